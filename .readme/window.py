@@ -13,7 +13,7 @@ import pygame
 from PIL import Image
 
 from robocov.mapfile import find_map_file, load_map
-from robocov_app.editor.edits.create import rectangle_drawn
+from robocov_app.editor.edits.create import add_rectangle
 from robocov_app.editor.ui.launch import editor_window
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.launch import HEADLESS_FPS, Launcher
@@ -56,7 +56,7 @@ def editor(theme: str, name: str) -> None:
     path = find_map_file("museum")
     with editor_window(path, HERE, theme=theme, size=SIZE, headless=True) as window:
         editor = window.editor
-        editor.change(rectangle_drawn(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
+        editor.apply(add_rectangle(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
         window.panel.show_tab("object")
         window.frame(0.5)
         to = window.canvas.to_pixel

@@ -16,15 +16,15 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.selection import Change, Edge, Selection, points_of
+from robocov_app.editor.model.selection import Change, Edge, Selection, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
-from robocov_app.editor.model.validation import Problem, examined
+from robocov_app.editor.model.validation import Problem, find_problems
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
 
 def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> tuple[Problem, ...]:
-    return examined(sketch, radius)[0]
+    return find_problems(sketch, radius)[0]
 
 
 def renumbered(sketch: Sketch) -> Sketch:
@@ -154,7 +154,7 @@ def selections(draw, sketch):
     keys = [item.key for item in sketch.obstacles]
     chosen = draw(st.sets(st.sampled_from(keys), max_size=4)) if keys else set()
     named = [name for name, _ in sketch.starts if draw(st.booleans())]
-    handles = [vertex for owner in (BOUNDARY, *keys, *named) for vertex, _ in points_of(sketch, owner)]
+    handles = [vertex for owner in (BOUNDARY, *keys, *named) for vertex, _ in list_vertices(sketch, owner)]
     picked = draw(st.sets(st.sampled_from(handles), max_size=3)) if handles and draw(st.booleans()) else set()
     boundary = sketch.boundary is not None and draw(st.integers(0, 4)) == 0
     return Selection(frozenset(chosen), frozenset(picked), frozenset(named), boundary)
@@ -179,65 +179,68 @@ def changes(draw, sketch):
     edges = [
         Edge(each, ring, k, points[k])
         for each in (BOUNDARY, *(item.key for item in sketch.obstacles))
-        for ring, points, _ in sketch.rings_of(each)
+        for ring, points, _ in sketch.list_rings(each)
         for k in range(len(points))
     ]
     edge = draw(st.sampled_from(edges)) if edges else Edge(BOUNDARY, 0, 0, a)
-    handles = sorted(selection.vertices, key=str) or [vertex for vertex, _ in points_of(sketch, owner)][:1]
+    handles = (
+        sorted(selection.vertices, key=str) or [vertex for vertex, _ in list_vertices(sketch, owner)][:1]
+    )
     key = owner if isinstance(owner, int) else 0
     deeds = [
-        lambda: create.polygon_drawn(sketch, [a, b, (a[0], b[1])]),
-        lambda: create.rectangle_drawn(sketch, [a, b]),
-        lambda: create.circle_drawn(sketch, a, length),
-        lambda: create.wall_drawn(sketch, [a, b], length),
-        lambda: create.boundary_drawn(sketch, [a, b, (b[0], a[1])]),
-        lambda: create.disc_start_drawn(sketch, a, length),
-        lambda: create.points_start_drawn(sketch, [a, b]),
-        lambda: create.anywhere_added(sketch),
-        lambda: transform.moved(sketch, selection, dx, dy),
-        lambda: transform.rotated(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
-        lambda: transform.scaled(sketch, selection, factor, draw(st.sampled_from([factor, 1.5])), a),
-        lambda: transform.resized(sketch, selection, length, draw(st.sampled_from([None, 1.0]))),
-        lambda: transform.placed(sketch, selection, a[0], None),
-        lambda: transform.mirrored(sketch, selection, axis),
-        lambda: transform.duplicated(sketch, selection, dx, dy),
-        lambda: transform.arrayed(sketch, selection, 2, 2, 1.0, 1.0),
-        lambda: properties.deleted(sketch, selection),
-        lambda: properties.renamed(sketch, owner, draw(st.sampled_from(["", "x", "start", "y" * 101]))),
-        lambda: properties.noted(sketch, selection, "a note"),
-        lambda: properties.grouped(sketch, selection),
-        lambda: properties.locked(sketch, selection),
-        lambda: properties.hidden(sketch, selection),
-        lambda: properties.titled(sketch, "another", "and its description"),
-        lambda: properties.widened(sketch, selection, length),
-        lambda: properties.sized(sketch, selection, length),
-        lambda: properties.raised(sketch, selection, draw(st.sampled_from(["top", "bottom"]))),
-        lambda: properties.start_first(sketch, str(owner)),
-        lambda: properties.made_polygons(sketch, selection),
-        lambda: properties.made_boundary(sketch, selection),
-        lambda: properties.underlaid(sketch, Background("plan.png", (40, 30))),
-        lambda: vertices.moved(sketch, selection, dx, dy),
-        lambda: Change(vertices.with_places(sketch, dict.fromkeys(handles, a)), selection, "put"),
-        lambda: vertices.inserted(sketch, edge),
-        lambda: vertices.extended(sketch, handles[0], a) if handles else None,
-        lambda: vertices.deleted(sketch, selection),
-        lambda: vertices.bevelled(sketch, selection, length),
-        lambda: vertices.rounded_off(sketch, selection, length),
-        lambda: vertices.hole_filled(sketch, key, 1) if key in sketch.places else None,
-        lambda: vertices.split(sketch, handles[0]) if handles else None,
-        lambda: vertices.joined(sketch, selection),
-        lambda: boolean.united(sketch, selection),
-        lambda: boolean.subtracted(sketch, selection),
-        lambda: boolean.intersected(sketch, selection),
-        lambda: boolean.divided(sketch, selection),
+        lambda: create.add_polygon(sketch, [a, b, (a[0], b[1])]),
+        lambda: create.add_rectangle(sketch, [a, b]),
+        lambda: create.add_circle(sketch, a, length),
+        lambda: create.add_wall(sketch, [a, b], length),
+        lambda: create.set_boundary(sketch, [a, b, (b[0], a[1])]),
+        lambda: create.add_disc_start(sketch, a, length),
+        lambda: create.add_points_start(sketch, [a, b]),
+        lambda: create.add_uniform_start(sketch),
+        lambda: transform.move(sketch, selection, dx, dy),
+        lambda: transform.rotate(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
+        lambda: transform.scale(sketch, selection, factor, draw(st.sampled_from([factor, 1.5])), a),
+        lambda: transform.resize(sketch, selection, length, draw(st.sampled_from([None, 1.0]))),
+        lambda: transform.place(sketch, selection, a[0], None),
+        lambda: transform.mirror(sketch, selection, axis),
+        lambda: transform.duplicate(sketch, selection, dx, dy),
+        lambda: transform.copy_to_grid(sketch, selection, 2, 2, (1.0, 1.0)),
+        lambda: properties.delete(sketch, selection),
+        lambda: properties.rename(sketch, owner, draw(st.sampled_from(["", "x", "start", "y" * 101]))),
+        lambda: properties.set_note(sketch, selection, "a note"),
+        lambda: properties.group(sketch, selection),
+        lambda: properties.lock(sketch, selection),
+        lambda: properties.hide(sketch, selection),
+        lambda: properties.set_title(sketch, "another"),
+        lambda: properties.set_description(sketch, "and its description"),
+        lambda: properties.set_width(sketch, selection, length),
+        lambda: properties.set_radius(sketch, selection, length),
+        lambda: properties.restack(sketch, selection, draw(st.sampled_from(["top", "bottom"]))),
+        lambda: properties.make_default_start(sketch, str(owner)),
+        lambda: properties.convert_to_polygons(sketch, selection),
+        lambda: properties.convert_to_boundary(sketch, selection),
+        lambda: properties.set_background(sketch, Background("plan.png", (40, 30))),
+        lambda: vertices.move_vertices(sketch, selection, dx, dy),
+        lambda: Change(vertices.place_vertices(sketch, dict.fromkeys(handles, a)), selection, "put"),
+        lambda: vertices.insert_vertex(sketch, edge),
+        lambda: vertices.extend_wall(sketch, handles[0], a) if handles else None,
+        lambda: vertices.delete_vertices(sketch, selection),
+        lambda: vertices.bevel_corners(sketch, selection, length),
+        lambda: vertices.round_corners(sketch, selection, length),
+        lambda: vertices.fill_hole(sketch, key, 1) if key in sketch.index_by_key else None,
+        lambda: vertices.split_wall(sketch, handles[0]) if handles else None,
+        lambda: vertices.join_walls(sketch, selection),
+        lambda: boolean.unite(sketch, selection),
+        lambda: boolean.subtract(sketch, selection),
+        lambda: boolean.intersect(sketch, selection),
+        lambda: boolean.divide(sketch, selection),
         lambda: boolean.offset(sketch, selection, draw(st.sampled_from([length, -length]))),
-        lambda: boolean.clipped(sketch, selection),
-        lambda: boolean.repaired(sketch, selection),
-        lambda: vertices.simplified(sketch, selection, length),
-        lambda: vertices.straightened(sketch, selection, 20.0),
-        lambda: transform.aligned(sketch, selection, side),
-        lambda: transform.distributed(sketch, selection, axis),
-        lambda: clipboard.pasted(sketch, clipboard.copied(sketch, selection), a),
+        lambda: boolean.clip_to_boundary(sketch, selection),
+        lambda: boolean.repair_outlines(sketch, selection),
+        lambda: vertices.simplify(sketch, selection, length),
+        lambda: vertices.straighten(sketch, selection, 20.0),
+        lambda: transform.align(sketch, selection, side),
+        lambda: transform.distribute(sketch, selection, axis),
+        lambda: clipboard.paste(sketch, clipboard.copy_selection(sketch, selection), a),
     ]
     try:
         return draw(st.sampled_from(deeds))()

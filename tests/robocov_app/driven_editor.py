@@ -12,11 +12,12 @@ import pygame
 from driven_window import MODIFIERS, Driver
 
 from robocov.mapfile import load_map
-from robocov_app.editor.model.document import FIRST_SHEET, Document
-from robocov_app.editor.model.measurement import measurement_worker
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.model.document import DEFAULT_BOUNDARY, Document
+from robocov_app.editor.model.measurement import create_measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.editor import Editor, EditorSettings
+from robocov_app.editor.settings import EditorSettings
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.display import open_display
@@ -26,7 +27,7 @@ SIZE = (900, 600)
 
 def sheet(*shapes: Any, **more: Any) -> Sketch:
     """Return a sketch of 10 x 10 m with these obstacles."""
-    return Sketch(boundary=FIRST_SHEET, **more).added(shapes)[0]
+    return Sketch(boundary=DEFAULT_BOUNDARY, **more).with_obstacles(shapes)[0]
 
 
 def of_map(name: str) -> Sketch:
@@ -55,7 +56,9 @@ def opened_editor(
     with open_display(headless=True):
         if document is None:
             document = Document(sketch if sketch is not None else sheet(), drafts)
-        editor = Editor(document, readings or measurement_worker(direct=True), folder, EditorSettings())
+        editor = Editor(
+            document, readings or create_measurement_worker(direct=True), folder, EditorSettings()
+        )
         editor.theme = theme
         hands = Hands(EditorWindow(editor, size, scale, drafts, patient=True))
         hands.settle()

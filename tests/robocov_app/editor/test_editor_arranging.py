@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart
 from robocov.errors import MapError
-from robocov_app.editor.edits.transform import SIDES, aligned, bounds_of, distributed
-from robocov_app.editor.model.selection import Selection, Vertex, place_of
+from robocov_app.editor.edits.transform import SIDES, align, compute_bounds, distribute
+from robocov_app.editor.model.selection import Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
 
@@ -19,11 +19,11 @@ def box(x, y, width, height):
 def sketch() -> Sketch:
     shapes = [box(1.0, 1.0, 2.0, 1.0), CircleObstacle((5.0, 4.0), 0.5), box(8.0, 2.0, 1.0, 4.0)]
     starts = (("disc", DiscStart((10.0, 7.0), 0.5)), ("all", UniformStart()))
-    return Sketch("Hall", boundary=HALL, starts=starts).added(shapes)[0]
+    return Sketch("Hall", boundary=HALL, starts=starts).with_obstacles(shapes)[0]
 
 
 def boxes(sketch, owners):
-    return np.array([bounds_of(sketch, Selection.of(owner)) for owner in owners])
+    return np.array([compute_bounds(sketch, Selection.of(owner)) for owner in owners])
 
 
 LEVELS = {
@@ -41,7 +41,7 @@ def test_what_is_aligned_is_level_and_moves_along_one_axis(sketch, side, to_boun
     keys = [item.key for item in sketch.obstacles]
     before = boxes(sketch, keys)
     selection = Selection.of(*keys, BOUNDARY) if to_boundary else Selection.of(*keys)
-    change = aligned(sketch, selection, side)
+    change = align(sketch, selection, side)
     after = boxes(change.sketch, keys)
     levels = LEVELS[side](after)
     frame = np.array([*before[:, :2].min(axis=0), *before[:, 2:].max(axis=0)])
@@ -59,7 +59,7 @@ def test_gaps_become_equal(sketch, axis):
     a = ("x", "y").index(axis)
     before = boxes(sketch, keys)
     order = sorted(range(len(keys)), key=lambda k: (before[k, a], before[k, a + 2]))
-    after = boxes(distributed(sketch, Selection.of(*keys), axis).sketch, keys)[order]
+    after = boxes(distribute(sketch, Selection.of(*keys), axis).sketch, keys)[order]
     gaps = after[1:, a] - after[:-1, a + 2]
     np.testing.assert_allclose(gaps, gaps.mean(), atol=4e-4)
     np.testing.assert_allclose(after[0], before[order[0]])
@@ -68,38 +68,38 @@ def test_gaps_become_equal(sketch, axis):
 
 
 def test_starts_are_aligned_too_and_the_boundary_stays(sketch):
-    change = aligned(sketch, Selection.of(0, "disc", "all"), "left")
-    assert change.sketch.start("disc") == DiscStart((1.5, 7.0), 0.5)
-    assert change.words == "2 things aligned at the left"
-    change = aligned(sketch, Selection.of(1, BOUNDARY), "middle")
-    assert change.sketch.item(1).shape.center == (5.0, 4.0)
-    change = aligned(sketch, Selection.of(1, BOUNDARY), "right")
-    assert change.sketch.item(1).shape.center == (11.5, 4.0)
+    change = align(sketch, Selection.of(0, "disc", "all"), "left")
+    assert change.sketch.get_start("disc") == DiscStart((1.5, 7.0), 0.5)
+    assert change.description == "2 things aligned at the left"
+    change = align(sketch, Selection.of(1, BOUNDARY), "middle")
+    assert change.sketch.get_item(1).shape.center == (5.0, 4.0)
+    change = align(sketch, Selection.of(1, BOUNDARY), "right")
+    assert change.sketch.get_item(1).shape.center == (11.5, 4.0)
     assert change.sketch.boundary == HALL
 
 
 def test_single_vertices_are_aligned(sketch):
     chosen = Selection(vertices=frozenset({Vertex(0, 0, 0), Vertex(2, 0, 1), Vertex(BOUNDARY, 0, 1)}))
-    change = aligned(sketch, chosen, "bottom")
-    assert [place_of(change.sketch, vertex)[1] for vertex in chosen.vertices] == [0.0] * 3
-    assert place_of(change.sketch, Vertex(0, 0, 0)) == (1.0, 0.0)
-    assert change.words == "3 vertices aligned at the bottom"
-    middle = aligned(sketch, chosen, "centre")
-    assert {place_of(middle.sketch, vertex)[0] for vertex in chosen.vertices} == {6.5}
+    change = align(sketch, chosen, "bottom")
+    assert [find_position(change.sketch, vertex)[1] for vertex in chosen.vertices] == [0.0] * 3
+    assert find_position(change.sketch, Vertex(0, 0, 0)) == (1.0, 0.0)
+    assert change.description == "3 vertices aligned at the bottom"
+    middle = align(sketch, chosen, "centre")
+    assert {find_position(middle.sketch, vertex)[0] for vertex in chosen.vertices} == {6.5}
 
 
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
-        (lambda s: aligned(s, Selection.of(0), "left"), "two or more"),
-        (lambda s: aligned(s, Selection.of("all", BOUNDARY), "left"), "select obstacles or starts"),
-        (lambda s: aligned(s, Selection.of(0, 1), "up"), "one of left"),
+        (lambda s: align(s, Selection.of(0), "left"), "two or more"),
+        (lambda s: align(s, Selection.of("all", BOUNDARY), "left"), "select obstacles or starts"),
+        (lambda s: align(s, Selection.of(0, 1), "up"), "one of left"),
         (
-            lambda s: aligned(s, Selection(vertices=frozenset({Vertex(0, 0, 0)})), "left"),
+            lambda s: align(s, Selection(vertices=frozenset({Vertex(0, 0, 0)})), "left"),
             "two or more vertices",
         ),
-        (lambda s: distributed(s, Selection.of(0, 1), "x"), "three or more"),
-        (lambda s: distributed(s, Selection.of(0, 1, 2), "z"), "an axis"),
+        (lambda s: distribute(s, Selection.of(0, 1), "x"), "three or more"),
+        (lambda s: distribute(s, Selection.of(0, 1, 2), "z"), "an axis"),
     ],
 )
 def test_what_cannot_be_arranged_is_said(sketch, deed, words):
@@ -108,6 +108,6 @@ def test_what_cannot_be_arranged_is_said(sketch, deed, words):
 
 
 def test_there_must_be_a_boundary_to_align_with(sketch):
-    without, keys = Sketch().added([box(0.0, 0.0, 1.0, 1.0)])
+    without, keys = Sketch().with_obstacles([box(0.0, 0.0, 1.0, 1.0)])
     with pytest.raises(MapError, match="no boundary"):
-        aligned(without, Selection.of(*keys, BOUNDARY), "left")
+        align(without, Selection.of(*keys, BOUNDARY), "left")

@@ -12,8 +12,15 @@ from driven_editor import of_map, opened_editor
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits.create import circle_drawn
-from robocov_app.editor.model.document import KIND, Autosave, content, recoverable, state_of, write_sketch
+from robocov_app.editor.edits.create import add_circle
+from robocov_app.editor.model.document import (
+    KIND,
+    Autosave,
+    build_record,
+    check_file,
+    find_recoverable,
+    write_sketch,
+)
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.storage.autosave import Autosaver, remove_draft
 
@@ -21,12 +28,12 @@ SKETCH = Sketch("Hall", boundary=HALL)
 
 
 def with_circles(count: int) -> Sketch:
-    return SKETCH.added([CircleObstacle((k + 1.0, 1.0), 0.3) for k in range(count)])[0]
+    return SKETCH.with_obstacles([CircleObstacle((k + 1.0, 1.0), 0.3) for k in range(count)])[0]
 
 
 def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> None:
     keeper = Autosaver(folder, KIND, path)
-    keeper.save_draft(lambda: content(sketch, disk))
+    keeper.save_draft(lambda: build_record(sketch, disk))
     keeper.close(discard=False)
 
 
@@ -34,30 +41,30 @@ def test_a_map_comes_back_with_its_file(tmp_path):
     path = tmp_path / "hall.json"
     disk = write_sketch(SKETCH, path)
     kept(tmp_path / "drafts", with_circles(5), path, disk)
-    (found,) = recoverable(tmp_path / "drafts")
+    (found,) = find_recoverable(tmp_path / "drafts")
     assert (found.path, found.name, found.obstacles, found.disk) == (path, "Hall", 5, disk)
-    assert found.sketch() == with_circles(5)
-    assert found.words().startswith("“Hall”, 5 obstacles, today ")
-    assert found.words().endswith("not saved to hall.json")
-    assert state_of(found.disk) == "same"
+    assert found.read_sketch() == with_circles(5)
+    assert found.describe().startswith("“Hall”, 5 obstacles, today ")
+    assert found.describe().endswith("not saved to hall.json")
+    assert check_file(found.disk) == "same"
 
 
 def test_one_whose_file_holds_it_already_is_not_offered(tmp_path):
     path = tmp_path / "hall.json"
     disk = write_sketch(with_circles(3), path)
     kept(tmp_path / "drafts", with_circles(3), path, disk)
-    assert recoverable(tmp_path / "drafts") == ()
+    assert find_recoverable(tmp_path / "drafts") == ()
     write_sketch(with_circles(4), path, disk)
-    assert len(recoverable(tmp_path / "drafts")) == 1
+    assert len(find_recoverable(tmp_path / "drafts")) == 1
 
 
 def test_one_that_vanishes_meanwhile_is_said(tmp_path):
     kept(tmp_path, SKETCH)
-    (found,) = recoverable(tmp_path)
-    assert found.words().endswith("never saved")
+    (found,) = find_recoverable(tmp_path)
+    assert found.describe().endswith("never saved")
     remove_draft(found.folder)
     with pytest.raises(MapError, match="no such file"):
-        found.sketch()
+        found.read_sketch()
 
 
 def test_what_is_no_map_or_has_a_strange_file_is_left_alone(tmp_path):
@@ -66,9 +73,9 @@ def test_what_is_no_map_or_has_a_strange_file_is_left_alone(tmp_path):
     held = json.loads(file.read_text())
     for wrong in ({"sketch": []}, {"path": "x", "disk": 1}, {"path": "x", "disk": {"stamp": [1]}}):
         file.write_text(json.dumps(held | wrong))
-        assert recoverable(tmp_path) == ()
+        assert find_recoverable(tmp_path) == ()
     file.write_text(json.dumps(held))
-    assert len(recoverable(tmp_path)) == 1
+    assert len(find_recoverable(tmp_path)) == 1
 
 
 def test_words_for_days():
@@ -79,7 +86,7 @@ def test_words_for_days():
         (now - timedelta(days=9), "2030-05-08 12:00"),
     ]:
         found = Autosave(Path("x"), Path("/maps/hall.json"), "Hall", when, 1, None)
-        assert found.words(now) == f"“Hall”, 1 obstacle, {words}, not saved to hall.json"
+        assert found.describe(now) == f"“Hall”, 1 obstacle, {words}, not saved to hall.json"
 
 
 @pytest.mark.parametrize("ends", ["killed", "closed"])
@@ -109,7 +116,7 @@ def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
 def test_a_file_can_be_opened_after_leaving_for_it_was_cancelled(tmp_path):
     write_sketch(SKETCH, tmp_path / "hall.json")
     with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
-        hands.editor.change(circle_drawn(hands.sketch, (5.0, 5.0), 1.0))
+        hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
         for answer in ("escape", "escape", "d"):
             hands.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
             hands.settle()

@@ -9,40 +9,40 @@ from hypothesis import strategies as st
 from robocov.errors import MapError
 from robocov_app.editor.model.background import (
     Background,
-    levelled,
-    picture_laid,
-    to_scale,
+    create_background,
+    level_background,
+    scale_to_length,
 )
-from robocov_app.editor.model.geometry import cos_sin
+from robocov_app.editor.model.geometry import compute_cos_sin
 
 PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
 
 
 def pixel_at(background: Background, place):
     dx, dy = place[0] - background.corner[0], place[1] - background.corner[1]
-    cos, sin = cos_sin(background.turn)
+    cos, sin = compute_cos_sin(background.turn)
     x, y = cos * dx + sin * dy, cos * dy - sin * dx
     return x / background.scale, background.pixels[1] - y / background.scale
 
 
 @given(backgrounds, st.floats(-100, 5000), st.floats(-100, 5000))
 def test_pixels_and_places_belong_together(background, x, y):
-    place = background.place_of((x, y))
+    place = background.to_world((x, y))
     size = max(1.0, *map(abs, background.corner), *map(abs, place)) / background.scale
     assert pixel_at(background, place) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
 
 
 def test_pixels_count_downwards_from_the_upper_left_corner():
-    assert PLAN.place_of((0, 300)) == (1.0, 2.0)
-    assert PLAN.place_of((400, 0)) == (21.0, 17.0)
+    assert PLAN.to_world((0, 300)) == (1.0, 2.0)
+    assert PLAN.to_world((400, 0)) == (21.0, 17.0)
     assert PLAN.corners == ((1.0, 2.0), (21.0, 2.0), (21.0, 17.0), (1.0, 17.0))
     upright = replace(PLAN, turn=90.0)
-    assert upright.place_of((400, 300)) == pytest.approx((1.0, 22.0))
+    assert upright.to_world((400, 300)) == pytest.approx((1.0, 22.0))
 
 
 @given(backgrounds)
 def test_a_document_gives_it_back(background):
-    assert Background.of_document(background.document()) == background
+    assert Background.from_document(background.to_document()) == background
 
 
 @pytest.mark.parametrize(
@@ -64,18 +64,18 @@ def test_a_document_gives_it_back(background):
     ],
 )
 def test_what_is_none_is_none(change):
-    assert Background.of_document({**PLAN.document(), **change}) is None
-    assert Background.of_document([]) is None
+    assert Background.from_document({**PLAN.to_document(), **change}) is None
+    assert Background.from_document([]) is None
 
 
 def test_a_picture_is_laid_as_wide_as_asked():
-    background = picture_laid("plan.png", (400, 300), 10.0)
+    background = create_background("plan.png", (400, 300), 10.0)
     assert background.scale == 0.025
     assert background.corners[2] == pytest.approx((10.0, 7.5))
     with pytest.raises(MapError, match="million pixels"):
-        picture_laid("plan.png", (100_000, 1_000))
+        create_background("plan.png", (100_000, 1_000))
     with pytest.raises(MapError, match="0 x 5 pixels"):
-        picture_laid("plan.png", (0, 5))
+        create_background("plan.png", (0, 5))
 
 
 places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
@@ -84,11 +84,11 @@ places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
 @given(backgrounds, st.tuples(st.integers(0, 99), st.integers(0, 99)), st.sampled_from([0.1, 2.5, 40.0]))
 def test_two_clicked_points_come_to_be_so_far_apart(background, offset, metres):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
-    a, b = background.place_of((0, 0)), background.place_of((offset[0] + 5, offset[1]))
+    a, b = background.to_world((0, 0)), background.to_world((offset[0] + 5, offset[1]))
     pixel_a, pixel_b = pixel_at(background, a), pixel_at(background, b)
-    scaled = to_scale(background, a, b, metres)
-    assert math.dist(scaled.place_of(pixel_a), scaled.place_of(pixel_b)) == pytest.approx(metres)
-    assert scaled.place_of(pixel_a) == pytest.approx(a, abs=1e-6)
+    scaled = scale_to_length(background, a, b, metres)
+    assert math.dist(scaled.to_world(pixel_a), scaled.to_world(pixel_b)) == pytest.approx(metres)
+    assert scaled.to_world(pixel_a) == pytest.approx(a, abs=1e-6)
     assert scaled.turn == background.turn
 
 
@@ -100,19 +100,19 @@ def test_what_gives_no_scale_is_said():
         ((1.0, 1.0), (5.0, 1.0), 1e9, "is 1e\\+09 m right"),
     ]:
         with pytest.raises(MapError, match=words):
-            to_scale(PLAN, a, b, metres)
+            scale_to_length(PLAN, a, b, metres)
 
 
 @given(backgrounds, st.tuples(st.integers(10, 99), st.integers(-99, 99)))
 def test_two_clicked_points_come_to_lie_level_or_upright(background, offset):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
-    a, b = background.place_of((0, 0)), background.place_of(offset)
-    level = levelled(background, a, b)
-    there, end = level.place_of((0, 0)), level.place_of(offset)
+    a, b = background.to_world((0, 0)), background.to_world(offset)
+    level = level_background(background, a, b)
+    there, end = level.to_world((0, 0)), level.to_world(offset)
     assert there == pytest.approx(a, abs=1e-6)
     assert min(abs(end[0] - a[0]), abs(end[1] - a[1])) < 1e-6
     assert math.dist(there, end) == pytest.approx(math.dist(a, b))
     assert abs(math.remainder(level.turn - background.turn, 360.0)) <= 45.0 + 1e-6
     assert -180.0 <= level.turn <= 180.0
     with pytest.raises(MapError, match="farther apart"):
-        levelled(background, a, a)
+        level_background(background, a, a)

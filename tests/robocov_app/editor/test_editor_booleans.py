@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties
-from robocov_app.editor.model.geometry import outlines
+from robocov_app.editor.model.geometry import extract_polygons
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 
@@ -24,25 +24,25 @@ def box(x, y, width, height):
 
 
 WANTED = {
-    "united": lambda counts: counts >= 1,
-    "intersected": lambda counts: counts.min(axis=0) == counts.max(axis=0),
+    "unite": lambda counts: counts >= 1,
+    "intersect": lambda counts: counts.min(axis=0) == counts.max(axis=0),
 }
 
 
 @settings(max_examples=150)
 @given(
     st.lists(sound_shapes(), min_size=2, max_size=4),
-    st.sampled_from(["united", "subtracted", "intersected", "divided"]),
+    st.sampled_from(["unite", "subtract", "intersect", "divide"]),
 )
 def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shapes, name):
-    sketch, keys = Sketch("n", boundary=HALL).added(shapes)
+    sketch, keys = Sketch("n", boundary=HALL).with_obstacles(shapes)
     raw = [shape.polygon for shape in shapes]
     first, others = raw[0], shapely.union_all(raw[1:])
     wanted = {
-        "united": shapely.union_all(raw),
-        "subtracted": first - others,
-        "intersected": shapely.intersection_all(raw),
-        "divided": first,
+        "unite": shapely.union_all(raw),
+        "subtract": first - others,
+        "intersect": shapely.intersection_all(raw),
+        "divide": first,
     }
     perimeter = sum(shape.length for shape in raw)
     try:
@@ -50,7 +50,7 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
     except MapError:
         assert wanted[name].area < 1e-3 * perimeter
         return
-    results = [change.sketch.item(key).shape for key in change.selection.items]
+    results = [change.sketch.get_item(key).shape for key in change.selection.items]
     assert len(results) == len(change.sketch.obstacles)
     # every vertex may move by half of a tenth of a millimetre each way, and crumbs go
     assert sum(shape.polygon.area for shape in results) == pytest.approx(
@@ -63,7 +63,7 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
         for ring in (shape.vertices, *shape.holes):
             assert ring[0] != ring[-1]
             assert all(value == round(value, 4) for point in ring for value in point)
-    assert not [problem for problem in problems(change.sketch) if problem.grave and problem.of in keys]
+    assert not [problem for problem in problems(change.sketch) if problem.is_error and problem.owner in keys]
     # by places: in as many of the shapes as it takes, but for a hair's breadth at the edges
     rng = np.random.default_rng(0)
     low_x, low_y, high_x, high_y = shapely.union_all(raw).bounds
@@ -72,10 +72,10 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
     points = points[shapely.distance(edges, points) > 1e-3]
     inside = np.array([shapely.contains(shape, points) for shape in raw])
     expected = {
-        "united": inside.any(axis=0),
-        "subtracted": inside[0] & ~inside[1:].any(axis=0),
-        "intersected": inside.all(axis=0),
-        "divided": inside[0],
+        "unite": inside.any(axis=0),
+        "subtract": inside[0] & ~inside[1:].any(axis=0),
+        "intersect": inside.all(axis=0),
+        "divide": inside[0],
     }[name]
     np.testing.assert_array_equal(shapely.contains(covered(change.sketch), points), expected)
 
@@ -86,17 +86,17 @@ def test_holes_stay():
         (((2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)),),
         "f",
     )
-    sketch, (a, b) = Sketch(boundary=HALL).added([frame, box(4.5, 2.5, 2.0, 1.0)])
-    change = boolean.united(sketch, Selection.of(a, b))
+    sketch, (a, b) = Sketch(boundary=HALL).with_obstacles([frame, box(4.5, 2.5, 2.0, 1.0)])
+    change = boolean.unite(sketch, Selection.of(a, b))
     (item,) = change.sketch.obstacles
     assert len(item.shape.holes) == 1
     assert item.shape.polygon.area == pytest.approx(12.0 + 1.5)
-    assert change.words == "2 obstacles united"
-    cut = boolean.subtracted(change.sketch.added([box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1))
+    assert change.description == "2 obstacles united"
+    cut = boolean.subtract(change.sketch.with_obstacles([box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1))
     assert cut.selection
     # from a plate, a smaller one cuts a hole
-    sketch, keys = Sketch().added([box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
-    (item,) = boolean.subtracted(sketch, Selection.of(*keys)).sketch.obstacles
+    sketch, keys = Sketch().with_obstacles([box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
+    (item,) = boolean.subtract(sketch, Selection.of(*keys)).sketch.obstacles
     assert len(item.shape.holes) == 1
     assert item.shape.polygon.area == pytest.approx(16.0 - np.pi, abs=5e-3)
 
@@ -110,8 +110,8 @@ def test_the_result_takes_the_place_of_the_lowest():
             Item(4, replace(box(1.0, -1.0, 1.0, 3.0), name="knife")),
         )
     )
-    change = boolean.subtracted(sketch, Selection.of(4, 3))
-    assert change.words == "1 obstacle cut out of polygon “desk”"
+    change = boolean.subtract(sketch, Selection.of(4, 3))
+    assert change.description == "1 obstacle cut out of polygon “desk”"
     keys = [item.key for item in change.sketch.obstacles]
     assert keys[:2] == [5, 3]
     assert keys[3] == 9
@@ -124,22 +124,22 @@ def test_the_result_takes_the_place_of_the_lowest():
 @pytest.mark.parametrize(
     ("name", "shapes", "words"),
     [
-        ("united", [box(0.0, 0.0, 1.0, 1.0)], "select two or more obstacles to unite"),
-        ("intersected", [box(0.0, 0.0, 1.0, 1.0), box(2.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
-        ("intersected", [box(0.0, 0.0, 1.0, 1.0), box(1.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
-        ("subtracted", [box(0.2, 0.2, 0.5, 0.5), box(0.0, 0.0, 1.0, 1.0)], "nothing is left of polygon"),
-        ("united", [box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)], "the wall covers nothing"),
+        ("unite", [box(0.0, 0.0, 1.0, 1.0)], "select two or more obstacles to unite"),
+        ("intersect", [box(0.0, 0.0, 1.0, 1.0), box(2.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
+        ("intersect", [box(0.0, 0.0, 1.0, 1.0), box(1.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
+        ("subtract", [box(0.2, 0.2, 0.5, 0.5), box(0.0, 0.0, 1.0, 1.0)], "nothing is left of polygon"),
+        ("unite", [box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)], "the wall covers nothing"),
     ],
 )
 def test_what_cannot_be_is_said(name, shapes, words):
-    sketch, keys = Sketch().added(shapes)
+    sketch, keys = Sketch().with_obstacles(shapes)
     with pytest.raises(MapError, match=words):
         getattr(boolean, name)(sketch, Selection.of(*keys))
 
 
 @given(sound_shapes(), st.sampled_from([0.05, 0.3, 1.0, -0.05, -0.2]))
 def test_an_offset_is_as_far_away_as_asked(shape, by):
-    sketch, (key,) = Sketch().added([shape])
+    sketch, (key,) = Sketch().with_obstacles([shape])
     before = shape.polygon
     try:
         change = boolean.offset(sketch, Selection.of(key), by)
@@ -158,7 +158,7 @@ def test_an_offset_is_as_far_away_as_asked(shape, by):
         assert before.buffer(by * 0.99 + 2e-3).covers(after.buffer(-1e-3))
     assert after.area > 0.0
     if isinstance(shape, CircleObstacle):
-        assert change.sketch.item(key).shape.radius == pytest.approx(shape.radius + by, abs=1e-4)
+        assert change.sketch.get_item(key).shape.radius == pytest.approx(shape.radius + by, abs=1e-4)
 
 
 def test_what_sticks_out_is_cut_off():
@@ -167,33 +167,35 @@ def test_what_sticks_out_is_cut_off():
         CircleObstacle((12.0, 4.0), 1.0, "half"),
         CircleObstacle((30.0, 4.0), 1.0, "outside"),
     ]
-    sketch, _ = Sketch(boundary=HALL).added(shapes)
-    change = boolean.clipped(sketch, Selection())
-    assert change.words == "2 obstacles cut off at the boundary"
+    sketch, _ = Sketch(boundary=HALL).with_obstacles(shapes)
+    change = boolean.clip_to_boundary(sketch, Selection())
+    assert change.description == "2 obstacles cut off at the boundary"
     inside, half = change.sketch.obstacles
     assert inside is sketch.obstacles[0]
     assert half.shape.polygon.area == pytest.approx(np.pi / 2, abs=5e-3)
     assert shapely.Polygon(HALL).covers(half.geometry)
     with pytest.raises(MapError, match="nothing sticks out"):
-        boolean.clipped(change.sketch, Selection())
+        boolean.clip_to_boundary(change.sketch, Selection())
     with pytest.raises(MapError, match="boundary must be sound"):
-        boolean.clipped(replace(sketch, boundary=None), Selection())
+        boolean.clip_to_boundary(replace(sketch, boundary=None), Selection())
 
 
 def test_crossing_outlines_are_repaired():
     bow_tie = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
     sketch = Sketch("n", boundary=((0.0, 0.0), (8.0, 8.0), (8.0, 0.0), (0.0, 8.0), (0.0, 7.0)))
-    sketch, keys = sketch.added([PolygonObstacle(bow_tie, (), "tie"), CircleObstacle((6.0, 4.0), 0.5)])
-    change = boolean.repaired(sketch, Selection())
-    assert change.words == "2 outlines repaired"
-    assert not [problem for problem in problems(change.sketch) if problem.grave]
+    sketch, keys = sketch.with_obstacles(
+        [PolygonObstacle(bow_tie, (), "tie"), CircleObstacle((6.0, 4.0), 0.5)]
+    )
+    change = boolean.repair_outlines(sketch, Selection())
+    assert change.description == "2 outlines repaired"
+    assert not [problem for problem in problems(change.sketch) if problem.is_error]
     assert sum(item.geometry.area for item in change.sketch.obstacles[:2]) == pytest.approx(2.0)
     assert change.sketch.obstacles[-1] is sketch.obstacles[-1]
     assert change.selection.boundary
     with pytest.raises(MapError, match="nothing to repair"):
-        boolean.repaired(change.sketch, Selection())
+        boolean.repair_outlines(change.sketch, Selection())
     # of what is selected only
-    only = boolean.repaired(sketch, Selection.of(keys[0]))
+    only = boolean.repair_outlines(sketch, Selection.of(keys[0]))
     assert only.sketch.boundary == sketch.boundary
 
 
@@ -201,7 +203,7 @@ def test_crossing_outlines_are_repaired():
 def test_walls_and_circles_become_the_polygons_that_they_are(sketch):
     keys = [item.key for item in sketch.obstacles if not isinstance(item.shape, PolygonObstacle)]
     assume(keys)
-    change = properties.made_polygons(sketch, Selection.of(*keys))
+    change = properties.convert_to_polygons(sketch, Selection.of(*keys))
     assert all(isinstance(item.shape, PolygonObstacle) for item in change.sketch.obstacles)
     difference = covered(change.sketch) ^ covered(sketch)
     assert difference.area <= 1e-4 * sum(item.geometry.length for item in sketch.obstacles)
@@ -210,12 +212,12 @@ def test_walls_and_circles_become_the_polygons_that_they_are(sketch):
 def test_outlines_are_valid_on_their_grid():
     # a spike thinner than the grid, a crumb, and a hole no wider than a millimetre
     spike = shapely.Polygon([(0, 0), (1, 0), (1, 0.5), (1.3, 0.50001), (1, 0.50002), (1, 1), (0, 1)])
-    (shape,) = outlines(spike)
+    (shape,) = extract_polygons(spike)
     assert shape.polygon.is_valid
     assert len(shape.vertices) == 4
-    assert outlines(shapely.box(0, 0, 0.0005, 5.0)) == ()
+    assert extract_polygons(shapely.box(0, 0, 0.0005, 5.0)) == ()
     slit = shapely.box(0, 0, 1, 1) - shapely.box(0.5, 0.2, 0.5004, 0.8)
-    assert outlines(slit)[0].holes == ()
-    assert outlines(shapely.LineString([(0, 0), (1, 1)])) == ()
+    assert extract_polygons(slit)[0].holes == ()
+    assert extract_polygons(shapely.LineString([(0, 0), (1, 1)])) == ()
     collinear = shapely.Polygon([(0, 0), (0.5, 0), (1, 0), (1, 1), (0, 1)])
-    assert len(outlines(collinear)[0].vertices) == 4
+    assert len(extract_polygons(collinear)[0].vertices) == 4

@@ -9,9 +9,9 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, Unif
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map
 from robocov_app.editor.edits import transform
-from robocov_app.editor.edits.clipboard import copied, pasted
+from robocov_app.editor.edits.clipboard import copy_selection, paste
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.model.sketch import Sketch, sketch_text
+from robocov_app.editor.model.sketch import Sketch, dump_sketch
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5)
@@ -20,26 +20,26 @@ PILLAR = CircleObstacle((6.0, 4.0), 0.5)
 @settings(max_examples=80)
 @given(st.one_of(drafts(), sound_sketches(least=1)))
 def test_what_is_copied_comes_back(sketch):
-    everything = Selection.all(sketch)
+    everything = Selection.select_all(sketch)
     assume(everything)
-    text = copied(sketch, everything)
+    text = copy_selection(sketch, everything)
     json.loads(text)
-    change = pasted(Sketch(), text)
+    change = paste(Sketch(), text)
     after = change.sketch
     assert [item.shape for item in after.obstacles] == [item.shape for item in sketch.obstacles]
     assert [item.note for item in after.obstacles] == [item.note for item in sketch.obstacles]
     assert after.starts == sketch.starts
     assert after.boundary == sketch.boundary
-    assert change.selection == Selection.all(after)
+    assert change.selection == Selection.select_all(after)
     # between windows: the same text says the same of what was pasted
-    assert json.loads(copied(after, change.selection))["obstacles"] == json.loads(text)["obstacles"]
+    assert json.loads(copy_selection(after, change.selection))["obstacles"] == json.loads(text)["obstacles"]
 
 
 @given(sound_sketches(least=1), st.sampled_from([(0.0, 0.0), (3.25, -1.5)]))
 def test_it_comes_where_the_cursor_is(sketch, at):
     whole = Selection(frozenset(item.key for item in sketch.obstacles))
-    change = pasted(sketch, copied(sketch, whole), at)
-    low_x, low_y, high_x, high_y = transform.bounds_of(change.sketch, change.selection)
+    change = paste(sketch, copy_selection(sketch, whole), at)
+    low_x, low_y, high_x, high_y = transform.compute_bounds(change.sketch, change.selection)
     assert ((low_x + high_x) / 2, (low_y + high_y) / 2) == pytest.approx(at, abs=2e-4)
     assert len(change.sketch.obstacles) == 2 * len(sketch.obstacles)
     assert change.sketch.obstacles[: len(sketch.obstacles)] == sketch.obstacles
@@ -47,46 +47,46 @@ def test_it_comes_where_the_cursor_is(sketch, at):
 
 
 def test_names_of_starts_stay_apart_and_a_second_boundary_is_left_out_unless_it_is_alone():
-    sketch, _ = Sketch(boundary=HALL, starts=(("corner", DiscStart((1.0, 1.0), 0.8)),)).added([BOX])
-    change = pasted(sketch, copied(sketch, Selection.all(sketch)))
+    sketch, _ = Sketch(boundary=HALL, starts=(("corner", DiscStart((1.0, 1.0), 0.8)),)).with_obstacles([BOX])
+    change = paste(sketch, copy_selection(sketch, Selection.select_all(sketch)))
     assert [name for name, _ in change.sketch.starts] == ["corner", "corner 2"]
     assert change.sketch.boundary == HALL
     assert [item.shape for item in change.sketch.obstacles] == [BOX, BOX]
-    assert change.words == "2 things pasted"
-    alone = pasted(sketch, copied(sketch, Selection(boundary=True)))
+    assert change.description == "2 things pasted"
+    alone = paste(sketch, copy_selection(sketch, Selection(boundary=True)))
     assert alone.sketch.obstacles[-1].shape == PolygonObstacle(HALL)
 
 
 def test_what_was_on_the_grid_stays_on_it():
     wall = WallObstacle(((1.0, 1.5), (2.0, 1.5)), 0.1)
-    sketch, keys = Sketch(boundary=HALL).added([wall])
-    change = pasted(sketch, copied(sketch, Selection.of(*keys)), (5.13, 3.38), grid=0.5)
+    sketch, keys = Sketch(boundary=HALL).with_obstacles([wall])
+    change = paste(sketch, copy_selection(sketch, Selection.of(*keys)), (5.13, 3.38), grid=0.5)
     assert change.sketch.obstacles[-1].shape.points == ((4.5, 3.5), (5.5, 3.5))
 
 
 def test_copying_nothing_is_said():
     with pytest.raises(MapError, match="to copy"):
-        copied(Sketch(), Selection())
+        copy_selection(Sketch(), Selection())
     with pytest.raises(MapError, match="to copy"):
-        copied(Sketch(), Selection.of(99))
+        copy_selection(Sketch(), Selection.of(99))
 
 
 def test_other_texts_can_be_pasted_too():
-    circle = pasted(Sketch(), '{"kind": "circle", "center": [1, 2], "radius": 0.5}')
+    circle = paste(Sketch(), '{"kind": "circle", "center": [1, 2], "radius": 0.5}')
     assert circle.sketch.obstacles[0].shape == CircleObstacle((1.0, 2.0), 0.5)
-    two = pasted(
+    two = paste(
         Sketch(),
         '[{"kind": "wall", "points": [[0, 0], [1, 0]], "width": 0.1},'
         ' {"kind": "circle", "center": [1, 2], "radius": 1}]',
     )
-    assert two.words == "2 obstacles pasted"
+    assert two.description == "2 obstacles pasted"
     assert isinstance(two.sketch.obstacles[0].shape, WallObstacle)
-    ring = pasted(Sketch(), " [[0, 0], [1, 0], [0.333333, 1]]")
+    ring = paste(Sketch(), " [[0, 0], [1, 0], [0.333333, 1]]")
     assert ring.sketch.obstacles[0].shape == PolygonObstacle(((0.0, 0.0), (1.0, 0.0), (0.3333, 1.0)))
-    rooms = pasted(Sketch(), dump_map(load_map("rooms")))
+    rooms = paste(Sketch(), dump_map(load_map("rooms")))
     assert len(rooms.sketch.obstacles) == len(load_map("rooms").obstacles)
     assert rooms.sketch.boundary == load_map("rooms").boundary
-    draft = pasted(Sketch(), sketch_text(Sketch(starts=(("a", UniformStart()),))))
+    draft = paste(Sketch(), dump_sketch(Sketch(starts=(("a", UniformStart()),))))
     assert draft.sketch.starts == (("a", UniformStart()),)
 
 
@@ -115,7 +115,7 @@ def test_other_texts_can_be_pasted_too():
 )
 def test_what_cannot_be_pasted_is_said_in_a_sentence(text):
     with pytest.raises(MapError) as caught:
-        pasted(Sketch(boundary=HALL), text)
+        paste(Sketch(boundary=HALL), text)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 300
 
@@ -123,6 +123,6 @@ def test_what_cannot_be_pasted_is_said_in_a_sentence(text):
 @given(st.text(max_size=30))
 def test_any_text_is_pasted_or_refused(text):
     try:
-        pasted(Sketch(), text)
+        paste(Sketch(), text)
     except MapError as error:
         assert "\n" not in str(error)

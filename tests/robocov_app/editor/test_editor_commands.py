@@ -12,7 +12,9 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, Wall
 from robocov_app.editor.edits import create
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
-from robocov_app.editor.ui.commands import GROUPS, TYPED, offered, typed_commands
+from robocov_app.editor.ui.commands import GROUPS
+from robocov_app.editor.ui.context_menu import list_menu_commands
+from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, list_typed_commands
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import Choice
 
@@ -81,7 +83,7 @@ def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
         Selection(vertices=vertex | {Vertex(0, 0, 2)}),
     ):
         hands.editor.select(selection)
-        names = offered(hands.editor)
+        names = list_menu_commands(hands.editor)
         assert {name for name in names if name} <= known
         assert names[0] and names[-1] and all(a or b for a, b in pairwise(names))
 
@@ -92,7 +94,7 @@ def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
 def test_booleans_unite_subtract_and_intersect(hands: Hands) -> None:
     hands.select(0, 1)
     hands.key("alt+u")
-    assert hands.sketch.item(0).geometry.area == pytest.approx(17) and len(hands.shapes) == 4
+    assert hands.sketch.get_item(0).geometry.area == pytest.approx(17) and len(hands.shapes) == 4
     hands.key("ctrl+z")
     hands.select(0, 1)
     hands.key("alt+s")
@@ -121,9 +123,9 @@ def test_turning_and_mirroring(hands: Hands) -> None:
     assert {x for x, _ in hands.shapes[3].points} == {2.0}
     hands.key("e")
     hands.select(0, 2)
-    before = hands.sketch.item(2).geometry.centroid.x
+    before = hands.sketch.get_item(2).geometry.centroid.x
     hands.key("shift+h")
-    assert hands.sketch.item(2).geometry.centroid.x != pytest.approx(before)
+    assert hands.sketch.get_item(2).geometry.centroid.x != pytest.approx(before)
 
 
 def test_walls_are_joined_split_and_extended(hands: Hands) -> None:
@@ -157,7 +159,7 @@ def test_copies_go_through_the_clipboard_also_to_another_window(hands: Hands, tm
         assert len(other.shapes) == 2
         clipboard.put("no map at all")
         other.key("ctrl+v")
-        assert other.editor.trouble and len(other.shapes) == 2
+        assert other.editor.has_error_message and len(other.shapes) == 2
         clipboard.put("")
         other.key("ctrl+v")
         assert "empty" in other.said
@@ -170,7 +172,7 @@ def test_deleting_and_duplicating(hands: Hands) -> None:
     hands.key("delete")
     assert len(hands.shapes) == 5
     hands.key("delete")
-    assert hands.editor.trouble and "nothing is selected" in hands.said
+    assert hands.editor.has_error_message and "nothing is selected" in hands.said
     hands.key("ctrl+a")
     hands.key("backspace")
     assert hands.shapes == []
@@ -224,14 +226,14 @@ def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
 def test_typed_commands_change_what_is_selected(hands: Hands, text: str, wanted: tuple[float, ...]) -> None:
     hands.select(0)
     hands.command(text)
-    assert hands.sketch.item(0).geometry.bounds == pytest.approx(wanted)
+    assert hands.sketch.get_item(0).geometry.bounds == pytest.approx(wanted)
 
 
 def test_typed_commands_name_note_array_and_set(hands: Hands) -> None:
     hands.select(0)
     for text in ("name desk", "note oak, heavy", "title Our office"):
         hands.command(text)
-    item = hands.sketch.item(0)
+    item = hands.sketch.get_item(0)
     assert (item.shape.name, item.note, hands.sketch.name) == ("desk", "oak, heavy", "Our office")
     hands.select(2)
     hands.command("circle 0.25")
@@ -249,9 +251,9 @@ def test_typed_commands_name_note_array_and_set(hands: Hands) -> None:
 
 
 def test_commands_that_take_a_value_are_found_by_typing(hands: Hands) -> None:
-    for word in TYPED:
+    for word in TYPED_COMMANDS:
         assert f"{word} " in [offer.fills for offer in hands.window.commands.offered(word)]
-    assert {command.name for command in typed_commands(hands.editor)} == set(TYPED)
+    assert {command.name for command in list_typed_commands(hands.editor)} == set(TYPED_COMMANDS)
 
 
 def palette(hands: Hands) -> Choice:
@@ -269,7 +271,7 @@ def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -
 
 
 def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
-    hands.editor.change(create.drawn(hands.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
+    hands.editor.apply(create.add_obstacle(hands.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
     hands.settle()
     hands.key("ctrl+tab", times=3)
     hands.frames(3)

@@ -5,7 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
-from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of, point_of, size_of
+from robocov_app.editor.model.coordinates import (
+    parse_angle,
+    parse_length,
+    parse_next_point,
+    parse_point,
+    parse_size,
+)
 
 LAST = (1.0, 2.0)
 
@@ -43,7 +49,7 @@ LAST = (1.0, 2.0)
     ],
 )
 def test_places(text, point):
-    assert point_of(text, last=LAST) == pytest.approx(point, abs=1e-9)
+    assert parse_point(text, last=LAST) == pytest.approx(point, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -73,15 +79,15 @@ def test_places(text, point):
 )
 def test_what_is_no_place_is_said_in_a_sentence(text):
     with pytest.raises(MapError) as caught:
-        point_of(text, last=LAST)
+        parse_point(text, last=LAST)
     assert "\n" not in str(caught.value)
     assert repr(text) in str(caught.value)
 
 
 def test_relative_places_need_a_point_before():
     with pytest.raises(MapError, match="no point before"):
-        point_of("@1 0")
-    assert point_of("1 0") == (1.0, 0.0)
+        parse_point("@1 0")
+    assert parse_point("1 0") == (1.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +115,7 @@ def test_relative_places_need_a_point_before():
     ],
 )
 def test_lengths(text, now, length):
-    assert length_of(text, now=now) == length
+    assert parse_length(text, now=now) == length
 
 
 @pytest.mark.parametrize(
@@ -129,7 +135,7 @@ def test_lengths(text, now, length):
 )
 def test_what_is_no_length_is_said(text, now):
     with pytest.raises(MapError, match=r"^'"):
-        length_of(text, now=now)
+        parse_length(text, now=now)
 
 
 @pytest.mark.parametrize(
@@ -146,17 +152,17 @@ def test_what_is_no_length_is_said(text, now):
     ],
 )
 def test_sizes(text, size):
-    assert size_of(text) == size
+    assert parse_size(text) == size
 
 
 @pytest.mark.parametrize("text", ["", "0", "3 x 0", "-1 x 2", "3 x", "x", "3 x 2 x 1", "50%"])
 def test_what_is_no_size_is_said(text):
     with pytest.raises(MapError, match=r"^'"):
-        size_of(text)
+        parse_size(text)
 
 
 def test_angles():
-    assert [angle_of(text) for text in ("45", "45°", "-90 deg", "22,5", "3.141592653589793rad")] == [
+    assert [parse_angle(text) for text in ("45", "45°", "-90 deg", "22,5", "3.141592653589793rad")] == [
         45.0,
         45.0,
         -90.0,
@@ -164,20 +170,20 @@ def test_angles():
         180.0,
     ]
     with pytest.raises(MapError, match="degrees"):
-        angle_of("north")
+        parse_angle("north")
 
 
 def test_a_mere_length_goes_towards_the_cursor():
-    assert next_point_of("2", LAST, (1.0, 9.0)) == (1.0, 4.0)
-    assert next_point_of("2", LAST, (4.0, 6.0)) == pytest.approx((2.2, 3.6))
-    assert next_point_of("50 cm", LAST, (0.0, 2.0)) == (0.5, 2.0)
-    assert next_point_of("<90", LAST, (4.0, 6.0)) == pytest.approx((1.0, 7.0))
-    assert next_point_of("3 4", LAST, (4.0, 6.0)) == (3.0, 4.0)
-    assert next_point_of("@1 0", LAST, None) == (2.0, 2.0)
+    assert parse_next_point("2", LAST, (1.0, 9.0)) == (1.0, 4.0)
+    assert parse_next_point("2", LAST, (4.0, 6.0)) == pytest.approx((2.2, 3.6))
+    assert parse_next_point("50 cm", LAST, (0.0, 2.0)) == (0.5, 2.0)
+    assert parse_next_point("<90", LAST, (4.0, 6.0)) == pytest.approx((1.0, 7.0))
+    assert parse_next_point("3 4", LAST, (4.0, 6.0)) == (3.0, 4.0)
+    assert parse_next_point("@1 0", LAST, None) == (2.0, 2.0)
     with pytest.raises(MapError, match="point the cursor"):
-        next_point_of("2", LAST, LAST)
+        parse_next_point("2", LAST, LAST)
     with pytest.raises(MapError, match="type x and y"):
-        next_point_of("2", None, (4.0, 6.0))
+        parse_next_point("2", None, (4.0, 6.0))
 
 
 metres = st.integers(-(10**7), 10**7).map(lambda k: k / 1000)
@@ -188,18 +194,18 @@ def test_what_is_written_plainly_is_read(x, y, between, comma):
     text = f"{x:.3f}{between}{y:.3f}"
     if comma and between != ", ":
         text = text.replace(".", ",")
-    assert point_of(text) == (x, y)
-    assert point_of(f"@{text}", last=LAST) == pytest.approx((x + 1.0, y + 2.0), abs=1e-8)
+    assert parse_point(text) == (x, y)
+    assert parse_point(f"@{text}", last=LAST) == pytest.approx((x + 1.0, y + 2.0), abs=1e-8)
 
 
 @given(st.text(alphabet=st.sampled_from("0123456789 .,;<@+-*/%x'\"mcke°ÿ∠"), max_size=12))
 def test_whatever_is_typed_gives_a_number_or_a_sentence(text):
     for read in (
-        lambda: point_of(text, last=LAST),
-        lambda: next_point_of(text, LAST, (3.0, 3.0)),
-        lambda: (length_of(text, now=2.0),),
-        lambda: size_of(text),
-        lambda: (angle_of(text),),
+        lambda: parse_point(text, last=LAST),
+        lambda: parse_next_point(text, LAST, (3.0, 3.0)),
+        lambda: (parse_length(text, now=2.0),),
+        lambda: parse_size(text),
+        lambda: (parse_angle(text),),
     ):
         try:
             assert all(math.isfinite(value) for value in read())

@@ -17,9 +17,9 @@ from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov_app.editor.edits import density as density_edits
 from robocov_app.editor.model.document import read_sketch, write_sketch
-from robocov_app.editor.model.parser import parse_sketch, sketch_of
+from robocov_app.editor.model.parser import build_sketch, parse_sketch
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.model.sketch import Sketch, sketch_text
+from robocov_app.editor.model.sketch import Sketch, dump_sketch
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 ONE = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)
@@ -34,9 +34,9 @@ def test_it_passes_through_unchanged(density, tmp_path):
     path = tmp_path / "heavy.json"
     save_map(Environment("heavy", RING, density=density), path)
     sketch, disk = read_sketch(path)
-    assert sketch.density == density and sketch.environment() == load_map(path)
-    assert sketch_text(sketch) == path.read_text() == dump_map(load_map(path))
-    edited, _ = sketch.added([CircleObstacle((5.0, 5.0), 0.5)])
+    assert sketch.density == density and sketch.build_environment() == load_map(path)
+    assert dump_sketch(sketch) == path.read_text() == dump_map(load_map(path))
+    edited, _ = sketch.with_obstacles([CircleObstacle((5.0, 5.0), 0.5)])
     write_sketch(edited, path, disk)
     assert load_map(path).density == density and len(load_map(path).obstacles) == 1
 
@@ -64,59 +64,59 @@ def test_what_is_no_density_is_refused_with_its_place():
     # a draft without a boundary may have one all the same
     document = to_json(Environment("heavy", RING, density=ONE))
     del document["boundary"]
-    assert sketch_of(document).density == ONE
+    assert build_sketch(document).density == ONE
 
 
 def test_a_density_that_is_nothing_in_the_free_space_is_a_problem():
     nothing = WeightedPolygons(KINDS["rooms"].areas[1:], 0.0)
     covering = sheet(CircleObstacle((7.0, 5.5), 3.5), density=nothing)
-    grave = [problem.words for problem in problems(covering) if problem.grave]
+    grave = [problem.message for problem in problems(covering) if problem.is_error]
     assert grave and "at least one weight above 0" in grave[0]
-    assert not [problem for problem in problems(heavy()) if problem.grave]
+    assert not [problem for problem in problems(heavy()) if problem.is_error]
 
 
 class TestEdits:
     def test_the_first_hot_spot_stands_on_a_floor_of_one(self):
-        change = density_edits.peak_added(sheet(), (3.0, 4.0), 1.5, 4.0)
+        change = density_edits.add_peak(sheet(), (3.0, 4.0), 1.5, 4.0)
         assert change.sketch.density == Gaussians((Gaussian((3.0, 4.0), 4.0, sigma=1.5),), 1.0)
-        two = density_edits.peak_added(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
-        assert len(density_edits.features_of(two)) == 2
-        assert density_edits.peak_added(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
+        two = density_edits.add_peak(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
+        assert len(density_edits.list_features(two)) == 2
+        assert density_edits.add_peak(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
 
     def test_with_the_last_one_the_density_goes(self):
-        assert density_edits.removed(heavy(), 0).sketch.density is None
-        assert density_edits.density_removed(heavy()).sketch.density is None
+        assert density_edits.remove_feature(heavy(), 0).sketch.density is None
+        assert density_edits.remove_density(heavy()).sketch.density is None
         with pytest.raises(MapError, match="the same already"):
-            density_edits.density_removed(sheet())
+            density_edits.remove_density(sheet())
 
     def test_move_size_weigh(self):
-        moved = density_edits.moved(heavy(), 0, 1.0, 2.0).sketch
-        assert density_edits.features_of(moved)[0].center == (4.0, 5.0)
-        sized = density_edits.peak_sized(moved, 0, 2.5).sketch
-        assert density_edits.features_of(sized)[0].sigma == 2.5
-        weighed = density_edits.weighed(sized, 0, 7.0).sketch
+        moved = density_edits.move_feature(heavy(), 0, 1.0, 2.0).sketch
+        assert density_edits.list_features(moved)[0].center == (4.0, 5.0)
+        sized = density_edits.resize_peak(moved, 0, 2.5).sketch
+        assert density_edits.list_features(sized)[0].sigma == 2.5
+        weighed = density_edits.set_weight(sized, 0, 7.0).sketch
         assert weighed.density == Gaussians((Gaussian((4.0, 5.0), 7.0, sigma=2.5),), 0.5)
-        assert density_edits.floor_set(weighed, 0.0).sketch.density.floor == 0.0
+        assert density_edits.set_floor(weighed, 0.0).sketch.density.floor == 0.0
 
     def test_one_that_is_not_round_keeps_its_shape(self):
         slanted = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.6), (0.6, 1.0)))
         sketch = heavy(Gaussians((slanted,), 0.5))
-        spread = density_edits.spread_of(slanted)
-        twice = density_edits.features_of(density_edits.peak_sized(sketch, 0, 2.0 * spread).sketch)[0]
-        assert density_edits.spread_of(twice) == pytest.approx(2.0 * spread)
+        spread = density_edits.compute_spread(slanted)
+        twice = density_edits.list_features(density_edits.resize_peak(sketch, 0, 2.0 * spread).sketch)[0]
+        assert density_edits.compute_spread(twice) == pytest.approx(2.0 * spread)
         assert np.array(twice.matrix) == pytest.approx(4.0 * np.array(slanted.matrix))
 
     @pytest.mark.parametrize(
         ("act", "words"),
         [
-            (lambda: density_edits.peak_added(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
-            (lambda: density_edits.peak_added(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: expected .*, got 0"),
-            (lambda: density_edits.peak_added(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
-            (lambda: density_edits.weighed(heavy(), 0, float("nan")), "weight: expected .*, got nan"),
-            (lambda: density_edits.weighed(heavy(), 0, 1e9), "weight: expected .*, got 1e"),
-            (lambda: density_edits.moved(heavy(), 5, 1.0, 1.0), "no such hot spot"),
-            (lambda: density_edits.floor_set(sheet(), 0.0), "weight: expected .*, got 0"),
-            (lambda: density_edits.peak_added(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
+            (lambda: density_edits.add_peak(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
+            (lambda: density_edits.add_peak(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: expected .*, got 0"),
+            (lambda: density_edits.add_peak(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
+            (lambda: density_edits.set_weight(heavy(), 0, float("nan")), "weight: expected .*, got nan"),
+            (lambda: density_edits.set_weight(heavy(), 0, 1e9), "weight: expected .*, got 1e"),
+            (lambda: density_edits.move_feature(heavy(), 5, 1.0, 1.0), "no such hot spot"),
+            (lambda: density_edits.set_floor(sheet(), 0.0), "weight: expected .*, got 0"),
+            (lambda: density_edits.add_peak(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
         ],
     )
     def test_what_cannot_be(self, act, words):
@@ -130,15 +130,15 @@ class TestEdits:
     )
     @settings(max_examples=15, deadline=None)
     def test_whatever_is_drawn_can_be_saved(self, center, sigma, weight):
-        sketch = density_edits.peak_added(heavy(), center, sigma, weight).sketch
-        assert parse_sketch(sketch_text(sketch), "again").density == sketch.density
-        assert sketch.environment().density == sketch.density
+        sketch = density_edits.add_peak(heavy(), center, sigma, weight).sketch
+        assert parse_sketch(dump_sketch(sketch), "again").density == sketch.density
+        assert sketch.build_environment().density == sketch.density
 
     def test_in_words(self):
-        assert density_edits.density_label(None) == "none: every place counts the same"
-        assert density_edits.density_label(ONE) == "1 hot spot, floor 0.5"
-        assert density_edits.density_label(KINDS["bilinear"]) == "picture, 13 x 11"
-        assert density_edits.density_label(KINDS["rooms"]) == "2 areas, 0.3 to 4"
+        assert density_edits.describe_density(None) == "none: every place counts the same"
+        assert density_edits.describe_density(ONE) == "1 hot spot, floor 0.5"
+        assert density_edits.describe_density(KINDS["bilinear"]) == "picture, 13 x 11"
+        assert density_edits.describe_density(KINDS["rooms"]) == "2 areas, 0.3 to 4"
 
 
 def test_with_the_mouse_and_by_typing(tmp_path):
@@ -146,38 +146,38 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         plain = hands.picture()
         hands.key("d")
         hands.drag(*(hands.pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
-        (peak,) = density_edits.features_of(hands.sketch)
+        (peak,) = density_edits.list_features(hands.sketch)
         assert peak.center == pytest.approx((3.0, 3.0), abs=0.06)
         assert peak.sigma == pytest.approx(2.0, abs=0.1) and peak.weight == 4.0
         assert not hands.same(plain)
         hands.type("6.5")
         hands.key("return")
-        assert density_edits.features_of(hands.sketch)[0].weight == 6.5
+        assert density_edits.list_features(hands.sketch)[0].weight == 6.5
         # the rim
         rim = hands.pixel((peak.center[0], peak.center[1] + peak.sigma))
         hands.wait()
         hands.drag(rim, *(hands.pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
-        assert density_edits.features_of(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
+        assert density_edits.list_features(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
         # the middle
         hands.wait()
         hands.drag(*(hands.pixel(point) for point in (peak.center, (4, 4), (6, 5))))
-        assert density_edits.features_of(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
+        assert density_edits.list_features(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
         hands.wait()
         hands.drag(*(hands.pixel(point) for point in ((1.5, 8), (1.8, 8), (2, 8))))
-        assert [each.weight for each in density_edits.features_of(hands.sketch)] == [6.5, 6.5]
+        assert [each.weight for each in density_edits.list_features(hands.sketch)] == [6.5, 6.5]
         hands.key("backspace")
-        assert len(density_edits.features_of(hands.sketch)) == 1
+        assert len(density_edits.list_features(hands.sketch)) == 1
         hands.key("ctrl+z")
-        assert len(density_edits.features_of(hands.sketch)) == 2
+        assert len(density_edits.list_features(hands.sketch)) == 2
         hands.wait()
         hands.click_at((6.0, 5.0))
         assert hands.editor.tool.chosen == 0
         hands.key("escape")
-        assert hands.editor.tool.chosen is None and hands.editor.tool.preview(hands.editor).rings
+        assert hands.editor.tool.chosen is None and hands.editor.tool.build_draw_state(hands.editor).rings
         hands.command("floor 0.2")
         hands.command("weight 3")
         assert hands.sketch.density.floor == 0.2 and hands.editor.tool.weight == 3.0
-        assert density_edits.density_label(hands.sketch.density) == "2 hot spots, floor 0.2"
+        assert density_edits.describe_density(hands.sketch.density) == "2 hot spots, floor 0.2"
         hands.command("density none")
         assert hands.sketch.density is None
         hands.command("density some")
@@ -194,7 +194,7 @@ def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
         assert hands.editor.tool.change is not None
         hands.key("escape")
         hands.release()
-        assert hands.sketch.density is None and not hands.editor.document.history.past
+        assert hands.sketch.density is None and not hands.editor.document.history.undo_descriptions
 
 
 AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
@@ -202,46 +202,46 @@ AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
 
 class TestAreas:
     def test_they_are_added_moved_weighed_and_taken_away(self):
-        sketch = density_edits.area_added(sheet(), WeightedArea(AREA, 3.0)).sketch
+        sketch = density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch
         assert sketch.density == WeightedPolygons((WeightedArea(AREA, 3.0),), 1.0)
-        moved = density_edits.moved(sketch, 0, 1.0, -1.0).sketch
+        moved = density_edits.move_feature(sketch, 0, 1.0, -1.0).sketch
         assert moved.density.areas[0].vertices[0] == (3.0, 1.0)
-        bent = density_edits.corner_moved(sketch, 0, 2, (7.0, 7.0)).sketch
+        bent = density_edits.move_corner(sketch, 0, 2, (7.0, 7.0)).sketch
         assert bent.density.areas[0].vertices[2] == (7.0, 7.0)
-        lighter = density_edits.weighed(sketch, 0, 0.0).sketch
+        lighter = density_edits.set_weight(sketch, 0, 0.0).sketch
         assert lighter.density.areas[0].weight == 0.0 and lighter.density.background == 1.0
-        assert density_edits.floor_set(sketch, 0.0).sketch.density.background == 0.0
-        assert density_edits.removed(sketch, 0).sketch.density is None
-        assert parse_sketch(sketch_text(bent), "again").density == bent.density
+        assert density_edits.set_floor(sketch, 0.0).sketch.density.background == 0.0
+        assert density_edits.remove_feature(sketch, 0).sketch.density is None
+        assert parse_sketch(dump_sketch(bent), "again").density == bent.density
 
     def test_polygons_become_areas_with_their_holes_and_names(self):
         hole = ((3.0, 3.0), (4.0, 3.0), (4.0, 4.0))
-        sketch, keys = sheet().added(
+        sketch, keys = sheet().with_obstacles(
             [PolygonObstacle(AREA, (hole,), "ward"), CircleObstacle((8.0, 8.0), 0.5)]
         )
-        change = density_edits.areas_made(sketch, Selection.of(keys[0]), 5.0)
+        change = density_edits.convert_polygons(sketch, Selection.of(keys[0]), 5.0)
         assert change.sketch.density == WeightedPolygons((WeightedArea(AREA, 5.0, (hole,), "ward"),), 1.0)
         assert len(change.sketch.obstacles) == 1
         with pytest.raises(MapError, match="select polygons"):
-            density_edits.areas_made(sketch, Selection.of(keys[1]), 5.0)
+            density_edits.convert_polygons(sketch, Selection.of(keys[1]), 5.0)
 
     @pytest.mark.parametrize(
         ("act", "words"),
         [
-            (lambda s: density_edits.area_added(s, WeightedArea(AREA[:2], 1.0)), "three corners"),
+            (lambda s: density_edits.add_area(s, WeightedArea(AREA[:2], 1.0)), "three corners"),
             (
-                lambda s: density_edits.area_added(s, WeightedArea((*AREA[:2], AREA[3], AREA[2]), 1.0)),
+                lambda s: density_edits.add_area(s, WeightedArea((*AREA[:2], AREA[3], AREA[2]), 1.0)),
                 "crossings",
             ),
-            (lambda s: density_edits.area_added(heavy(), WeightedArea(AREA, 1.0)), "is a gaussians"),
-            (lambda s: density_edits.corner_moved(s, 0, 9, (0.0, 0.0)), "no such corner"),
-            (lambda s: density_edits.peak_sized(s, 0, 1.0), "no such hot spot"),
-            (lambda s: density_edits.weighed(density_edits.floor_set(s, 0.0).sketch, 0, 0.0), "above 0"),
+            (lambda s: density_edits.add_area(heavy(), WeightedArea(AREA, 1.0)), "is a gaussians"),
+            (lambda s: density_edits.move_corner(s, 0, 9, (0.0, 0.0)), "no such corner"),
+            (lambda s: density_edits.resize_peak(s, 0, 1.0), "no such hot spot"),
+            (lambda s: density_edits.set_weight(density_edits.set_floor(s, 0.0).sketch, 0, 0.0), "above 0"),
         ],
     )
     def test_what_cannot_be(self, act, words):
         with pytest.raises(MapError, match=words):
-            act(density_edits.area_added(sheet(), WeightedArea(AREA, 3.0)).sketch)
+            act(density_edits.add_area(sheet(), WeightedArea(AREA, 3.0)).sketch)
 
     def test_the_bundled_hospital_is_edited_with_the_mouse_and_by_typing(self, tmp_path):
         sketch = Sketch.from_environment(load_map("hospital"))
@@ -261,4 +261,4 @@ class TestAreas:
             assert len(hands.sketch.density.areas) == len(sketch.density.areas) + 1
             hands.key("backspace")
             assert len(hands.sketch.density.areas) == len(sketch.density.areas)
-            assert hands.sketch.environment().density == hands.sketch.density
+            assert hands.sketch.build_environment().density == hands.sketch.density

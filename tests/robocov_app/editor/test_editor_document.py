@@ -22,10 +22,10 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, list_bundled_maps, load_map, parse_map, to_json
 from robocov_app.editor.edits import vertices
-from robocov_app.editor.model.background import Background, annotated, taken_apart
-from robocov_app.editor.model.parser import parse_sketch, sketch_of
-from robocov_app.editor.model.selection import points_of
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch, draft_document, geometry_of, sketch_text
+from robocov_app.editor.model.background import Background, read_marks, write_marks
+from robocov_app.editor.model.parser import build_sketch, parse_sketch
+from robocov_app.editor.model.selection import list_vertices
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch, build_geometry, dump_sketch, to_document
 
 EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 
@@ -36,58 +36,58 @@ EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 @settings(max_examples=150)
 @given(st.one_of(drafts(), drafts(shapes(anywhere, floats)), sound_sketches()))
 def test_a_sketch_comes_back_from_its_document(sketch):
-    document = draft_document(sketch)
-    again = sketch_of(json.loads(json.dumps(document)), "again")
+    document = to_document(sketch)
+    again = build_sketch(json.loads(json.dumps(document)), "again")
     assert again == sketch
-    assert draft_document(again) == document
-    assert list(draft_document(again)) == list(document)
+    assert to_document(again) == document
+    assert list(to_document(again)) == list(document)
     assert hash(again) == hash(sketch)
 
 
 @settings(max_examples=60)
 @given(st.one_of(drafts(), sound_sketches()))
 def test_a_sketch_comes_back_from_its_text(sketch):
-    text = sketch_text(sketch)
+    text = dump_sketch(sketch)
     assert parse_sketch(text.encode(), "again") == sketch
-    assert sketch_text(parse_sketch(text, "again")) == text
+    assert dump_sketch(parse_sketch(text, "again")) == text
 
 
 @pytest.mark.parametrize("name", list_bundled_maps())
 def test_bundled_maps_pass_through_unchanged(name):
     environment = load_map(name)
     sketch = Sketch.from_environment(environment)
-    assert sketch.environment() == environment
-    assert list(sketch.environment().starts) == list(environment.starts)
-    assert draft_document(sketch) == to_json(environment)
-    assert sketch_text(sketch) == dump_map(environment)
+    assert sketch.build_environment() == environment
+    assert list(sketch.build_environment().starts) == list(environment.starts)
+    assert to_document(sketch) == to_json(environment)
+    assert dump_sketch(sketch) == dump_map(environment)
 
 
 @given(sound_sketches())
 def test_what_runs_is_what_a_saved_map_is(sketch):
     try:
-        environment = sketch.environment("here")
+        environment = sketch.build_environment("here")
     except MapError as error:
         with pytest.raises(MapError, match="here") as caught:
-            parse_map(sketch_text(sketch), "here")
+            parse_map(dump_sketch(sketch), "here")
         assert str(caught.value).split(": ", 1)[1] == str(error).split(": ", 1)[1]
     else:
-        assert parse_map(sketch_text(sketch), "here") == environment
+        assert parse_map(dump_sketch(sketch), "here") == environment
 
 
 def test_keys_are_not_in_the_file():
     sketch = Sketch(
         obstacles=(Item(7, CircleObstacle((1.0, 1.0), 0.5), "old"), Item(3, WallObstacle((), 0.1)))
     )
-    again = sketch_of(draft_document(sketch))
+    again = build_sketch(to_document(sketch))
     assert [item.key for item in again.obstacles] == [0, 1]
     assert again == renumbered(sketch)
 
 
 def test_a_number_too_long_for_a_map_is_still_a_draft():
     sketch = Sketch(boundary=((0.0, 0.0), (1e300, 0.0), (0.0, 1e-300)))
-    assert sketch_of(json.loads(json.dumps(draft_document(sketch)))) == sketch
+    assert build_sketch(json.loads(json.dumps(to_document(sketch)))) == sketch
     with pytest.raises(MapError, match="boundary"):
-        sketch.environment()
+        sketch.build_environment()
 
 
 # what is no draft
@@ -121,7 +121,7 @@ def test_a_number_too_long_for_a_map_is_still_a_draft():
 )
 def test_what_is_made_differently_is_refused_with_its_place(document, words):
     with pytest.raises(MapError, match=words) as caught:
-        sketch_of(document, "mine.json")
+        build_sketch(document, "mine.json")
     assert str(caught.value).startswith("mine.json: ")
     assert "\n" not in str(caught.value)
 
@@ -135,7 +135,7 @@ def test_errors_in_text_have_lines():
 
 
 def test_almost_nothing_is_a_draft():
-    sketch = sketch_of({"format": "robocov-map", "version": 1})
+    sketch = build_sketch({"format": "robocov-map", "version": 1})
     assert sketch == Sketch(name="")
     assert sketch.bounds is None
 
@@ -148,11 +148,11 @@ def test_almost_nothing_is_a_draft():
 def test_moving_a_vertex_changes_one_line(data):
     sketch = data.draw(sound_sketches(least=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
-    vertex, _ = data.draw(st.sampled_from(points_of(sketch, owner)))
+    vertex, _ = data.draw(st.sampled_from(list_vertices(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-99999, 99999), st.integers(-99999, 99999)))
     moved = (to[0] / 10000, to[1] / 10000)
-    before = sketch_text(sketch).splitlines()
-    after = sketch_text(vertices.with_places(sketch, {vertex: moved})).splitlines()
+    before = dump_sketch(sketch).splitlines()
+    after = dump_sketch(vertices.place_vertices(sketch, {vertex: moved})).splitlines()
     changed = [line for line in difflib.ndiff(before, after) if line[:2] in ("- ", "+ ")]
     assert len(changed) <= 2
     assert len(before) == len(after)
@@ -160,7 +160,7 @@ def test_moving_a_vertex_changes_one_line(data):
 
 def test_numbers_have_no_noise():
     sketch = Sketch(boundary=((0.1 + 0.2, -0.0), (3.0, 1e-17), (0.5, 2.0)))
-    (line,) = [line for line in sketch_text(sketch).splitlines() if "boundary" in line]
+    (line,) = [line for line in dump_sketch(sketch).splitlines() if "boundary" in line]
     assert line == '  "boundary": [[0.3, 0], [3, 0], [0.5, 2]],'
 
 
@@ -177,7 +177,7 @@ def noted() -> Sketch:
 
 
 def test_notes_are_free_keys_of_a_map_that_runs():
-    environment = noted().environment()
+    environment = noted().build_environment()
     assert environment.extra["editor"]["notes"] == [
         {"obstacle": 0, "name": "pillar", "note": "ask Ada"},
         {"obstacle": 2, "note": "no name"},
@@ -187,18 +187,18 @@ def test_notes_are_free_keys_of_a_map_that_runs():
 
 
 def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
-    document = draft_document(noted())
+    document = to_document(noted())
     first, second, third = document["obstacles"]
     document["obstacles"] = [second, third, first]
-    notes = [item.note for item in sketch_of(document).obstacles]
+    notes = [item.note for item in build_sketch(document).obstacles]
     assert notes[2] == "ask Ada"
     # one without a name is where it was
     document["obstacles"] = [first]
-    again = sketch_of(document)
+    again = build_sketch(document)
     assert [item.note for item in again.obstacles] == ["ask Ada"]
     # nothing is lost, even so
     assert "no name" in json.dumps(again.extra)
-    assert sketch_of(draft_document(again)) == again
+    assert build_sketch(to_document(again)) == again
 
 
 @pytest.mark.parametrize(
@@ -215,11 +215,11 @@ def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
 )
 def test_what_others_keep_stays_untouched(foreign):
     document = {**EMPTY, "boundary": [[0, 0], [1, 0], [0, 1]], "extra": {"editor": foreign, "mine": 1}}
-    sketch = sketch_of(document)
+    sketch = build_sketch(document)
     assert sketch.extra == {"editor": foreign, "mine": 1}
-    assert draft_document(sketch)["extra"] == document["extra"]
+    assert to_document(sketch)["extra"] == document["extra"]
     ours = replace(sketch, obstacles=noted().obstacles, background=noted().background)
-    again = sketch_of(json.loads(json.dumps(draft_document(ours))))
+    again = build_sketch(json.loads(json.dumps(to_document(ours))))
     assert again == ours
     assert again.extra == sketch.extra
 
@@ -229,7 +229,7 @@ MARKS = {"note": "x", "group": "desks", "locked": True}
 
 @given(st.dictionaries(st.sampled_from(["editor", "editor 2", "mine"]), json_values))
 def test_free_keys_with_notes_come_apart_again(extra):
-    notes, background, others = taken_apart(annotated(extra, {1: MARKS}, ["a", "b"], None), ["a", "b"])
+    notes, background, others = read_marks(write_marks(extra, {1: MARKS}, ["a", "b"], None), ["a", "b"])
     assert (notes, background) == ({1: MARKS}, None)
     # an empty object of the editor's own is none
     assert {**others, **{key: {} for key in extra if key not in others}} == extra
@@ -240,7 +240,7 @@ def test_free_keys_with_notes_come_apart_again(extra):
 
 @given(shapes())
 def test_every_shape_has_a_valid_geometry(shape):
-    geometry = geometry_of(shape)
+    geometry = build_geometry(shape)
     assert geometry.is_valid
     points = shapely.get_coordinates(geometry)
     assert np.isfinite(points).all()
@@ -252,10 +252,10 @@ def test_geometry_of_sound_shapes_is_theirs():
         WallObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.1),
         PolygonObstacle(HALL, (((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)),)),
     ):
-        assert geometry_of(shape).equals(shape.polygon)
+        assert build_geometry(shape).equals(shape.polygon)
     bow_tie = PolygonObstacle(((0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0)))
-    assert geometry_of(bow_tie).area == pytest.approx(2.0)
-    assert geometry_of(PolygonObstacle(())).is_empty
+    assert build_geometry(bow_tie).area == pytest.approx(2.0)
+    assert build_geometry(PolygonObstacle(())).is_empty
 
 
 def test_what_no_map_could_hold_covers_nothing():
@@ -267,26 +267,28 @@ def test_what_no_map_could_hold_covers_nothing():
         WallObstacle(((0.0, 0.0), (1.0, 0.0)), 1e100),
         WallObstacle(((0.0, 0.0), (1e100, 0.0)), 1.0),
     ):
-        assert geometry_of(shape).area == 0.0
+        assert build_geometry(shape).area == 0.0
     holed = PolygonObstacle(HALL, (((1.0, 1.0), (1e200, 0.0), (1.0, 2.0)),))
-    assert geometry_of(holed).area == pytest.approx(96.0)
+    assert build_geometry(holed).area == pytest.approx(96.0)
 
 
 def test_parts_are_found_by_key():
-    sketch, (a, b) = Sketch().added([CircleObstacle((0.0, 0.0), 1.0), (WallObstacle(HALL, 0.1), "note")])
-    assert sketch.item(b).note == "note"
-    assert sketch.fresh_key > max(a, b)
-    wider = sketch.with_things({b: WallObstacle(HALL, 0.2)})
-    assert wider.item(a) is sketch.item(a)
-    assert wider.item(b).shape == WallObstacle(HALL, 0.2)
-    assert wider.item(b).note == "note"
-    assert sketch.without([a]).obstacles == (sketch.item(b),)
+    sketch, (a, b) = Sketch().with_obstacles(
+        [CircleObstacle((0.0, 0.0), 1.0), (WallObstacle(HALL, 0.1), "note")]
+    )
+    assert sketch.get_item(b).note == "note"
+    assert sketch.next_key > max(a, b)
+    wider = sketch.with_objects({b: WallObstacle(HALL, 0.2)})
+    assert wider.get_item(a) is sketch.get_item(a)
+    assert wider.get_item(b).shape == WallObstacle(HALL, 0.2)
+    assert wider.get_item(b).note == "note"
+    assert sketch.without([a]).obstacles == (sketch.get_item(b),)
     with pytest.raises(KeyError):
-        sketch.item(99)
-    sketch = sketch.with_things({"s": UniformStart(), "t": UniformStart()})
-    sketch = sketch.with_things({"s": DiscStart((0.0, 0.0), 1.0)})
+        sketch.get_item(99)
+    sketch = sketch.with_objects({"s": UniformStart(), "t": UniformStart()})
+    sketch = sketch.with_objects({"s": DiscStart((0.0, 0.0), 1.0)})
     assert sketch.starts == (("s", DiscStart((0.0, 0.0), 1.0)), ("t", UniformStart()))
-    assert sketch.start("t") == UniformStart()
+    assert sketch.get_start("t") == UniformStart()
 
 
 def test_bounds_hold_everything():
@@ -316,4 +318,4 @@ def test_an_environment_becomes_the_sketch_of_the_same_map():
     sketch = Sketch.from_environment(environment)
     assert (sketch.name, sketch.description, sketch.boundary) == ("e", "d", HALL)
     assert sketch.extra == {"k": 1}
-    assert sketch.unchecked() == environment
+    assert sketch.build_unchecked_environment() == environment

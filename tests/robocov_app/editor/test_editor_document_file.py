@@ -9,50 +9,50 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.edits import create, properties
-from robocov_app.editor.model.document import FIRST_SHEET, ChangedError, Document, recoverable
+from robocov_app.editor.model.document import DEFAULT_BOUNDARY, ChangedError, Document, find_recoverable
 from robocov_app.editor.model.selection import Selection
 
 PILLAR = CircleObstacle((5, 5), 1.0)
 
 
 def changed(document: Document, radius: float = 1.0) -> None:
-    document.history.do(create.circle_drawn(document.history.sketch, (5, 5), radius))
-    document.keep()
+    document.history.apply(create.add_circle(document.history.sketch, (5, 5), radius))
+    document.keep_aside()
 
 
 def test_a_new_sheet_offers_a_boundary_and_loses_nothing(tmp_path: Path) -> None:
     document = Document.new(None)
-    assert document.history.sketch.boundary == FIRST_SHEET
-    assert not document.history.unsaved and document.title == "Untitled"
-    assert document.suggested(tmp_path) == tmp_path / "untitled.json"
+    assert document.history.sketch.boundary == DEFAULT_BOUNDARY
+    assert not document.history.has_unsaved_changes and document.title == "Untitled"
+    assert document.suggest_path(tmp_path) == tmp_path / "untitled.json"
     (tmp_path / "untitled.json").write_text("")
-    assert document.suggested(tmp_path) == tmp_path / "untitled-1.json"
+    assert document.suggest_path(tmp_path) == tmp_path / "untitled-1.json"
 
 
 def test_saving_and_opening_again(tmp_path: Path) -> None:
     document = Document.new(None)
     changed(document)
-    assert document.history.unsaved
+    assert document.history.has_unsaved_changes
     words = document.save(tmp_path / "plan")
-    assert words == f"saved: {tmp_path / 'plan.json'}" and not document.history.unsaved
-    again = Document.opened(tmp_path / "plan.json", None)
-    assert again.title == "plan.json" and not again.history.unsaved
+    assert words == f"saved: {tmp_path / 'plan.json'}" and not document.history.has_unsaved_changes
+    again = Document.open_file(tmp_path / "plan.json", None)
+    assert again.title == "plan.json" and not again.history.has_unsaved_changes
     assert [item.shape for item in again.history.sketch.obstacles] == [PILLAR]
     assert again.history.sketch.name == document.history.sketch.name == "plan"  # nobody had named it
-    document.history.do(properties.titled(document.history.sketch, "My plan"))
+    document.history.apply(properties.set_title(document.history.sketch, "My plan"))
     document.save(tmp_path / "plan")
     assert load_map(tmp_path / "plan.json").name == "My plan"
     document.history.undo()
-    assert document.history.unsaved
+    assert document.history.has_unsaved_changes
     document.history.redo()
-    assert not document.history.unsaved
+    assert not document.history.has_unsaved_changes
 
 
 def test_a_bundled_map_opens_as_a_copy_and_is_never_written(tmp_path: Path) -> None:
     bundled = list_bundled_maps()["rooms"]
-    document = Document.opened(bundled, None)
+    document = Document.open_file(bundled, None)
     assert document.path is None and document.title == "rooms"
-    assert document.suggested(tmp_path).name == "rooms.json"
+    assert document.suggest_path(tmp_path).name == "rooms.json"
     before = bundled.read_bytes()
     with pytest.raises(MapError, match="comes with robocov"):
         document.save(bundled, over=True)
@@ -75,19 +75,21 @@ def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_
     changed(document)
     document.save(tmp_path / "plan.json")
     mine = document.history.sketch
-    assert document.look(10.0) == "same"
+    assert document.check_disk(10.0) == "same"
     other = Document.new(None)
     changed(other, 2.0)
     other.save(tmp_path / "other.json")
     touched(tmp_path / "plan.json", (tmp_path / "other.json").read_text())
-    assert document.look(10.5) == "same"  # not asked that often
-    assert document.look(12.0) == "changed"
-    assert document.look(14.0) == "same"
-    assert document.history.unsaved
+    assert document.check_disk(10.5) == "same"  # not asked that often
+    assert document.check_disk(12.0) == "changed"
+    assert document.check_disk(14.0) == "same"
+    assert document.history.has_unsaved_changes
     with pytest.raises(ChangedError):
         document.save(tmp_path / "plan.json")
     document.reload()
-    assert document.history.sketch.obstacles[0].shape.radius == 2.0 and not document.history.unsaved
+    assert (
+        document.history.sketch.obstacles[0].shape.radius == 2.0 and not document.history.has_unsaved_changes
+    )
     assert document.history.undo() is not None
     assert document.history.sketch == mine
 
@@ -97,8 +99,8 @@ def test_keeping_mine_lets_saving_replace_what_is_there(tmp_path: Path) -> None:
     changed(document)
     document.save(tmp_path / "plan.json")
     touched(tmp_path / "plan.json", "{}")
-    assert document.look(10.0) == "changed"
-    document.keep_mine()
+    assert document.check_disk(10.0) == "changed"
+    document.ignore_disk_change()
     document.save(tmp_path / "plan.json")
     assert len(load_map(tmp_path / "plan.json").obstacles) == 1
 
@@ -107,7 +109,7 @@ def test_a_file_that_goes_is_noticed(tmp_path: Path) -> None:
     document = Document.new(None)
     document.save(tmp_path / "plan.json")
     (tmp_path / "plan.json").unlink()
-    assert document.look(10.0) == "gone" and document.history.unsaved
+    assert document.check_disk(10.0) == "gone" and document.history.has_unsaved_changes
     document.save(tmp_path / "plan.json", over=True)
     assert (tmp_path / "plan.json").exists()
 
@@ -117,22 +119,24 @@ def test_a_draft_is_kept_and_recovered_and_saving_takes_it_away(tmp_path: Path) 
     document = Document(sheet(), drafts)
     changed(document)
     document.flush()
-    assert recoverable(drafts) == ()  # its editor lives
+    assert find_recoverable(drafts) == ()  # its editor lives
     document.close(discard=False)
-    (draft,) = recoverable(drafts)
-    again = Document.recovered(draft, drafts)
-    assert again.history.unsaved and [item.shape for item in again.history.sketch.obstacles] == [PILLAR]
+    (draft,) = find_recoverable(drafts)
+    again = Document.recover(draft, drafts)
+    assert again.history.has_unsaved_changes and [item.shape for item in again.history.sketch.obstacles] == [
+        PILLAR
+    ]
     again.save(tmp_path / "plan.json")
     again.flush()
     again.close(discard=False)
-    assert recoverable(drafts) == ()
+    assert find_recoverable(drafts) == ()
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     document = Document.new(None)
     with pytest.raises(RobocovError, match="no-such-folder"):
         document.save(tmp_path / "no-such-folder" / "plan.json")
-    assert not document.history.unsaved
+    assert not document.history.has_unsaved_changes
     assert document.autosaver.trouble == ""
 
 
@@ -142,11 +146,11 @@ def test_naming_a_map_at_save_keeps_what_was_undone(tmp_path):
     changed(document, 2.0)
     document.history.undo()
     document.save(tmp_path / "plan.json")
-    assert document.history.sketch.name == "plan" and not document.history.unsaved
+    assert document.history.sketch.name == "plan" and not document.history.has_unsaved_changes
     assert document.history.redo() is not None
     assert len(document.history.sketch.obstacles) == 2 and document.history.sketch.name == "plan"
     document.history.undo()
-    assert not document.history.unsaved
+    assert not document.history.has_unsaved_changes
     document.history.undo()
     assert document.history.sketch.name == "plan"
 
@@ -160,8 +164,8 @@ def test_a_file_with_a_long_or_strange_name_names_its_map_as_far_as_it_can(tmp_p
 def test_a_map_that_cannot_run_would_spoil_a_valid_one(tmp_path):
     document = Document.new(None)
     document.save(tmp_path / "plan.json")
-    assert not document.spoils(tmp_path / "plan")
-    document.history.do(properties.deleted(document.history.sketch, Selection(boundary=True)))
-    assert document.spoils(tmp_path / "plan") and not document.spoils(tmp_path / "new.json")
+    assert not document.would_spoil(tmp_path / "plan")
+    document.history.apply(properties.delete(document.history.sketch, Selection(boundary=True)))
+    assert document.would_spoil(tmp_path / "plan") and not document.would_spoil(tmp_path / "new.json")
     document.save(tmp_path / "plan.json")
-    assert not document.spoils(tmp_path / "plan"), "there is nothing more to be lost"
+    assert not document.would_spoil(tmp_path / "plan"), "there is nothing more to be lost"

@@ -16,40 +16,40 @@ def sketch() -> Sketch:
 
 
 def test_the_pieces_keep_name_note_and_group(sketch):
-    change = create.door_opened(sketch, 3, (1.0, 0.3), 0.8)
+    change = create.open_door(sketch, 3, (1.0, 0.3), 0.8)
     first, second, _ = change.sketch.obstacles
     assert first.shape.points == ((0.0, 0.0), (0.6, 0.0))
     assert second.shape.points == ((1.4, 0.0), (4.0, 0.0), (4.0, 3.0))
     for item in (first, second):
         assert (item.shape.name, item.shape.width, item.note, item.group) == ("west", 0.2, "oak", "outer")
-    assert change.words == "door of 0.8 m opened in wall “west”"
+    assert change.description == "door of 0.8 m opened in wall “west”"
     assert change.selection.items == {3, second.key}
 
 
 def test_a_door_goes_round_a_corner_and_to_an_end(sketch):
-    round_it = create.wall_opened(sketch, 3, (3.5, 0.1), (4.0, 0.5)).sketch
+    round_it = create.open_wall(sketch, 3, (3.5, 0.1), (4.0, 0.5)).sketch
     assert [i.shape.points for i in round_it.obstacles[:2]] == [
         ((0.0, 0.0), (3.5, 0.0)),
         ((4.0, 0.5), (4.0, 3.0)),
     ]
-    at_end = create.door_opened(sketch, 3, (-1.0, 0.0), 1.0).sketch
+    at_end = create.open_door(sketch, 3, (-1.0, 0.0), 1.0).sketch
     assert [i.shape.points for i in at_end.obstacles[:-1]] == [((1.0, 0.0), (4.0, 0.0), (4.0, 3.0))]
 
 
 def test_which_wall_is_meant(sketch):
-    assert create.wall_at(sketch, (2.0, 0.05), 0.1) == 3
-    assert create.wall_at(sketch, (8.0, 8.0), 0.1) is None
-    a, b = create.door_at(sketch, 3, (0.1, 0.0), 1.0)
+    assert create.find_wall(sketch, (2.0, 0.05), 0.1) == 3
+    assert create.find_wall(sketch, (8.0, 8.0), 0.1) is None
+    a, b = create.compute_door_ends(sketch, 3, (0.1, 0.0), 1.0)
     assert (a, b) == ((0.0, 0.0), (1.0, 0.0))
 
 
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
-        (lambda s: create.door_opened(s, 3, (1.0, 0.0), 0.001), "at least 2 cm"),
-        (lambda s: create.door_opened(s, 3, (1.0, 0.0), 7.0), "not longer than a door"),
-        (lambda s: create.wall_opened(s, 3, (0.0, 0.0), (4.0, 3.0)), "nothing would be left"),
-        (lambda s: create.wall_opened(s, 5, (0.0, 0.0), (4.0, 3.0)), "opened in walls"),
+        (lambda s: create.open_door(s, 3, (1.0, 0.0), 0.001), "at least 2 cm"),
+        (lambda s: create.open_door(s, 3, (1.0, 0.0), 7.0), "not longer than a door"),
+        (lambda s: create.open_wall(s, 3, (0.0, 0.0), (4.0, 3.0)), "nothing would be left"),
+        (lambda s: create.open_wall(s, 5, (0.0, 0.0), (4.0, 3.0)), "opened in walls"),
     ],
 )
 def test_what_cannot_be(sketch, deed, words):

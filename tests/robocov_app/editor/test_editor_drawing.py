@@ -8,6 +8,7 @@ from driven_editor import Hands, opened_editor, sheet
 from PIL import Image
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
+from robocov_app.editor.tools.tool import DrawState
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def test_escape_gives_up_and_backspace_takes_a_point_back(hands: Hands) -> None:
     assert hands.shapes == [PolygonObstacle(((2, 2), (4, 2), (4, 4)))]
     hands.click_all((6, 6), (7, 7))
     hands.key("escape")
-    assert len(hands.shapes) == 1 and not hands.editor.tool.busy and hands.editor.tool.name == "polygon"
+    assert len(hands.shapes) == 1 and not hands.editor.tool.is_busy and hands.editor.tool.name == "polygon"
     hands.key("escape")
     assert hands.editor.tool.name == "select"
 
@@ -55,7 +56,7 @@ def test_too_few_points_are_told(hands: Hands) -> None:
     hands.key("p")
     hands.click_all((2, 2), (4, 2))
     hands.key("return")
-    assert hands.editor.trouble and "2 of at least 3 points" in hands.said and not hands.shapes
+    assert hands.editor.has_error_message and "2 of at least 3 points" in hands.said and not hands.shapes
 
 
 def test_a_wall_takes_typed_lengths_and_coordinates(hands: Hands) -> None:
@@ -83,10 +84,10 @@ def test_what_is_typed_can_be_corrected_given_up_and_wrong(hands: Hands) -> None
     assert hands.editor.tool.points == [(1.0, 1.0), (1.0, 3.0)]
     hands.type("7")
     hands.key("escape")
-    assert hands.editor.typed == "" and hands.editor.tool.busy
+    assert hands.editor.typed == "" and hands.editor.tool.is_busy
     hands.type("1..2")
     hands.key("return")
-    assert hands.editor.trouble and len(hands.editor.tool.points) == 2
+    assert hands.editor.has_error_message and len(hands.editor.tool.points) == 2
 
 
 def test_the_width_of_walls_is_changed_by_brackets(hands: Hands) -> None:
@@ -214,7 +215,7 @@ def test_doors_are_opened_by_a_click_and_by_dragging(hands: Hands) -> None:
     assert [wall.points for wall in hands.shapes][2:] == [((6.6, 2), (7, 2)), ((8, 2), (9, 2))]
     hands.wait()
     hands.click_at((5, 8))
-    assert hands.editor.trouble and "in walls" in hands.said
+    assert hands.editor.has_error_message and "in walls" in hands.said
 
 
 def test_starts_are_discs_places_and_anywhere(hands: Hands) -> None:
@@ -234,19 +235,19 @@ def test_measuring_tells_and_changes_nothing(hands: Hands) -> None:
     before = hands.sketch
     hands.key("m")
     hands.drag_at((1, 1), (3, 3), (4, 5))
-    preview = hands.editor.tool.preview(hands.editor)
-    assert preview.line == ((1, 1), (4, 5)) and "5.00 m" in preview.words
-    assert "Δx 3.00  Δy 4.00" in preview.words
+    preview = hands.editor.tool.build_draw_state(hands.editor)
+    assert preview.line == ((1, 1), (4, 5)) and "5.00 m" in preview.label
+    assert "Δx 3.00  Δy 4.00" in preview.label
     hands.click_all((1, 1), (4, 1), (4, 5))
     hands.key("return")
-    assert "7.00 m in all" in hands.editor.tool.preview(hands.editor).words
+    assert "7.00 m in all" in hands.editor.tool.build_draw_state(hands.editor).label
     hands.key("escape")
-    assert hands.editor.tool.preview(hands.editor) is None and hands.sketch is before
+    assert hands.editor.tool.build_draw_state(hands.editor) == DrawState() and hands.sketch is before
 
 
 def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp_path: Path) -> None:
     Image.new("RGB", (200, 100), (200, 40, 40)).save(tmp_path / "plan.png")
-    hands.window.documents.underlay(tmp_path / "plan.png")
+    hands.window.documents.open_background(tmp_path / "plan.png")
     hands.settle()
     laid = hands.sketch.background
     assert laid is not None and laid.pixels == (200, 100) and laid.scale == pytest.approx(10 / 200)
@@ -270,18 +271,18 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp
 def test_two_points_for_a_picture_that_is_not_there(hands: Hands) -> None:
     hands.key("i")
     hands.click_all((2, 2))
-    assert hands.editor.trouble and "no picture" in hands.said
+    assert hands.editor.has_error_message and "no picture" in hands.said
 
 
 def test_a_map_is_made_level_along_a_line_that_was_measured(hands: Hands) -> None:
     hands.key("w")
     hands.drag_at((1, 1), (2, 1), (5, 2.5))
     hands.command("level")
-    assert hands.editor.trouble and "two clicks" in hands.said
+    assert hands.editor.has_error_message and "two clicks" in hands.said
     hands.key("m")
     hands.click_all((1, 1), (5, 2.5))
     hands.command("level")
     assert hands.said == "map turned by -20.56°"
     (_, ay), (bx, by) = hands.shapes[0].points
     assert ay == by == 1 and bx == pytest.approx(1 + 18.25**0.5, abs=1e-4)
-    assert hands.editor.tool.preview(hands.editor) is None
+    assert hands.editor.tool.build_draw_state(hands.editor) == DrawState()

@@ -18,12 +18,12 @@ from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.editor.edits import create
-from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import Document, recoverable
-from robocov_app.editor.ui.commands import run_typed
+from robocov_app.editor.model.document import Document, find_recoverable
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.launch import editor_window, offer
+from robocov_app.editor.ui.launch import editor_window, offer_recovery
+from robocov_app.editor.ui.typed_commands import run_typed_command
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE
@@ -47,7 +47,7 @@ def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
     hands.type("plan")
     hands.key("return")
     assert hands.editor.dialogs.asked is None and load_map(tmp_path / "plan.json").obstacles
-    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
     assert hands.editor.dialogs.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
     assert hands.editor.recent == [str(tmp_path / "plan.json")]
@@ -71,25 +71,25 @@ def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path:
 
 
 def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
-    hands.editor.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.editor.apply(create.add_polygon(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.window.frame(0.0)
     hands.key("ctrl+s")
     hands.key("return")
     assert "as a draft" in hands.said
-    assert Document.opened(tmp_path / "untitled.json", None).history.sketch == renumbered(hands.sketch)
+    assert Document.open_file(tmp_path / "untitled.json", None).history.sketch == renumbered(hands.sketch)
 
 
 def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> None:
-    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
     hands.key("ctrl+a")
     hands.type("nowhere/plan.json")
     hands.key("return")
-    assert "nowhere" in hands.refused() and hands.editor.document.history.unsaved
+    assert "nowhere" in hands.refused() and hands.editor.document.history.has_unsaved_changes
 
 
 def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_path: Path) -> None:
-    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     assert asked(hands) == "Save the changes?"
     hands.key("escape")
@@ -104,16 +104,16 @@ def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_pat
 
 
 def test_discarding_is_for_good_but_for_what_is_in_files(hands: Hands, tmp_path: Path) -> None:
-    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.key("d")
     assert hands.shapes == [] and hands.editor.document.title == "Untitled"
     assert hands.said.startswith("a new map: 10 x 10 m")
-    assert recoverable(tmp_path / "drafts") == ()
+    assert find_recoverable(tmp_path / "drafts") == ()
 
 
 def test_answers_are_clicked_too(hands: Hands) -> None:
-    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.answer("Cancel")
     assert hands.editor.dialogs.asked is None and len(hands.shapes) == 2
@@ -157,14 +157,14 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Pat
     hands.window.frame(2.0)
     assert asked(hands) == "The file has changed"
     hands.key("r")
-    assert hands.shapes == [] and not hands.editor.document.history.unsaved
+    assert hands.shapes == [] and not hands.editor.document.history.has_unsaved_changes
     hands.key("ctrl+z")
     assert len(hands.shapes) == 1
     touched(path, json.dumps({**document, "name": "Again"}))
     hands.window.frame(2.0)
     hands.window.frame(2.0)
     hands.key("k")
-    assert len(hands.shapes) == 1 and hands.editor.document.history.unsaved
+    assert len(hands.shapes) == 1 and hands.editor.document.history.has_unsaved_changes
     hands.key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
     path.unlink()
@@ -188,7 +188,7 @@ def test_a_picture_is_laid_under_by_its_path_from_the_map(hands: Hands, tmp_path
     assert "not a picture" in hands.refused()
     hands.window.do("background:none")
     assert hands.sketch.background is None
-    hands.editor.change(underlaid(hands.sketch, Background("gone.png", (40, 30))))
+    hands.editor.apply(set_background(hands.sketch, Background("gone.png", (40, 30))))
     hands.window.draw()
     assert "gone.png cannot be shown" in hands.said
 
@@ -201,7 +201,7 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands.key("return")
     first = (tmp_path / "untitled.svg").read_text()
     assert "<svg" in first and "exported" in hands.said and hands.editor.document.path is None
-    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+e")
     hands.key("return")
     assert asked(hands) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
@@ -212,9 +212,9 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands.type("plan.xyz")
     hands.key("return")
     assert "unknown format" in hands.refused()
-    hands.editor.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.editor.apply(create.add_polygon(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.key("ctrl+e")
-    assert hands.editor.trouble and hands.editor.dialogs.asked is None
+    assert hands.editor.has_error_message and hands.editor.dialogs.asked is None
 
 
 def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def opening(folder: Path, path: Path | None = None, **more: object) -> AbstractC
 def test_settings_are_remembered(places: Path) -> None:
     with opening(places) as window:
         window.editor.theme = "dark"
-        window.editor.attempt(lambda: run_typed(window.editor, "0.25", "grid"))
+        window.editor.attempt(lambda: run_typed_command(window.editor, "0.25", "grid"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")
@@ -282,23 +282,23 @@ def test_recent_files_are_found_from_every_folder(
 
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
     lost = Document(sheet(), places / "drafts")
-    lost.history.do(create.circle_drawn(lost.history.sketch, (5, 5), 1.0))
-    lost.keep()
+    lost.history.apply(create.add_circle(lost.history.sketch, (5, 5), 1.0))
+    lost.keep_aside()
     lost.flush()
     lost.close(discard=False)
     with opening(places) as window:
         asked = window.editor.dialogs.asked
         assert isinstance(asked, Question) and "Recover" in asked.title
         Hands(window).key("r")
-        assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.unsaved
+        assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.has_unsaved_changes
     # the window went without a decision: it is offered again
     with opening(places) as window:
         assert window.editor.dialogs.asked is not None
         Hands(window).key("l")
-        offer(window, recoverable(places / "drafts"))
+        offer_recovery(window, find_recoverable(places / "drafts"))
         Hands(window).key("d")
         window.documents.leaving = True
-    assert recoverable(places / "drafts") == ()
+    assert find_recoverable(places / "drafts") == ()
 
 
 def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -> None:
@@ -312,14 +312,17 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
         pass
     with opening(places) as window:
         window.editor.attempt(lambda: window.documents.open(places / "plan.json"))
-        assert window.editor.trouble and "another editor" in window.editor.message
+        assert window.editor.has_error_message and "another editor" in window.editor.message
         window.documents.leaving = True
     document.close(discard=True)
 
 
 def test_a_new_name_is_a_new_map(places: Path) -> None:
     with opening(places, places / "fresh.json") as window:
-        assert window.editor.document.title == "fresh.json" and not window.editor.document.history.unsaved
+        assert (
+            window.editor.document.title == "fresh.json"
+            and not window.editor.document.history.has_unsaved_changes
+        )
         window.editor.attempt(window.documents.save)
         window.documents.leaving = True
     assert load_map(places / "fresh.json").area == 100.0
@@ -378,8 +381,8 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
         end = time.monotonic() + 60.0
         while window.editor.dialogs.asked is not None and time.monotonic() < end:
             window.frame(0.01)
-        assert window.editor.document.path is None and window.editor.document.history.unsaved
-        assert window.editor.sketch.environment().free_area == 12.0
+        assert window.editor.document.path is None and window.editor.document.history.has_unsaved_changes
+        assert window.editor.sketch.build_environment().free_area == 12.0
         window.documents.leaving = True
 
 
@@ -403,7 +406,7 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
     hands.key("ctrl+s")
     hands.key("return")
     (path,) = tmp_path.glob("*.json")
-    hands.editor.change(create.boundary_drawn(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
+    hands.editor.apply(create.set_boundary(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
     hands.key("ctrl+s")
     assert hands.editor.dialogs.asked is not None and "valid map" in hands.editor.dialogs.asked.words
     hands.key("c")
@@ -412,6 +415,6 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
     hands.key("r")
     with pytest.raises(MapError):
         load_map(path)
-    hands.editor.change(create.boundary_drawn(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
+    hands.editor.apply(create.set_boundary(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
     hands.key("ctrl+s")
-    assert hands.editor.dialogs.asked is None and not hands.editor.document.history.unsaved
+    assert hands.editor.dialogs.asked is None and not hands.editor.document.history.has_unsaved_changes

@@ -10,8 +10,8 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
 from robocov.mapfile import load_map
 from robocov_app.editor.model import document
-from robocov_app.editor.model.document import ChangedError, read_sketch, state_of, write_sketch
-from robocov_app.editor.model.sketch import Sketch, sketch_text
+from robocov_app.editor.model.document import ChangedError, check_file, read_sketch, write_sketch
+from robocov_app.editor.model.sketch import Sketch, dump_sketch
 
 SKETCH = Sketch("Hall", boundary=HALL)
 
@@ -23,13 +23,13 @@ def test_what_is_saved_is_opened_again(tmp_path, sketch):
     write_sketch(sketch, path, over=True)
     again, disk = read_sketch(path)
     assert again == sketch
-    assert state_of(disk) == "same"
+    assert check_file(disk) == "same"
     assert [file.name for file in tmp_path.iterdir()] == ["draft.json"]
 
 
 def test_what_runs_can_be_loaded(tmp_path):
     write_sketch(SKETCH, tmp_path / "map.json")
-    assert load_map(tmp_path / "map.json") == SKETCH.environment()
+    assert load_map(tmp_path / "map.json") == SKETCH.build_environment()
 
 
 def test_a_file_that_is_there_is_not_overwritten_unasked(tmp_path):
@@ -49,32 +49,32 @@ def test_a_file_that_is_there_is_not_overwritten_unasked(tmp_path):
 def test_changes_on_disk_are_noticed(tmp_path):
     path = tmp_path / "map.json"
     disk = write_sketch(SKETCH, path)
-    assert state_of(disk) == "same"
+    assert check_file(disk) == "same"
     os.utime(path, ns=(1, 1))
-    assert state_of(disk) == "same", "merely touched"
+    assert check_file(disk) == "same", "merely touched"
     text = path.read_text()
     path.write_text(text.replace("12", "13"))
-    assert state_of(disk) == "changed", "of the same length"
+    assert check_file(disk) == "changed", "of the same length"
     with pytest.raises(ChangedError, match="changed by something else"):
         write_sketch(SKETCH, path, disk)
     path.unlink()
-    assert state_of(disk) == "gone"
+    assert check_file(disk) == "gone"
     # what has gone can be written again
-    assert state_of(write_sketch(SKETCH, path, disk)) == "same"
+    assert check_file(write_sketch(SKETCH, path, disk)) == "same"
 
 
 def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
     path = tmp_path / "map.json"
     write_sketch(SKETCH, path)
     (first, disk_of_first), (second, disk_of_second) = read_sketch(path), read_sketch(path)
-    one, _ = first.added([CircleObstacle((1.0, 1.0), 0.5)])
-    other, _ = second.added([CircleObstacle((2.0, 2.0), 0.5)])
+    one, _ = first.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])
+    other, _ = second.with_obstacles([CircleObstacle((2.0, 2.0), 0.5)])
     disk_of_first = write_sketch(one, path, disk_of_first)
     with pytest.raises(ChangedError):
         write_sketch(other, path, disk_of_second)
     assert read_sketch(path)[0] == renumbered(one)
     write_sketch(other, path, disk_of_second, over=True)
-    assert state_of(disk_of_first) == "changed"
+    assert check_file(disk_of_first) == "changed"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and modes")
@@ -85,7 +85,7 @@ def test_links_and_modes_stay(tmp_path):
     link = tmp_path / "link.json"
     link.symlink_to(target)
     sketch, disk = read_sketch(link)
-    write_sketch(sketch.added([CircleObstacle((1.0, 1.0), 0.5)])[0], link, disk)
+    write_sketch(sketch.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])[0], link, disk)
     assert link.is_symlink()
     assert len(read_sketch(target)[0].obstacles) == 1
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
@@ -101,7 +101,7 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pathlib.Path.write_bytes", full)
     with pytest.raises(OutputError, match=r"map\.json: cannot be written: No space left"):
-        write_sketch(SKETCH.added([CircleObstacle((1.0, 1.0), 0.5)])[0], path, disk)
+        write_sketch(SKETCH.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])[0], path, disk)
     monkeypatch.undo()
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["map.json"]
@@ -126,5 +126,5 @@ def test_paths_are_absolute(tmp_path, monkeypatch):
     disk = write_sketch(SKETCH, document.Path("map.json"))
     assert disk.path.is_absolute()
     monkeypatch.chdir(tmp_path.parent)
-    assert state_of(disk) == "same"
-    assert disk.path.read_text() == sketch_text(SKETCH)
+    assert check_file(disk) == "same"
+    assert disk.path.read_text() == dump_sketch(SKETCH)

@@ -9,8 +9,8 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.canvas.canvas import map_words
-from robocov_app.editor.canvas.overlay import STEM
+from robocov_app.editor.canvas.canvas import describe_map
+from robocov_app.editor.canvas.overlay import STEM_PX
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.render.theme import DARK, LIGHT
 
@@ -60,34 +60,34 @@ def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: P
     outside = CircleObstacle((30, 30), 1.0)
     with opened_editor(tmp_path, sheet(CROSSED, outside)) as hands:
         problems = hands.editor.problems
-        assert problems[0].grave and "cross" in problems[0].words
+        assert problems[0].is_error and "cross" in problems[0].message
         hands.window.canvas.fit()
         hands.frames(1)
-        spot = problems[0].where.representative_point()
+        spot = problems[0].geometry.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
-        at = x, y - STEM
+        at = x, y - STEM_PX
         assert near(without_message(hands), at, LIGHT.trajectory, 6) > 40
         hands.click(*at)
-        assert hands.editor.problem is problems[0] and hands.said == problems[0].words
+        assert hands.editor.problem is problems[0] and hands.said == problems[0].message
         hands.turn("problems")
         hands.window.canvas.zoom(8.0, (100.0, 100.0))
         hands.click(*hands.widget("option", f"problem:{len(problems) - 1}").rect.center)
         assert hands.editor.problem is problems[-1]
-        where = problems[-1].where.representative_point()
-        assert hands.window.canvas.over(hands.pixel((where.x, where.y)))
+        where = problems[-1].geometry.representative_point()
+        assert hands.window.canvas.contains(hands.pixel((where.x, where.y)))
 
 
 def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(CROSSED)) as hands:
-        assert map_words(hands.editor).endswith("draft: 1 problem")
+        assert describe_map(hands.editor).endswith("draft: 1 problem")
         hands.key("ctrl+a")
         hands.key("delete")
-        assert map_words(hands.editor).startswith("● Untitled   ·   0 obstacles")
+        assert describe_map(hands.editor).startswith("● Untitled   ·   0 obstacles")
 
 
 def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
     with opened_editor(tmp_path, Sketch()) as hands:
-        assert "no boundary" in hands.editor.problems[0].words or hands.editor.problems[0].grave
+        assert "no boundary" in hands.editor.problems[0].message or hands.editor.problems[0].is_error
         for tool in hands.editor.tools:
             hands.window.do(f"tool:{tool}")
             hands.click_all((2, 2), (4, 2), (4, 4))
@@ -137,10 +137,10 @@ def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> Non
         hands.key("a")
         await_that(hands, lambda: hands.window.canvas.team is not None)
         team = hands.window.canvas.team
-        assert len(team.places) == 6
+        assert len(team.positions) == 6
         hands.key("shift+=")
         await_that(hands, lambda: hands.window.canvas.team.robots == 7)
-        assert len(hands.window.canvas.team.places) == 7
+        assert len(hands.window.canvas.team.positions) == 7
 
 
 def test_what_is_wrong_is_marked_already_while_something_is_dragged(tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_what_is_wrong_is_marked_already_while_something_is_dragged(tmp_path: Pa
         hands.press(*hands.pixel((5, 5)))
         hands.go((8, 5), (11.5, 5), held=1)
         hands.frames(2)
-        assert "outside" in hands.editor.problems[0].words
+        assert "outside" in hands.editor.problems[0].message
         hands.key("escape")
         hands.release()
         hands.frames(2)

@@ -7,7 +7,7 @@ from drawn_sketches import HALL
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits.fixes import TITLES, fixed, unreachable_filled
+from robocov_app.editor.edits.fixes import FIX_TITLES, fill_unreachable, find_fix
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.sketch import Sketch
 
@@ -16,7 +16,7 @@ BOW_TIE = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
 
 
 def hall(*shapes, starts=(), **others) -> Sketch:
-    return replace(Sketch("Hall", boundary=HALL, starts=starts).added(shapes)[0], **others)
+    return replace(Sketch("Hall", boundary=HALL, starts=starts).with_obstacles(shapes)[0], **others)
 
 
 def rooms(width: float) -> Sketch:
@@ -55,11 +55,11 @@ def test_a_problem_that_is_mended_is_gone(sketch, kind, words):
     radius = 0.2
     before = measure(sketch, radius).problems
     problem = next(each for each in before if each.kind == kind)
-    assert TITLES[kind]
-    change = fixed(sketch, problem, radius)
-    assert words in change.words
+    assert FIX_TITLES[kind]
+    change = find_fix(sketch, problem, radius)
+    assert words in change.description
     after = measure(change.sketch, radius).problems
-    assert kind not in [each.kind for each in after], [each.words for each in after]
+    assert kind not in [each.kind for each in after], [each.message for each in after]
     assert len(after) < len(before)
 
 
@@ -68,20 +68,20 @@ def test_all_that_cannot_be_reached_is_filled_at_once():
     fork = ((8.0, 0.0), (8.0, 3.0), (8.2, 3.0), (8.2, 0.2), (8.5, 0.2), (8.5, 3.0), (9.0, 0.0))
     sketch = hall(frame, PolygonObstacle(fork))
     assert measure(sketch, 0.3).problems
-    after = measure(unreachable_filled(sketch, 0.3).sketch, 0.3)
+    after = measure(fill_unreachable(sketch, 0.3).sketch, 0.3)
     assert not after.problems and len(after.reached) == 1
     with pytest.raises(MapError, match="nothing to fill"):
-        unreachable_filled(hall(), 0.3)
+        fill_unreachable(hall(), 0.3)
     with pytest.raises(MapError, match="fits anywhere"):
-        unreachable_filled(hall(), 5.0)
+        fill_unreachable(hall(), 5.0)
 
 
 def test_what_cannot_be_mended_is_none():
     locked = rooms(0.3)
     locked = replace(locked, obstacles=tuple(replace(item, locked=True) for item in locked.obstacles))
     narrow = next(each for each in measure(locked, 0.2).problems if each.kind == "narrow")
-    assert fixed(locked, narrow, 0.2) is None
+    assert find_fix(locked, narrow, 0.2) is None
     nameless = hall(name="")
-    assert fixed(nameless, measure(nameless).problems[0], 0.2) is None
+    assert find_fix(nameless, measure(nameless).problems[0], 0.2) is None
     full = hall(starts=(("a", PointsStart(((-1.0, 4.0),))),))
-    assert fixed(full, measure(full, 5.0).problems[0], 5.0) is None
+    assert find_fix(full, measure(full, 5.0).problems[0], 5.0) is None

@@ -13,9 +13,9 @@ from driven_window import KEYS, MODIFIERS
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.parser import parse_sketch
-from robocov_app.editor.model.sketch import sketch_text
-from robocov_app.editor.ui.commands import TYPED
+from robocov_app.editor.model.sketch import dump_sketch
 from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS
 
 EVENTS, BATCH, DRAWN = 2_500, 6, 5
 """Events of one seed, events between two frames, and frames of which one is drawn."""
@@ -33,7 +33,7 @@ MOST = {
 """What is done so often at most, since it writes files or takes long."""
 
 WORDS = (
-    *(f"{word} {value}" for word in TYPED for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
+    *(f"{word} {value}" for word in TYPED_COMMANDS for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
     *("3 x 2", "@1<45", "120cm", "+0.5 -0.5", "90", "𝔸 é ñ 中 🤖", "%s {x} <b> &", "..", "1e309", "-", "٣"),
 )
 SIZES = ((640, 480), (900, 600), (1000, 1400), (2000, 640), (777, 601))
@@ -202,8 +202,8 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
                 window.closed = window.documents.leaving = False
             if step % 50 == 0:
                 sketch = hands.sketch
-                assert parse_sketch(sketch_text(sketch), "map") == renumbered(sketch)
-                assert hands.editor.selection.within(sketch) == hands.editor.selection
+                assert parse_sketch(dump_sketch(sketch), "map") == renumbered(sketch)
+                assert hands.editor.selection.restrict_to(sketch) == hands.editor.selection
         # and back to the beginning, exactly
         pygame.event.clear()
         if hands.window.trial is not None:

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.document import History
 from robocov_app.editor.model.geometry import DECIMALS
-from robocov_app.editor.model.parser import sketch_of
+from robocov_app.editor.model.parser import build_sketch
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import Sketch, draft_document
+from robocov_app.editor.model.sketch import Sketch, to_document
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
@@ -19,25 +19,25 @@ def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
     was = [(history.sketch, history.selection)]
     for _ in range(data.draw(st.integers(1, 6))):
         change = data.draw(changes(history.sketch))
-        if change is not None and history.do(change):
+        if change is not None and history.apply(change):
             was.append((history.sketch, history.selection))
             # whatever an edit makes can be kept, and comes back
-            assert sketch_of(draft_document(change.sketch)) == renumbered(change.sketch)
-            assert change.selection == change.selection.within(change.sketch)
-            assert len(change.sketch.places) == len(change.sketch.obstacles)
-            assert change.words
-    words = history.past
+            assert build_sketch(to_document(change.sketch)) == renumbered(change.sketch)
+            assert change.selection == change.selection.restrict_to(change.sketch)
+            assert len(change.sketch.index_by_key) == len(change.sketch.obstacles)
+            assert change.description
+    words = history.undo_descriptions
     for sketch, _ in reversed(was[:-1]):
         assert history.undo() is not None
         assert history.sketch == sketch
-    assert not history.past
+    assert not history.undo_descriptions
     assert history.undo() is None
-    assert history.future == tuple(reversed(words))
+    assert history.redo_descriptions == tuple(reversed(words))
     for sketch, selection in was[1:]:
         assert history.redo() is not None
         assert (history.sketch, history.selection) == (sketch, selection)
-    assert not history.future
-    assert history.past == words
+    assert not history.redo_descriptions
+    assert history.undo_descriptions == words
 
 
 @settings(max_examples=100)
@@ -45,7 +45,7 @@ def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
 def test_coordinates_come_out_to_the_tenth_of_a_millimetre(data):
     sketch = data.draw(sound_sketches(least=1))
     change = data.draw(changes(sketch))
-    document = draft_document(change.sketch) if change is not None else {}
+    document = to_document(change.sketch) if change is not None else {}
 
     def walk(value):
         if isinstance(value, list | tuple):
@@ -64,7 +64,7 @@ def test_coordinates_come_out_to_the_tenth_of_a_millimetre(data):
 def drawn(count: int) -> History:
     history = History(Sketch(boundary=HALL))
     for k in range(count):
-        history.do(create.circle_drawn(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
+        history.apply(create.add_circle(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
     return history
 
 
@@ -73,39 +73,39 @@ def test_a_drag_is_one_step():
     selection = Selection.of(0)
     before = history.sketch
     for k in range(1, 30):
-        assert history.do(transform.moved(before, selection, 0.1 * k, 0.0), drag="drag 1")
-    assert history.past == ("circle moved", "circle drawn")
-    history.broken = True
-    history.do(transform.moved(history.sketch, selection, 1.0, 0.0), drag="drag 1")
-    assert len(history.past) == 3
+        assert history.apply(transform.move(before, selection, 0.1 * k, 0.0), drag="drag 1")
+    assert history.undo_descriptions == ("circle moved", "circle drawn")
+    history.starts_new_step = True
+    history.apply(transform.move(history.sketch, selection, 1.0, 0.0), drag="drag 1")
+    assert len(history.undo_descriptions) == 3
     history.undo()
     history.undo()
     assert history.sketch == before
     # and after undoing, the same drag begins anew
-    history.do(transform.moved(before, selection, 0.1, 0.0), drag="drag 1")
-    assert history.past == ("circle moved", "circle drawn")
+    history.apply(transform.move(before, selection, 0.1, 0.0), drag="drag 1")
+    assert history.undo_descriptions == ("circle moved", "circle drawn")
 
 
 def test_a_drag_that_comes_back_is_none():
     history = drawn(1)
     before = history.sketch
     history.mark_saved()
-    history.do(transform.moved(before, Selection.of(0), 1.0, 0.0), drag=1)
-    assert history.unsaved
-    history.do(transform.moved(before, Selection.of(0), 0.0, 0.0), drag=1)
-    assert history.past == ("circle drawn",)
+    history.apply(transform.move(before, Selection.of(0), 1.0, 0.0), drag=1)
+    assert history.has_unsaved_changes
+    history.apply(transform.move(before, Selection.of(0), 0.0, 0.0), drag=1)
+    assert history.undo_descriptions == ("circle drawn",)
     assert history.sketch == before
-    assert not history.unsaved
+    assert not history.has_unsaved_changes
 
 
 def test_what_changes_nothing_is_no_step_and_keeps_what_was_undone():
     history = drawn(2)
     history.undo()
-    assert not history.do(Change(history.sketch, Selection.of(0), "nothing"))
-    assert history.future
+    assert not history.apply(Change(history.sketch, Selection.of(0), "nothing"))
+    assert history.redo_descriptions
     assert history.selection == Selection.of(0)
-    history.do(create.circle_drawn(history.sketch, (5.0, 5.0), 1.0))
-    assert not history.future
+    history.apply(create.add_circle(history.sketch, (5.0, 5.0), 1.0))
+    assert not history.redo_descriptions
 
 
 def test_undo_has_no_limit():
@@ -124,25 +124,25 @@ def test_undo_has_no_limit():
 
 def test_saved_is_what_the_file_holds_wherever_one_goes():
     history = drawn(3)
-    assert history.unsaved
+    assert history.has_unsaved_changes
     history.mark_saved()
-    assert not history.unsaved
+    assert not history.has_unsaved_changes
     history.undo()
-    assert history.unsaved
+    assert history.has_unsaved_changes
     history.redo()
-    assert not history.unsaved
+    assert not history.has_unsaved_changes
     history.saved = None
-    assert history.unsaved
-    assert History(Sketch(), saved=False).unsaved
-    assert not History(Sketch()).unsaved
+    assert history.has_unsaved_changes
+    assert History(Sketch(), saved=False).has_unsaved_changes
+    assert not History(Sketch()).has_unsaved_changes
 
 
 def test_undoing_selects_what_was_selected():
     history = drawn(2)
     history.selection = Selection.of(0)
-    history.do(properties.deleted(history.sketch, Selection.of(0)))
+    history.apply(properties.delete(history.sketch, Selection.of(0)))
     assert history.selection == Selection()
     back = history.undo()
     assert back is not None
-    assert back.words == "circle deleted"
+    assert back.description == "circle deleted"
     assert back.selection == history.selection == Selection.of(0)

@@ -11,8 +11,14 @@ from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.import_sheet import declared_colours, find_role, give_role, make_sheet, next_role
-from robocov_app.editor.ui.importing import Importing
+from robocov_app.editor.ui.import_sheet import (
+    build_colour_sheet,
+    choose_next_role,
+    find_role,
+    list_declared_colours,
+    set_role,
+)
+from robocov_app.editor.ui.importing import ImportJob
 from robocov_app.formats import IMPORTERS, ReadOptions
 from robocov_app.jobs.workers import DirectWorker
 
@@ -31,7 +37,7 @@ def drawing(tmp_path: Path) -> Path:
 
 
 def dialog(path: Path, kind: str = "svg") -> ImportDialog:
-    asked = ImportDialog(path, IMPORTERS[kind], DirectWorker(Importing()), lambda _: None)
+    asked = ImportDialog(path, IMPORTERS[kind], DirectWorker(ImportJob()), lambda _: None)
     asked.poll()
     return asked
 
@@ -47,31 +53,31 @@ def test_a_colour_goes_through_its_roles_and_back(drawing: Path) -> None:
     assert free_area(asked) == pytest.approx(ROOM - 6)
     for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
         asked.cycle_colour((224, 224, 255))
-        assert find_role(asked.given, (224, 224, 255)) == role
+        assert find_role(asked.entries, (224, 224, 255)) == role
         assert free_area(asked) == pytest.approx(area)
         # what is left out can still be clicked
         assert asked.imported is not None and asked.imported.sheet is not None
         assert asked.imported.sheet.find_colour(*RUG) == (224, 224, 255)
-    assert asked.given == {}
+    assert asked.entries == {}
 
 
 def test_what_was_typed_stays_beside_what_is_clicked() -> None:
     given = {"free_colour": "red, lightblue", "cell": "1"}
-    give_role(given, (0, 0, 255), "free")
+    set_role(given, (0, 0, 255), "free")
     assert given == {"free_colour": "red, lightblue, #0000ff", "cell": "1"}
-    give_role(given, (255, 0, 0), "solid")
+    set_role(given, (255, 0, 0), "solid")
     assert given == {"free_colour": "lightblue, #0000ff", "solid_colour": "#ff0000", "cell": "1"}
-    assert declared_colours(given) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
-    give_role(given, (255, 0, 0), None)
+    assert list_declared_colours(given) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
+    set_role(given, (255, 0, 0), None)
     assert "solid_colour" not in given
     # half a name is no colour yet
     given["free_colour"] = "lightbl"
-    assert declared_colours(given) == []
-    assert next_role(next_role(next_role(next_role(None)))) is None
+    assert list_declared_colours(given) == []
+    assert choose_next_role(choose_next_role(choose_next_role(choose_next_role(None)))) is None
 
 
 def test_the_topmost_shape_is_the_one_that_is_clicked(drawing: Path) -> None:
-    found = make_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
+    found = build_colour_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
     assert found is not None
     assert found.colours == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
     assert found.find_colour(*RUG) == (224, 224, 255)
@@ -92,7 +98,7 @@ def picture(folder: Path) -> Path:
 
 
 def test_colours_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
-    found = make_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
+    found = build_colour_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
     assert found is not None
     names = {(255, 255, 255), (160, 192, 255), (0, 0, 0), (255, 0, 0)}
     assert set(found.colours) == names
@@ -103,18 +109,18 @@ def test_colours_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
     asked.set("cell", "0.1")
     split = free_area(asked)
     asked.cycle_colour((255, 0, 0))
-    assert find_role(asked.given, (255, 0, 0)) == "free"
+    assert find_role(asked.entries, (255, 0, 0)) == "free"
     assert free_area(asked) > split + 50
 
 
 def test_a_map_without_colours_has_no_sheet(tmp_path: Path) -> None:
     foreign = IMPORTERS["svg"].read(dialog_file(tmp_path), ReadOptions())
-    assert make_sheet(foreign) is not None
+    assert build_colour_sheet(foreign) is not None
     path = tmp_path / "plan.wkt"
     path.write_text(shapely.box(0, 0, 5, 5).wkt)
     asked = dialog(path, "wkt")
     assert free_area(asked) == pytest.approx(25.0)
-    assert asked.imported is not None and asked.imported.sheet is None and not asked.has_colours
+    assert asked.imported is not None and asked.imported.sheet is None and asked.sheet is None
 
 
 def dialog_file(folder: Path) -> Path:
@@ -151,20 +157,20 @@ def test_a_click_on_the_preview_changes_a_colour_and_the_preview(hands: Hands) -
     asked, widgets = shown(hands)
     hands.click(*widgets["button:clicks:colour"].rect.center)
     asked, widgets = shown(hands)
-    before, after = (camera.to_pixels(np.array(RUG)) for camera in asked.cameras)
+    before, after = (camera.to_pixels(np.array(RUG)) for camera in asked.preview.cameras)
     assert pixel(hands, before) == (224, 224, 255)
     solid = pixel(hands, after)
     hands.click(*before.tolist())
     asked, widgets = shown(hands)
-    assert asked.given == {"free_colour": "#e0e0ff"}
+    assert asked.entries == {"free_colour": "#e0e0ff"}
     # the rows of colours are in sight, and do not move the maps
     chip = widgets["button:colour:#e0e0ff"]
     assert chip.text.strip() == "free"
-    assert pixel(hands, asked.cameras[1].to_pixels(np.array(RUG))) != solid
+    assert pixel(hands, asked.preview.cameras[1].to_pixels(np.array(RUG))) != solid
     # a click into the right map still keeps a part
-    hands.click(*asked.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
+    hands.click(*asked.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
     asked, _ = shown(hands)
-    assert [float(word) for word in asked.given["inside"].split()] == pytest.approx((8.0, 1.0), abs=0.1)
+    assert [float(word) for word in asked.entries["inside"].split()] == pytest.approx((8.0, 1.0), abs=0.1)
 
 
 def test_colours_are_reached_by_the_keyboard(hands: Hands) -> None:
@@ -185,17 +191,17 @@ def test_colours_are_reached_by_the_keyboard(hands: Hands) -> None:
         hands.frames(1)
     hands.key("space")
     asked, _ = shown(hands)
-    assert asked.given == {"free_colour": "#e0e0ff"}
+    assert asked.entries == {"free_colour": "#e0e0ff"}
     assert ui.focus is not None and ui.focus == "colour:#e0e0ff"
     hands.key("space")
     asked, _ = shown(hands)
-    assert asked.given == {"solid_colour": "#e0e0ff"}
+    assert asked.entries == {"solid_colour": "#e0e0ff"}
 
 
 def test_the_report_is_in_sight(hands: Hands) -> None:
     asked, _ = shown(hands)
-    foot = max(camera.view[1] + camera.view[3] for camera in asked.cameras)
-    left = round(asked.cameras[0].view[0])
+    foot = max(camera.view[1] + camera.view[3] for camera in asked.preview.cameras)
+    left = round(asked.preview.cameras[0].view[0])
     lines = np.array(
         [
             [hands.window.screen.get_at((x, y))[:3] for x in range(left, left + 120)]

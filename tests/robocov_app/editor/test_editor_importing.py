@@ -12,9 +12,9 @@ import pytest
 from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
 
-from robocov_app.editor.edits.properties import titled
+from robocov_app.editor.edits.properties import set_title
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.importing import Importing, options_of
+from robocov_app.editor.ui.importing import ImportJob, list_options
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping
 from robocov_app.jobs.workers import DirectWorker, LatestWorker
 from robocov_app.toolkit.dialogs import Question
@@ -35,7 +35,7 @@ def plan(tmp_path: Path) -> Path:
 
 
 def question(path: Path, worker: Any = None, taken: Any = None) -> ImportDialog:
-    worker = worker or DirectWorker(Importing())
+    worker = worker or DirectWorker(ImportJob())
     return ImportDialog(path, IMPORTERS["picture"], worker, taken)
 
 
@@ -47,24 +47,24 @@ def free(asked: ImportDialog) -> float:
 
 @pytest.mark.parametrize("name", IMPORTERS)
 def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
-    options = options_of(IMPORTERS[name])
+    options = list_options(IMPORTERS[name])
     shaping = [field.name for field in fields(Shaping)]
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
-    asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(Importing()), None)
-    assert asked.settings() == (ReadOptions(), Shaping())
+    asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
+    assert asked.build_settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
     given |= {"colours": "red, #00ff00", "width": "3px"}
     meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
     meant |= {"colours": ("red", "#00ff00"), "width": "3px"}
     for option in options:
-        asked.given = {option.name: option.choices[-1] if option.choices else given[option.kind]}
+        asked.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
         value = (
             {"yes": True}.get(option.choices[-1], option.choices[-1])
             if option.choices
             else meant[option.kind]
         )
-        assert getattr(asked.settings()[option.name in shaping], option.name) == value
+        assert getattr(asked.build_settings()[option.name in shaping], option.name) == value
 
 
 def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
@@ -88,7 +88,7 @@ def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
     assert "is solid, expected a free position" in asked.trouble
     asked.set("inside", "")
     assert free(asked) == pytest.approx(80 - 1)
-    assert asked.given == {"cell": "0.1"}
+    assert asked.entries == {"cell": "0.1"}
 
 
 def waited(asked: ImportDialog) -> None:
@@ -138,21 +138,21 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.key("return")
     hands.type("0.1")
     asked, _ = shown(hands)
-    assert asked.given == {"cell": "0.1"}
-    for camera, place in zip(asked.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
+    assert asked.entries == {"cell": "0.1"}
+    for camera, place in zip(asked.preview.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
         hands.click(*camera.to_pixels(np.array(place)).tolist())
-        x, y = (float(word) for word in asked.given["inside"].split())
+        x, y = (float(word) for word in asked.entries["inside"].split())
         assert (x, y) == pytest.approx(place, abs=0.1)
-    hands.click(*asked.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
+    hands.click(*asked.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     hands.key("return")
     hands.frames(2)
     assert hands.editor.dialogs.asked is None
     assert (
-        hands.editor.document.history.unsaved
+        hands.editor.document.history.has_unsaved_changes
         and hands.editor.document.path is None
         and hands.editor.document.title == "plan"
     )
-    assert hands.sketch.environment().free_area == pytest.approx(56)
+    assert hands.sketch.build_environment().free_area == pytest.approx(56)
     assert hands.said == "imported: plan.png, not saved yet"
 
 
@@ -163,19 +163,19 @@ def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
     hands.click(*view["menu:invert"].rect.center)
     hands.key("down")
     hands.key("return")
-    assert asked.given == {"cell": "0.1", "invert": "yes"} and not asked.accepted
+    assert asked.entries == {"cell": "0.1", "invert": "yes"} and not asked.accepted
     menu = shown(hands)[1]["menu:unknown"]
     seen = []
     for _ in range(4):
         hands.click(*menu.rect.center)
         hands.key("down")
         hands.key("return")
-        seen.append(asked.given.get("unknown"))
+        seen.append(asked.entries.get("unknown"))
     assert seen == ["obstacle", "free", "cut", "cut"]
     hands.click(*menu.rect.center)
     hands.key("home")
     hands.key("return")
-    assert "unknown" not in asked.given, "an option without a default can be left again"
+    assert "unknown" not in asked.entries, "an option without a default can be left again"
     before = hands.sketch
     hands.click(*view["button:cancel"].rect.center)
     assert hands.editor.dialogs.asked is None and hands.sketch is before
@@ -195,7 +195,7 @@ def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path)
 
 
 def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
-    hands.editor.change(titled(hands.sketch, "mine"))
+    hands.editor.apply(set_title(hands.sketch, "mine"))
     hands.post(pygame.DROPFILE, file=str(plan))
     hands.settle()
     shown(hands)
@@ -231,7 +231,7 @@ def test_options_maps_and_report_keep_apart(tmp_path: Path, plan: Path, size: tu
         hands.type("0.1")
         asked, view = shown(hands)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button")]
-        views = [pygame.Rect(camera.view) for camera in asked.cameras]
+        views = [pygame.Rect(camera.view) for camera in asked.preview.cameras]
         assert not views[0].colliderect(views[1]) and min(min(view.size) for view in views) > 120
         assert all(not view.colliderect(rect) for view in views for rect in rects)
         left, right = (hands.window.screen.subsurface(view).copy() for view in views)

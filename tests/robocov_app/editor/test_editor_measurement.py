@@ -13,7 +13,7 @@ from shapely import MultiPolygon
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov.mapfile.check import check_map
-from robocov_app.editor.model.measurement import measure, reach_of
+from robocov_app.editor.model.measurement import compute_reach, measure
 from robocov_app.editor.model.sketch import Sketch
 
 FAR = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
@@ -26,7 +26,7 @@ def doors(*widths: float) -> Sketch:
         x = 12.0 * (k + 1) / (len(widths) + 1)
         shapes.append(WallObstacle(((x, -1.0), (x, 4.0 - width / 2)), 0.2))
         shapes.append(WallObstacle(((x, 4.0 + width / 2), (x, 9.0)), 0.2))
-    return Sketch("Doors", boundary=HALL).added(shapes)[0]
+    return Sketch("Doors", boundary=HALL).with_obstacles(shapes)[0]
 
 
 def rastered(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.ndarray, np.ndarray]:
@@ -45,12 +45,12 @@ def rastered(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.nda
 @settings(max_examples=25)
 @given(sound_sketches(least=1, most=6), st.sampled_from([0.1, 0.25, 0.6]))
 def test_what_robots_reach_is_what_a_raster_says(sketch, radius):
-    free = sketch.unchecked().free
+    free = sketch.build_unchecked_environment().free
     if free.is_empty:
         return
     cell = 0.05
     parts, swept = rastered(free, radius, cell)
-    reached, untouched = reach_of(free, radius)
+    reached, untouched = compute_reach(free, radius)
     opened = shapely.union_all(reached)
     perimeter = free.length
     assert opened.area == pytest.approx(swept.sum() * cell**2, abs=2.0 * perimeter * cell)
@@ -78,7 +78,7 @@ def test_a_door_lets_pass_whom_it_lets_pass(width, radius, passes):
     assert result.gap.width == pytest.approx(width)
     assert result.components == pytest.approx([96.0 - 0.2 * (8.0 - width)])
     assert len(result.reached) == (1 if passes else 2)
-    words = [problem.words for problem in result.problems]
+    words = [problem.message for problem in result.problems]
     if passes:
         assert result.impassable.is_empty
         assert result.sealed.is_empty
@@ -113,14 +113,14 @@ def test_a_passage_that_leads_back_to_the_same_place_is_marked_too():
         PolygonObstacle(((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0))),
         PolygonObstacle(((5.3, 3.0), (7.3, 3.0), (7.3, 5.0), (5.3, 5.0))),
     ]
-    result = measure(Sketch(boundary=HALL).added(blocks)[0], 0.2)
+    result = measure(Sketch(boundary=HALL).with_obstacles(blocks)[0], 0.2)
     assert len(result.reached) == 1
     (mark,) = result.impassable.geoms
     # the slot, and half a disc at either end
     assert mark.area == pytest.approx(0.3 * 2.0 + math.pi * 0.15**2, abs=0.01)
     # no more than a crack is taken for touching
     closed = [blocks[0], PolygonObstacle(((5.0015, 3.0), (7.3, 3.0), (7.3, 5.0), (5.0015, 5.0)))]
-    result = measure(Sketch(boundary=HALL).added(closed)[0], 0.2)
+    result = measure(Sketch(boundary=HALL).with_obstacles(closed)[0], 0.2)
     assert result.impassable.is_empty
     assert result.gap.width == pytest.approx(3.0)
 
@@ -133,7 +133,7 @@ def test_niches_and_sealed_pockets_are_marked_but_not_corners():
         ((8.0, 4.0), (9.0, 4.0), (9.0, 5.0), (8.0, 5.0)), (((8.4, 4.4), (8.6, 4.4), (8.6, 4.6), (8.4, 4.6)),)
     )
     pillar = CircleObstacle((10.0, 2.0), 0.5)
-    result = measure(Sketch(boundary=HALL).added([niche, frame, pillar])[0], 0.3)
+    result = measure(Sketch(boundary=HALL).with_obstacles([niche, frame, pillar])[0], 0.3)
     marks = sorted(result.impassable.geoms, key=lambda part: part.centroid.x)
     assert len(marks) == 2
     assert marks[0].area == pytest.approx(0.2 * 2.0, abs=0.03)
@@ -146,7 +146,7 @@ def test_where_no_robot_fits_it_is_said():
     result = measure(Sketch("n", boundary=((0.0, 0.0), (9.0, 0.0), (9.0, 0.3), (0.0, 0.3))), 0.2)
     assert result.reached == ()
     assert result.impassable.area == pytest.approx(2.7)
-    assert "no robot of radius 0.2 m fits anywhere" in [problem.words for problem in result.problems]
+    assert "no robot of radius 0.2 m fits anywhere" in [problem.message for problem in result.problems]
 
 
 @pytest.mark.parametrize("name", ["rooms", "office", "gaps", "cave", "museum"])
@@ -167,15 +167,15 @@ def test_every_draft_can_be_read_out(sketch, radius):
     assert isinstance(result.impassable, MultiPolygon)
     assert result.free_area == pytest.approx(sum(result.components))
     assert sum(result.reached) <= result.free_area + 1e-6
-    assert [problem.words for problem in result.problems][: len(problems(sketch, radius))] == [
-        problem.words for problem in problems(sketch, radius)
+    assert [problem.message for problem in result.problems][: len(problems(sketch, radius))] == [
+        problem.message for problem in problems(sketch, radius)
     ]
 
 
 def test_broken_parts_count_as_far_as_they_are_sound():
     assert measure(Sketch()).free_area == 0.0
     bow_tie = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
-    result = measure(Sketch("n", boundary=HALL).added([bow_tie, WallObstacle((), 0.1)])[0])
+    result = measure(Sketch("n", boundary=HALL).with_obstacles([bow_tie, WallObstacle((), 0.1)])[0])
     assert result.free_area == pytest.approx(96.0 - 2.0)
     crossing = measure(Sketch("n", boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))))
     assert crossing.components == pytest.approx((4.0, 4.0))
@@ -184,9 +184,11 @@ def test_broken_parts_count_as_far_as_they_are_sound():
 @pytest.mark.parametrize("huge", [1e5, 1e12, 1e300])
 def test_sizes_that_no_map_has_are_measured(huge):
     shapes = [CircleObstacle((1.0, 1.0), huge), WallObstacle(((1.0, 1.0), (huge, 1.0)), huge)]
-    sketch = Sketch("n", boundary=HALL, starts=(("a", DiscStart((huge, 1.0), huge)),)).added(shapes)[0]
+    sketch = Sketch("n", boundary=HALL, starts=(("a", DiscStart((huge, 1.0), huge)),)).with_obstacles(shapes)[
+        0
+    ]
     result = measure(sketch)
     assert result.free_area == pytest.approx(96.0)
-    assert len([problem for problem in result.problems if problem.grave]) >= 3
+    assert len([problem for problem in result.problems if problem.is_error]) >= 3
     far = measure(replace(sketch, boundary=((0.0, 0.0), (huge, 0.0), (0.0, huge))))
     assert far.free_area == 0.0

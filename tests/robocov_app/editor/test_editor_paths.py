@@ -14,8 +14,8 @@ from robocov_app.editor.edits import paths, properties, transform
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.model.sketch import Sketch, sketch_text
-from robocov_app.editor.ui.commands import run_typed
+from robocov_app.editor.model.sketch import Sketch, dump_sketch
+from robocov_app.editor.ui.typed_commands import run_typed_command
 
 CART = CircleObstacle((2.0, 2.0), 0.5)
 ROUND = ObstaclePath(((2.0, 2.0), (8.0, 2.0), (8.0, 6.0)), 0.5)
@@ -24,7 +24,7 @@ DESK = PolygonObstacle(((5.0, 7.0), (7.0, 7.0), (7.0, 8.0), (5.0, 8.0)))
 
 
 def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
-    path = sketch.item(key).shape.path
+    path = sketch.get_item(key).shape.path
     assert path is not None
     return path
 
@@ -34,44 +34,44 @@ def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
 
 def test_the_first_way_point_makes_a_path_from_the_obstacles_middle() -> None:
     sketch = sheet(DESK)
-    change = paths.way_point_added(sketch, 0, (1.0, 3.00004), speed=0.3)
+    change = paths.add_waypoint(sketch, 0, (1.0, 3.00004), speed=0.3)
     assert led(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
     assert change.selection == Selection.of(0)
     # where it is drawn it stays
-    assert change.sketch.environment().at(0.0).obstacles[0].polygon.equals(DESK.polygon)
-    more = paths.way_point_added(change.sketch, 0, (1.0, 1.0)).sketch
-    between = paths.way_point_added(more, 0, (3.0, 6.0), 1).sketch
+    assert change.sketch.build_environment().at(0.0).obstacles[0].polygon.equals(DESK.polygon)
+    more = paths.add_waypoint(change.sketch, 0, (1.0, 1.0)).sketch
+    between = paths.add_waypoint(more, 0, (3.0, 6.0), 1).sketch
     assert led(between).points == ((6.0, 7.5), (3.0, 6.0), (1.0, 3.0), (1.0, 1.0))
 
 
 def test_way_points_move_and_go_and_with_the_last_but_one_the_path() -> None:
     sketch = sheet(MOVING)
-    moved = paths.way_point_moved(sketch, 0, 1, (7.0, 3.0)).sketch
+    moved = paths.move_waypoint(sketch, 0, 1, (7.0, 3.0)).sketch
     assert led(moved).points[1] == (7.0, 3.0)
-    fewer = paths.way_point_removed(moved, 0, 0).sketch
+    fewer = paths.remove_waypoint(moved, 0, 0).sketch
     assert led(fewer).points == ((7.0, 3.0), (8.0, 6.0))
-    assert paths.way_point_removed(fewer, 0, 1).sketch.item(0).shape.path is None
+    assert paths.remove_waypoint(fewer, 0, 1).sketch.get_item(0).shape.path is None
     with pytest.raises(MapError, match="no such way point"):
-        paths.way_point_moved(sketch, 0, 3, (1.0, 1.0))
+        paths.move_waypoint(sketch, 0, 3, (1.0, 1.0))
     with pytest.raises(MapError, match="in one place"):
-        paths.way_point_moved(fewer, 0, 0, (8.0, 6.0))
+        paths.move_waypoint(fewer, 0, 0, (8.0, 6.0))
     with pytest.raises(MapError, match="too far away"):
-        paths.way_point_moved(sketch, 0, 0, (float("nan"), 0.0))
+        paths.move_waypoint(sketch, 0, 0, (float("nan"), 0.0))
 
 
 def test_speed_and_what_happens_at_the_end() -> None:
     sketch, both = sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND)), Selection.of(0, 1, 2)
-    turned = paths.path_turned(sketch, both).sketch
+    turned = paths.toggle_repeat(sketch, both).sketch
     assert [led(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
-    assert led(paths.path_turned(turned, both).sketch).repeat == "loop"
-    paced = paths.path_paced(sketch, both, 0.25).sketch
-    assert led(paced, 2).speed == 0.25 and paced.item(1).shape.path is None
-    gone = paths.path_removed(sketch, both).sketch
-    assert paths.moving(sketch) == (0, 2) and paths.moving(gone) == ()
+    assert led(paths.toggle_repeat(turned, both).sketch).repeat == "loop"
+    paced = paths.set_speed(sketch, both, 0.25).sketch
+    assert led(paced, 2).speed == 0.25 and paced.get_item(1).shape.path is None
+    gone = paths.remove_path(sketch, both).sketch
+    assert paths.list_moving_obstacles(sketch) == (0, 2) and paths.list_moving_obstacles(gone) == ()
     for act in (
-        paths.path_turned,
-        paths.path_removed,
-        lambda *two: paths.path_paced(*two, 1.0),
+        paths.toggle_repeat,
+        paths.remove_path,
+        lambda *two: paths.set_speed(*two, 1.0),
     ):
         with pytest.raises(MapError, match="select an obstacle that moves"):
             act(sketch, Selection.of(1))
@@ -80,25 +80,25 @@ def test_speed_and_what_happens_at_the_end() -> None:
 @pytest.mark.parametrize("text", ["0", "-1", "11", "fast", "nan"])
 def test_what_is_no_speed_is_refused(text: str) -> None:
     with pytest.raises(MapError, match=r"expected .*m/s"):
-        paths.speed_of(text)
+        paths.parse_speed(text)
 
 
 def test_what_is_near() -> None:
-    assert paths.way_point_at(ROUND, (8.1, 2.1), 0.2) == 1
-    assert paths.way_point_at(ROUND, (5.0, 2.0), 0.2) is None
-    assert paths.leg_at(ROUND, (5.0, 2.1), 0.2) == 1
+    assert paths.find_waypoint(ROUND, (8.1, 2.1), 0.2) == 1
+    assert paths.find_waypoint(ROUND, (5.0, 2.0), 0.2) is None
+    assert paths.find_leg(ROUND, (5.0, 2.1), 0.2) == 1
     # the leg back to the first way point is one of loops only
-    assert paths.leg_at(ROUND, (5.0, 4.0), 0.2) == 3
-    assert paths.leg_at(replace(ROUND, repeat="back-and-forth"), (5.0, 4.0), 0.2) is None
+    assert paths.find_leg(ROUND, (5.0, 4.0), 0.2) == 3
+    assert paths.find_leg(replace(ROUND, repeat="back-and-forth"), (5.0, 4.0), 0.2) is None
 
 
 @pytest.mark.parametrize("points", [(), ((1.0, 1.0),), ((1.0, 1.0), (1.0, 1.0))])
 def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path) -> None:
     broken = replace(CART, path=ObstaclePath(points, 0.0))
-    assert not paths.goes(broken.path)
-    assert paths.path_words(broken.path) == "leads nowhere"
-    paths.way_point_at(broken.path, (0.0, 0.0), 1.0)
-    assert paths.leg_at(broken.path, (9.0, 9.0), 0.1) is None
+    assert not paths.leads_somewhere(broken.path)
+    assert paths.describe_path(broken.path) == "leads nowhere"
+    paths.find_waypoint(broken.path, (0.0, 0.0), 1.0)
+    assert paths.find_leg(broken.path, (9.0, 9.0), 0.1) is None
     with opened_editor(tmp_path, sheet(broken)) as hands:
         hands.editor.select(Selection.of(0))
         hands.key("l")
@@ -112,25 +112,25 @@ def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path)
 )
 def test_who_is_moved_turned_or_scaled_takes_its_path_along(shape) -> None:
     sketch, one = sheet(replace(shape, path=ROUND)), Selection.of(0)
-    moved = transform.moved(sketch, one, 1.0, -0.5).sketch
+    moved = transform.move(sketch, one, 1.0, -0.5).sketch
     assert led(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
-    turned = transform.rotated(sketch, one, 90.0, (2.0, 2.0)).sketch
+    turned = transform.rotate(sketch, one, 90.0, (2.0, 2.0)).sketch
     assert led(turned).points == ((2.0, 2.0), (2.0, 8.0), (-2.0, 8.0))
-    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).thing(replace(shape, path=ROUND))
+    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).apply(replace(shape, path=ROUND))
     assert stretched.path == replace(ROUND, points=((2.0, 2.0), (14.0, 2.0), (14.0, 6.0)))
 
 
 def test_a_circle_that_becomes_a_polygon_goes_on_moving() -> None:
-    change = properties.made_polygons(sheet(MOVING), Selection.of(0))
+    change = properties.convert_to_polygons(sheet(MOVING), Selection.of(0))
     (item,) = change.sketch.obstacles
     assert isinstance(item.shape, PolygonObstacle) and item.shape.path == ROUND
 
 
 def test_it_is_kept_in_the_file() -> None:
-    sketch = paths.way_point_added(sheet(DESK), 0, (1.0, 3.0)).sketch
-    again = parse_sketch(sketch_text(sketch), "map")
+    sketch = paths.add_waypoint(sheet(DESK), 0, (1.0, 3.0)).sketch
+    again = parse_sketch(dump_sketch(sketch), "map")
     assert led(again) == led(sketch)
-    assert again.environment().has_moving_obstacles
+    assert again.build_environment().has_moving_obstacles
 
 
 # the tool
@@ -144,7 +144,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         hands.click_all((4.0, 4.0))
         assert "click the obstacle" in editor.message
         hands.click_all((2.0, 2.0), (2.1, 2.1))
-        assert editor.selection == Selection.of(0) and paths.moving(hands.sketch) == ()
+        assert editor.selection == Selection.of(0) and paths.list_moving_obstacles(hands.sketch) == ()
         hands.click_all((6.0, 2.0), (6.0, 5.0))
         points = np.array(led(hands.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
@@ -166,14 +166,14 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
             hands.key("ctrl+z")
         assert len(led(hands.sketch).points) == 2
         hands.key("ctrl+z")
-        assert paths.moving(hands.sketch) == ()
+        assert paths.list_moving_obstacles(hands.sketch) == ()
 
 
 def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(MOVING, DESK)) as hands:
         hands.key("o")
         hands.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
-        assert paths.moving(hands.sketch) == (0, 1)
+        assert paths.list_moving_obstacles(hands.sketch) == (0, 1)
         assert led(hands.sketch) == ROUND
         hands.key("return")
         assert not hands.editor.selection and hands.editor.tool.name == "path"
@@ -181,7 +181,7 @@ def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
         hands.key("escape")
         assert hands.editor.tool is hands.editor.selector and hands.editor.selection == Selection.of(1)
         hands.key("alt+o")
-        assert paths.moving(hands.sketch) == (0,)
+        assert paths.list_moving_obstacles(hands.sketch) == (0,)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -193,8 +193,8 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
         hands.editor.message = ""
         hands.frames(2)
         before = hands.picture()
-        change = paths.way_point_added(hands.sketch, 0, (8.0, 2.0))
-        hands.editor.change(replace(change, selection=Selection(), words=""))
+        change = paths.add_waypoint(hands.sketch, 0, (8.0, 2.0))
+        hands.editor.apply(replace(change, selection=Selection(), description=""))
         hands.editor.message = ""
         hands.frames(2)
         with_path = hands.picture()
@@ -214,7 +214,7 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
 def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     with opened_editor(tmp_path, sheet(CART)) as hands:
-        hands.editor.change(paths.way_point_added(hands.sketch, 0, (8.0, 2.0)))
+        hands.editor.apply(paths.add_waypoint(hands.sketch, 0, (8.0, 2.0)))
         hands.editor.document.save(path)
     environment = load_map(path)
     assert environment.at(4.0).obstacles[0].center == pytest.approx((4.0, 2.0))
@@ -223,10 +223,10 @@ def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
 def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(MOVING)) as hands:
         hands.editor.select(Selection.of(0))
-        run_typed(hands.editor, "0.75", "speed")
+        run_typed_command(hands.editor, "0.75", "speed")
         assert led(hands.sketch).speed == 0.75
         hands.push("tab:object")
         hands.push("path:repeat")
         assert led(hands.sketch).repeat == "back-and-forth"
         hands.push("path:none")
-        assert paths.moving(hands.sketch) == ()
+        assert paths.list_moving_obstacles(hands.sketch) == ()

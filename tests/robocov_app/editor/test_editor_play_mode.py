@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.play_mode import brought_back
+from robocov_app.editor.ui.play_mode import build_trial_change
 
 PILLAR = CircleObstacle((7, 7), 1.0)
 
@@ -32,7 +32,7 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         before, camera, selection = hands.sketch, hands.window.canvas.camera, hands.editor.selection
         picture = hands.picture()
         trial = tried(hands)
-        assert trial.viewer.session.environment == before.environment()
+        assert trial.viewer.session.environment == before.build_environment()
         assert trial.viewer.session.scenario.start_name == "s"
         hands.frames(10)
         assert trial.viewer.session.time > 0.0
@@ -67,10 +67,10 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
     with opened_editor(tmp_path, sheet(crossed)) as hands:
         hands.key("f5")
-        assert hands.window.trial is None and hands.editor.trouble and hands.said
+        assert hands.window.trial is None and hands.editor.has_error_message and hands.said
     with opened_editor(tmp_path, Sketch(boundary=None)) as hands:
         hands.key("f5")
-        assert hands.window.trial is None and hands.editor.trouble
+        assert hands.window.trial is None and hands.editor.has_error_message
     with opened_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as hands:
         hands.editor.robots = 50
         hands.key("f5")
@@ -79,7 +79,7 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
 
 def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(PILLAR)) as hands:
-        hands.editor.change(properties.noted(hands.sketch, Selection.of(0), "old oak"))
+        hands.editor.apply(properties.set_note(hands.sketch, Selection.of(0), "old oak"))
         trial = tried(hands)
         hands.key("c")
         x, y = trial.canvas.to_pixel((3.0, 3.0))
@@ -128,11 +128,11 @@ def test_light_and_dark_come_back_too(tmp_path: Path) -> None:
 
 def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
     sketch = sheet(PILLAR, PILLAR)
-    environment = sketch.environment()
-    assert brought_back(sketch, environment, environment) is None
-    assert brought_back(sketch, environment, sketch.environment()) is None
-    other = of_map("rooms").environment()
-    assert brought_back(sketch, environment, other) is None
+    environment = sketch.build_environment()
+    assert build_trial_change(sketch, environment, environment) is None
+    assert build_trial_change(sketch, environment, sketch.build_environment()) is None
+    other = of_map("rooms").build_environment()
+    assert build_trial_change(sketch, environment, other) is None
 
 
 def test_a_key_that_is_held_down_while_it_opens_does_not_lead_back(tmp_path: Path) -> None:

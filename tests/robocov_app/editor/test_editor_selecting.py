@@ -10,7 +10,7 @@ from driven_editor import Hands, opened_editor, sheet
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
-from robocov_app.editor.tools.tool import handle_at, handled, handles
+from robocov_app.editor.tools.tool import find_handle, list_handles, list_vertex_owners
 
 SQUARE = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -63,7 +63,7 @@ def test_dragging_moves_and_can_be_undone_as_one(hands: Hands) -> None:
     assert hands.shapes[0].name == "box" and hands.editor.selection == Selection.of(0)
     hands.key("ctrl+z")
     assert hands.shapes[0] == SQUARE
-    assert not hands.editor.document.history.past
+    assert not hands.editor.document.history.undo_descriptions
     hands.key("ctrl+y")
     assert hands.shapes[0].vertices[0] == (4, 2)
 
@@ -72,11 +72,11 @@ def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(hands: Hands) -> No
     before = hands.sketch
     hands.press(*hands.pixel((3, 3)))
     hands.go((4, 4), (5, 5), held=1)
-    assert hands.editor.preview[0] is not hands.sketch
+    assert hands.editor.displayed[0] is not hands.sketch
     hands.key("escape")
     hands.go((6, 6), held=1)
     hands.release()
-    assert hands.sketch is before and hands.editor.preview[0] is hands.sketch
+    assert hands.sketch is before and hands.editor.displayed[0] is hands.sketch
 
 
 def test_alt_drag_copies(hands: Hands) -> None:
@@ -140,7 +140,7 @@ def test_the_rim_of_a_circle_and_of_a_start_are_dragged(hands: Hands) -> None:
     assert hands.shapes[1] == CircleObstacle((7, 7), 1.5)
     hands.click_all((1, 8.5))
     hands.drag_at((1, 9.1), (1, 9.2), (1, 9.4))
-    assert hands.sketch.start("corner") == DiscStart((1, 8.5), 0.9)
+    assert hands.sketch.get_start("corner") == DiscStart((1, 8.5), 0.9)
 
 
 def test_the_knob_turns_and_takes_degrees(hands: Hands) -> None:
@@ -155,7 +155,7 @@ def test_the_knob_turns_and_takes_degrees(hands: Hands) -> None:
     turned = {
         (round(middle_x - (b - middle_y), 4), round(middle_y + a - middle_x, 4)) for a, b in WALL.points
     }
-    bounds = hands.sketch.item(2).geometry.bounds
+    bounds = hands.sketch.get_item(2).geometry.bounds
     assert bounds[2] - bounds[0] == pytest.approx(2.1, abs=1e-3)
     assert len(turned) == len(hands.shapes[2].points)
 
@@ -185,7 +185,7 @@ def test_corners_and_sides_of_the_box_scale(hands: Hands) -> None:
     hands.hold("shift")
     hands.drag((x, y), (x + one, y - one), (x + 1.5 * one, y - one))
     hands.hold()
-    low_x, low_y, high_x, high_y = hands.sketch.item(0).geometry.bounds
+    low_x, low_y, high_x, high_y = hands.sketch.get_item(0).geometry.bounds
     assert (low_x, low_y) == (2, 2)
     assert (high_x - low_x) / (high_y - low_y) == pytest.approx(1.5, rel=1e-3)
 
@@ -223,43 +223,42 @@ def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
 
 def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
     from robocov_app.editor.edits import transform
-    from robocov_app.editor.tools import select
+    from robocov_app.editor.tools.drags import MANY_POINTS
 
-    ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(select.MANY_POINTS + 10))
+    ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(MANY_POINTS + 10))
     with opened_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as hands:
-        wanted = transform.moved(hands.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
+        wanted = transform.move(hands.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
         hands.select(0, 1)
         hands.press(*hands.pixel((3, 3)))
         hands.go((3.5, 3.2), (4, 3.5), held=1)
-        assert hands.editor.preview[0] is hands.sketch and hands.editor.selector.drag.offset == pytest.approx(
-            (1.0, 0.5)
-        )
+        assert hands.editor.displayed[0] is hands.sketch
+        assert hands.editor.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
         hands.release()
         assert hands.shapes == [item.shape for item in wanted.obstacles]
 
 
 def test_grips_know_whose_vertices_are_shown(hands: Hands) -> None:
-    assert handled(Selection()) == () and handled(Selection.of(0, 1)) == ()
-    assert handled(Selection.of(2)) == (2,)
-    assert handled(Selection(vertices=frozenset({Vertex(1, 0, 0)}))) == (1,)
-    found = handles(hands.sketch, Selection.of(0), 0.01)
+    assert list_vertex_owners(Selection()) == () and list_vertex_owners(Selection.of(0, 1)) == ()
+    assert list_vertex_owners(Selection.of(2)) == (2,)
+    assert list_vertex_owners(Selection(vertices=frozenset({Vertex(1, 0, 0)}))) == (1,)
+    found = list_handles(hands.sketch, Selection.of(0), 0.01)
     assert sum(each.kind == "vertex" for each in found) == 4
     assert sum(each.kind == "scale" for each in found) == 8
-    assert handle_at(found, (4, 4), 0.2).vertex == Vertex(0, 0, 2)
-    assert handle_at(found, (3, 3), 0.2) is None
+    assert find_handle(found, (4, 4), 0.2).vertex == Vertex(0, 0, 2)
+    assert find_handle(found, (3, 3), 0.2) is None
 
 
 def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
     selector = hands.editor.selector
     hands.go((9, 5))
-    assert selector.shape_of_cursor(hands.editor) == "arrow"
+    assert selector.choose_cursor(hands.editor) == "arrow"
     hands.go((3, 3))
-    assert selector.shape_of_cursor(hands.editor) == "hand"
+    assert selector.choose_cursor(hands.editor) == "hand"
     hands.select(0)
     hands.go((3, 3.01))
-    assert selector.shape_of_cursor(hands.editor) == "move"
+    assert selector.choose_cursor(hands.editor) == "move"
     hands.move(*handle(hands, "scale", (1, 1)))
-    assert selector.shape_of_cursor(hands.editor) == "rising"
+    assert selector.choose_cursor(hands.editor) == "rising"
 
 
 def test_what_is_small_on_the_screen_is_dragged_itself_not_its_vertices(tmp_path: Path) -> None:

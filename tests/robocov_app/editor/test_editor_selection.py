@@ -16,13 +16,13 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
+from robocov_app.editor.model.hit_test import find_edge, find_in_box, find_owners, find_vertices_in_box
 from robocov_app.editor.model.selection import (
     Edge,
     Selection,
     Vertex,
-    place_of,
-    points_of,
+    find_position,
+    list_vertices,
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
@@ -40,16 +40,16 @@ STARTS = (
 
 @pytest.fixture
 def sketch() -> Sketch:
-    return Sketch("Hall", boundary=HALL, starts=STARTS).added([LOW, HIGH, WALL])[0]
+    return Sketch("Hall", boundary=HALL, starts=STARTS).with_obstacles([LOW, HIGH, WALL])[0]
 
 
 def owner_at(sketch: Sketch, point, reach: float):
-    return next(iter(owners_at(sketch, point, reach)), None)
+    return next(iter(find_owners(sketch, point, reach)), None)
 
 
 def test_a_click_takes_the_topmost(sketch):
     assert owner_at(sketch, (4.0, 4.0), 0.1) == 1
-    assert owners_at(sketch, (4.0, 4.0), 0.1) == (1, 0)
+    assert find_owners(sketch, (4.0, 4.0), 0.1) == (1, 0)
     assert owner_at(sketch, (1.2, 1.2), 0.1) == 0
     # through a hole there is nothing, but near its edge there is
     assert owner_at(sketch, (2.7, 2.3), 0.05) is None
@@ -59,7 +59,7 @@ def test_a_click_takes_the_topmost(sketch):
 def test_starts_lie_above_at_their_centre_and_rim_but_not_inside(sketch):
     assert owner_at(sketch, (4.5, 2.0), 0.1) == "disc"
     assert owner_at(sketch, (4.5, 1.02), 0.1) == "disc"
-    assert owners_at(sketch, (4.5, 1.5), 0.1) == (0, "disc")
+    assert find_owners(sketch, (4.5, 1.5), 0.1) == (0, "disc")
     assert owner_at(sketch, (5.3, 2.0), 0.1) == "disc"
     assert owner_at(sketch, (8.05, 6.0), 0.1) == "two"
 
@@ -79,49 +79,49 @@ def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
     lines = [
         shapely.LineString([*points, *points[:1]] if closed else points)
         for owner in owners
-        for _, points, closed in sketch.rings_of(owner)
+        for _, points, closed in sketch.list_rings(owner)
     ]
     nearest = min(line.distance(shapely.Point(point)) for line in lines)
-    edge = edge_at(sketch, point, reach, owners)
+    edge = find_edge(sketch, point, reach, owners)
     if nearest > reach:
         assert edge is None
     else:
         assert math.dist(point, edge.point) == pytest.approx(nearest, abs=1e-9)
-        ring = sketch.ring_points(edge.of)[edge.ring]
+        ring = sketch.list_vertex_rings(edge.owner)[edge.ring]
         a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
         assert shapely.LineString([a, b]).distance(shapely.Point(edge.point)) < 1e-9
 
 
 def test_handles(sketch):
-    assert [at for _, at in points_of(sketch, 1)] == [
+    assert [at for _, at in list_vertices(sketch, 1)] == [
         (4.0, 4.0),
         (6.0, 4.0),
         (4.0, 6.0),
         (2.0, 4.0),
         (4.0, 2.0),
     ]
-    assert points_of(sketch, 0)[4] == (Vertex(0, 1, 0), (2.0, 2.0))
-    assert [vertex.index for vertex, _ in points_of(sketch, "disc")] == [0, 1, 2, 3, 4]
-    assert points_of(sketch, "two")[1] == (Vertex("two", 0, 1), (9.0, 6.0))
-    assert points_of(sketch, "all") == ()
-    assert len(points_of(sketch, BOUNDARY)) == 4
-    assert points_of(sketch, 77) == points_of(sketch, "none") == ()
-    assert [closed for _, _, closed in sketch.rings_of(2)] == [False]
-    assert sketch.rings_of(1) == sketch.rings_of("disc") == ()
+    assert list_vertices(sketch, 0)[4] == (Vertex(0, 1, 0), (2.0, 2.0))
+    assert [vertex.index for vertex, _ in list_vertices(sketch, "disc")] == [0, 1, 2, 3, 4]
+    assert list_vertices(sketch, "two")[1] == (Vertex("two", 0, 1), (9.0, 6.0))
+    assert list_vertices(sketch, "all") == ()
+    assert len(list_vertices(sketch, BOUNDARY)) == 4
+    assert list_vertices(sketch, 77) == list_vertices(sketch, "none") == ()
+    assert [closed for _, _, closed in sketch.list_rings(2)] == [False]
+    assert sketch.list_rings(1) == sketch.list_rings("disc") == ()
     with pytest.raises(MapError, match="no such vertex"):
-        place_of(sketch, Vertex(0, 0, 4))
+        find_position(sketch, Vertex(0, 0, 4))
 
 
 def test_boxes(sketch):
-    assert in_box(sketch, (0.5, 0.5), (5.4, 5.5)) == Selection(frozenset({0}))
-    everything = in_box(sketch, (13.0, 9.0), (-1.0, -1.0))
+    assert find_in_box(sketch, (0.5, 0.5), (5.4, 5.5)) == Selection(frozenset({0}))
+    everything = find_in_box(sketch, (13.0, 9.0), (-1.0, -1.0))
     assert everything == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}), boundary=True)
-    touched = in_box(sketch, (4.9, 0.5), (8.5, 6.5), touched=True)
+    touched = find_in_box(sketch, (4.9, 0.5), (8.5, 6.5), touched=True)
     assert touched == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}))
     # a disc that the corner of the box does not reach
-    assert not in_box(sketch, (5.3, 2.8), (6.0, 3.0), touched=True).starts
-    assert in_box(Sketch(), (0.0, 0.0), (1.0, 1.0), touched=True) == Selection()
-    corners = vertices_in_box(sketch, (0.0, 0.0), (2.5, 2.5), [0, BOUNDARY, 2])
+    assert not find_in_box(sketch, (5.3, 2.8), (6.0, 3.0), touched=True).starts
+    assert find_in_box(Sketch(), (0.0, 0.0), (1.0, 1.0), touched=True) == Selection()
+    corners = find_vertices_in_box(sketch, (0.0, 0.0), (2.5, 2.5), [0, BOUNDARY, 2])
     assert corners.vertices == {Vertex(0, 0, 0), Vertex(0, 1, 0), Vertex(BOUNDARY, 0, 0)}
 
 
@@ -129,9 +129,9 @@ def test_boxes(sketch):
 def test_boxes_hold_what_shapely_says(sketch, a, b):
     box = shapely.box(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))
     inside = {item.key for item in sketch.obstacles if box.covers(item.shape.polygon.envelope)}
-    assert in_box(sketch, a, b).items == inside
+    assert find_in_box(sketch, a, b).items == inside
     touched = {item.key for item in sketch.obstacles if box.intersects(item.shape.polygon)}
-    assert in_box(sketch, a, b, touched=True).items == touched
+    assert find_in_box(sketch, a, b, touched=True).items == touched
 
 
 def test_selections_add_up(sketch):
@@ -139,15 +139,17 @@ def test_selections_add_up(sketch):
     assert a == Selection(frozenset({0}), frozenset(), frozenset({"disc"}), True)
     assert a.owners == {0, "disc", BOUNDARY}
     b = Selection.of(1, "disc")
-    assert a.plus(b) == Selection.of(0, 1, "disc", BOUNDARY)
-    assert a.toggled(b) == Selection.of(0, 1, BOUNDARY)
-    assert a.toggled(a) == Selection()
+    assert a.union(b) == Selection.of(0, 1, "disc", BOUNDARY)
+    assert a.toggle(b) == Selection.of(0, 1, BOUNDARY)
+    assert a.toggle(a) == Selection()
     assert not Selection()
     assert Selection(vertices=frozenset({Vertex(0, 0, 0)}))
-    assert Selection.all(sketch).owners == {0, 1, 2, "disc", "two", "all", BOUNDARY}
+    assert Selection.select_all(sketch).owners == {0, 1, 2, "disc", "two", "all", BOUNDARY}
     gone = Selection(frozenset({0, 9}), frozenset({Vertex(0, 0, 3), Vertex(0, 0, 4)}), frozenset({"x"}), True)
-    assert gone.within(sketch) == Selection(frozenset({0}), frozenset({Vertex(0, 0, 3)}), frozenset(), True)
-    assert not gone.within(Sketch())
+    assert gone.restrict_to(sketch) == Selection(
+        frozenset({0}), frozenset({Vertex(0, 0, 3)}), frozenset(), True
+    )
+    assert not gone.restrict_to(Sketch())
 
 
 def test_selections_in_words(sketch):
@@ -165,14 +167,14 @@ def test_selections_in_words(sketch):
         "3 things": Selection.of(0, 1, "disc"),
     }
     for expected, selection in words.items():
-        assert selection.words(sketch) == expected
+        assert selection.describe(sketch) == expected
     assert sketch.display_name(BOUNDARY) == "boundary"
 
 
 def test_picking_among_a_thousand_measures_only_what_is_near(monkeypatch):
     rng = np.random.default_rng(0)
     shapes = [CircleObstacle((float(x), float(y)), 0.3) for x, y in rng.uniform(0, 50, (1000, 2))]
-    sketch, keys = Sketch(boundary=HALL).added(shapes)
+    sketch, keys = Sketch(boundary=HALL).with_obstacles(shapes)
     measured = []
     distance = shapely.distance
     monkeypatch.setattr(
@@ -180,8 +182,8 @@ def test_picking_among_a_thousand_measures_only_what_is_near(monkeypatch):
     )
     for x, y in rng.uniform(0, 50, (50, 2)).tolist():
         owner_at(sketch, (x, y), 0.1)
-        edge_at(sketch, (x, y), 0.1, keys)
-        in_box(sketch, (x, y), (x + 5, y + 5), touched=True)
+        find_edge(sketch, (x, y), 0.1, keys)
+        find_in_box(sketch, (x, y), (x + 5, y + 5), touched=True)
     assert measured and sum(measured) < 50 * 20
 
 

@@ -14,15 +14,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov_app.editor.canvas.map_layers import (
-    Outlines,
-    Sheet,
-    View,
-    beyond,
-    grid_steps,
-    outline_of,
-    outside_colour,
-)
+from robocov_app.editor.canvas.outlines import Outlines, build_outline
+from robocov_app.editor.canvas.sheet import Sheet, compute_grid_steps, compute_hull_excess
+from robocov_app.editor.canvas.view import View, choose_outside_colour
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
@@ -69,24 +63,24 @@ def test_patches_and_scrolling_give_the_same_page_as_drawing_anew(steps, dark: b
     sketch = sheet(*SHAPES)
     theme = DARK if dark else LIGHT
     kept, center = Sheet(), (5.0, 5.0)
-    kept.page(view(center, theme=theme), sketch)
+    kept.draw(view(center, theme=theme), sketch)
     for kind, x, y in steps:
         lifted: frozenset[int] = frozenset()
         if kind == 0:
             center = center[0] + x / 28.0, center[1] + y / 28.0
         elif kind == 1:
-            sketch = transform.moved(sketch, Selection.of(y % 4), x / 40, y / 40).sketch
+            sketch = transform.move(sketch, Selection.of(y % 4), x / 40, y / 40).sketch
         elif kind == 2:
-            sketch = create.circle_drawn(sketch, (5 + x / 10, 5 + y / 10), 0.5).sketch
+            sketch = create.add_circle(sketch, (5 + x / 10, 5 + y / 10), 0.5).sketch
         elif kind == 3 and len(sketch.obstacles) > 4:
-            sketch = properties.deleted(sketch, Selection.of(sketch.obstacles[-1].key)).sketch
+            sketch = properties.delete(sketch, Selection.of(sketch.obstacles[-1].key)).sketch
         elif kind == 4:
             lifted = frozenset({x % 4})
         else:
-            sketch = transform.moved(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
+            sketch = transform.move(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
         at = view(center, theme=theme)
-        page = drawn(kept.page(at, sketch, lifted), at)
-        anew = drawn(Sheet().page(at, sketch, lifted), at)
+        page = drawn(kept.draw(at, sketch, lifted), at)
+        anew = drawn(Sheet().draw(at, sketch, lifted), at)
         # a smooth line that is cut by a patch's edge may differ by a shade in its pixels there
         apart = np.abs(page.astype(int) - anew.astype(int)).max(axis=2)
         assert (apart > 40).sum() <= 6, (kind, x, y)
@@ -105,7 +99,7 @@ class Watched(Sheet):
 
     def painted(self, at: View, sketch: Sketch) -> str | int:
         self.boxes.clear()
-        self.page(at, sketch)
+        self.draw(at, sketch)
         return "all" if self.boxes == [at.clip] else len(self.boxes)
 
 
@@ -114,7 +108,7 @@ def test_only_what_changed_is_drawn_anew() -> None:
     page = Watched()
     assert page.painted(view(), sketch) == "all"
     assert page.painted(view(), sketch) == 0
-    moved = transform.moved(sketch, Selection.of(1), 0.1, 0.0).sketch
+    moved = transform.move(sketch, Selection.of(1), 0.1, 0.0).sketch
     assert page.painted(view(), moved) == 1
     assert page.painted(view((5.0 + 3 / 28.0, 5.0)), moved) == 1
     assert page.boxes[0].width == 3, "it was scrolled"
@@ -127,13 +121,13 @@ def test_what_is_lifted_is_not_on_the_page() -> None:
     at = view()
     x, y = (round(value) for value in at.camera.to_pixels(np.array([7.0, 6.5])))
     page = Sheet()
-    assert page.page(at, sketch).get_at((x, y))[:3] == LIGHT.obstacle
-    assert page.page(at, sketch, frozenset({1})).get_at((x, y))[:3] != LIGHT.obstacle
+    assert page.draw(at, sketch).get_at((x, y))[:3] == LIGHT.obstacle
+    assert page.draw(at, sketch, frozenset({1})).get_at((x, y))[:3] != LIGHT.obstacle
 
 
 def test_a_hole_shows_what_lies_below() -> None:
     at = view(shown=frozenset())
-    page = Sheet().page(at, sheet(*SHAPES))
+    page = Sheet().draw(at, sheet(*SHAPES))
 
     def colour(point: tuple[float, float]) -> tuple[int, ...]:
         x, y = at.camera.to_pixels(np.array(point))
@@ -141,16 +135,16 @@ def test_a_hole_shows_what_lies_below() -> None:
 
     assert colour((2.8, 2.3)) == LIGHT.background
     assert colour((1.5, 1.5)) == LIGHT.obstacle
-    assert colour((11.0, 5.0)) == outside_colour(LIGHT)
+    assert colour((11.0, 5.0)) == choose_outside_colour(LIGHT)
 
 
 def test_what_the_hull_adds_is_told_apart() -> None:
     sketch = of_map("l-shape")
-    area = beyond(sketch)
+    area = compute_hull_excess(sketch)
     assert area is not None and area.area > 1.0
-    assert beyond(sheet()).is_empty
-    assert beyond(replace(sketch, boundary=None)).is_empty
-    assert beyond(replace(sketch, boundary=((0, 0), (1, 1), (1, 0), (0, 1)))).is_empty
+    assert compute_hull_excess(sheet()).is_empty
+    assert compute_hull_excess(replace(sketch, boundary=None)).is_empty
+    assert compute_hull_excess(replace(sketch, boundary=((0, 0), (1, 1), (1, 0), (0, 1)))).is_empty
 
 
 def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
@@ -160,13 +154,13 @@ def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
         corner = (0.0, 0.0) if turn == 0.0 else (10.0, 0.0)
         sketch = replace(sheet(*SHAPES), background=replace(laid, turn=turn, corner=corner))
         at = view(shown=frozenset({"picture"}))
-        page = Sheet().page(at, sketch)
+        page = Sheet().draw(at, sketch)
         x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
         assert page.get_at((round(x), round(y)))[0] > 200 > 60 > page.get_at((round(x), round(y)))[1]
         x, y = at.camera.to_pixels(np.array([1.5, 1.5]))
         mixed = page.get_at((round(x), round(y)))
         assert mixed[1] > 40  # the picture shines through
-    hidden = Sheet().page(view(shown=frozenset()), sketch)
+    hidden = Sheet().draw(view(shown=frozenset()), sketch)
     x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
     assert hidden.get_at((round(x), round(y)))[:3] == LIGHT.background
 
@@ -176,23 +170,23 @@ def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
     Image.new(mode, (40, 30)).save(tmp_path / "one.png")
     page = Sheet()
     sketch = replace(sheet(), background=Background(str(tmp_path / "one.png"), (40, 30), 0.25))
-    page.page(view(), sketch)
-    assert page.underlaid.trouble == ""
+    page.draw(view(), sketch)
+    assert page.reference_image.error == ""
 
 
 def test_a_picture_that_cannot_be_read_is_told_and_all_else_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     page = Sheet()
     sketch = replace(sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
-    page.page(view(), sketch)
-    assert "bad.png" in page.underlaid.trouble
+    page.draw(view(), sketch)
+    assert "bad.png" in page.reference_image.error
 
 
 def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
-    assert grid_steps(0.1, 60.0, 1.0) == (0.2, 1.0)
+    assert compute_grid_steps(0.1, 60.0, 1.0) == (0.2, 1.0)
     for grid in (0.01, 0.1, 0.25, 1.0, 5.0):
         for zoom in (0.5, 3.0, 28.0, 400.0, 9000.0):
-            fine, coarse = grid_steps(grid, zoom, 1.0)
+            fine, coarse = compute_grid_steps(grid, zoom, 1.0)
             assert fine * zoom >= 10.9 or fine == grid
             assert abs(fine / grid - round(fine / grid)) < 1e-6 * fine / grid
             assert abs(coarse / fine - round(coarse / fine)) < 1e-6 * coarse / fine
@@ -201,16 +195,16 @@ def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
 
 def test_names_stand_where_there_is_room() -> None:
     ring = shapely.Polygon([(0, 0), (6, 0), (6, 1), (1, 1), (1, 6), (0, 6)])
-    x, y, room, high = outline_of(ring).name_place
+    x, y, room, high = build_outline(ring).name_space
     assert ring.contains(shapely.Point(x, y)) and 1.0 - 1e-9 <= room <= 6.0 + 1e-9 and high >= 1.0 - 1e-9
-    assert outline_of(shapely.Polygon()).name_place[2] == 0.0
+    assert build_outline(shapely.Polygon()).name_space.width == 0.0
 
 
 def test_outlines_are_made_once_for_each_obstacle() -> None:
     outlines, sketch = Outlines(), sheet(*SHAPES)
-    first = outlines.of(sketch.obstacles[0])
-    moved = transform.moved(sketch, Selection.of(1), 1, 0).sketch
-    assert outlines.of(moved.obstacles[0]) is first and not all(first.outer)
-    assert len(outlines.touching(moved, (0.9, 0.9, 1.1, 1.1))) == 1
-    line = outline_of(shapely.LineString([(0, 0), (1, 1)]))
+    first = outlines.get(sketch.obstacles[0])
+    moved = transform.move(sketch, Selection.of(1), 1, 0).sketch
+    assert outlines.get(moved.obstacles[0]) is first and first.has_holes
+    assert len(outlines.find_items(moved, (0.9, 0.9, 1.1, 1.1))) == 1
+    line = build_outline(shapely.LineString([(0, 0), (1, 1)]))
     assert not line.rings and len(line.lines) == 1

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits.vertices import simplified, straightened
+from robocov_app.editor.edits.vertices import simplify, straighten
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 
@@ -27,13 +27,13 @@ def wobbly(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):
 @given(st.integers(0, 10**6), st.integers(8, 120), st.sampled_from([0.001, 0.02, 0.1, 0.5, 2.0]))
 def test_no_vertex_that_is_left_out_is_far_from_the_new_outline(seed, count, tolerance):
     ring = wobbly(count, seed)
-    sketch, (key,) = Sketch().added([PolygonObstacle(ring)])
+    sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     try:
-        change = simplified(sketch, Selection.of(key), tolerance)
+        change = simplify(sketch, Selection.of(key), tolerance)
     except MapError as error:
         assert "no vertex can be left out" in str(error)
         return
-    after = change.sketch.item(key).shape
+    after = change.sketch.get_item(key).shape
     assert len(after.vertices) < len(ring)
     assert after.polygon.is_valid
     outline = after.polygon.exterior
@@ -46,42 +46,44 @@ def test_no_vertex_that_is_left_out_is_far_from_the_new_outline(seed, count, tol
 def test_holes_do_not_come_to_cross_their_outline():
     # a thin frame: a coarse tolerance would let the hole stick out
     outer, inner = wobbly(120, 0, 3.0, 0.0), wobbly(120, 1, 2.9, 0.0)
-    sketch, (key,) = Sketch().added([PolygonObstacle(outer, (inner,))])
-    assert sketch.item(key).shape.polygon.is_valid
-    change = simplified(sketch, Selection.of(key), 2.0)
-    assert change.sketch.item(key).shape.polygon.is_valid
-    assert len(change.sketch.ring_points(key)[1]) < 120
+    sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(outer, (inner,))])
+    assert sketch.get_item(key).shape.polygon.is_valid
+    change = simplify(sketch, Selection.of(key), 2.0)
+    assert change.sketch.get_item(key).shape.polygon.is_valid
+    assert len(change.sketch.list_vertex_rings(key)[1]) < 120
 
 
 def test_walls_keep_their_ends_and_the_boundary_is_asked_for():
     line = tuple((k / 10, 0.001 * (k % 2)) for k in range(40))
-    sketch, (key,) = Sketch(boundary=(*HALL[:2], (12.0, 4.0), *HALL[2:])).added([WallObstacle(line, 0.1)])
-    change = simplified(sketch, Selection(), 0.01)
-    assert change.sketch.item(key).shape.points == (line[0], line[-1])
-    assert change.words == "38 vertices left out"
+    sketch, (key,) = Sketch(boundary=(*HALL[:2], (12.0, 4.0), *HALL[2:])).with_obstacles(
+        [WallObstacle(line, 0.1)]
+    )
+    change = simplify(sketch, Selection(), 0.01)
+    assert change.sketch.get_item(key).shape.points == (line[0], line[-1])
+    assert change.description == "38 vertices left out"
     assert change.sketch.boundary == sketch.boundary
-    change = simplified(sketch, Selection(boundary=True), 0.01)
+    change = simplify(sketch, Selection(boundary=True), 0.01)
     assert set(change.sketch.boundary) == set(HALL)
-    assert change.words == "1 vertex left out"
+    assert change.description == "1 vertex left out"
 
 
 def test_traced_plans_become_straight():
     traced = ((1.0, 1.02), (4.03, 0.98), (3.98, 3.0), (0.99, 3.04))
-    sketch, (key,) = Sketch(boundary=HALL).added([PolygonObstacle(traced)])
-    change = straightened(sketch, Selection.of(key))
-    assert change.sketch.item(key).shape.vertices == (
+    sketch, (key,) = Sketch(boundary=HALL).with_obstacles([PolygonObstacle(traced)])
+    change = straighten(sketch, Selection.of(key))
+    assert change.sketch.get_item(key).shape.vertices == (
         (0.995, 1.0),
         (4.005, 1.0),
         (4.005, 3.02),
         (0.995, 3.02),
     )
-    assert change.words == "1 outline straightened"
+    assert change.description == "1 outline straightened"
     with pytest.raises(MapError, match="not so already"):
-        straightened(change.sketch, Selection.of(key))
+        straighten(change.sketch, Selection.of(key))
     # several edges in a row come to lie on one line, slanted ones stay
     wall = WallObstacle(((0.0, 0.0), (2.0, 0.04), (4.0, 0.0), (6.0, 2.0), (6.02, 5.0)), 0.1)
-    sketch, (key,) = Sketch().added([wall])
-    assert straightened(sketch, Selection.of(key)).sketch.item(key).shape.points == (
+    sketch, (key,) = Sketch().with_obstacles([wall])
+    assert straighten(sketch, Selection.of(key)).sketch.get_item(key).shape.points == (
         (0.0, 0.02),
         (2.0, 0.02),
         (4.0, 0.02),
@@ -93,16 +95,16 @@ def test_traced_plans_become_straight():
 @given(sound_sketches(least=1), st.sampled_from([1.0, 5.0, 20.0]))
 def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
     try:
-        change = straightened(sketch, Selection(), degrees)
+        change = straighten(sketch, Selection(), degrees)
     except MapError:
         return
     slope = math.tan(math.radians(degrees))
     for item in sketch.obstacles:
         if isinstance(item.shape, CircleObstacle):
-            assert change.sketch.item(item.key) is item
+            assert change.sketch.get_item(item.key) is item
             continue
         for before, after in zip(
-            sketch.ring_points(item.key), change.sketch.ring_points(item.key), strict=True
+            sketch.list_vertex_rings(item.key), change.sketch.list_vertex_rings(item.key), strict=True
         ):
             assert len(before) == len(after)
             if before == after:
@@ -118,13 +120,13 @@ def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
-        (lambda s: simplified(s, Selection.of(0), 0.1), "select polygons, walls or the boundary"),
-        (lambda s: simplified(s, Selection(boundary=True), math.nan), "a tolerance"),
-        (lambda s: simplified(s, Selection(boundary=True), 0.1), "no vertex can be left out"),
-        (lambda s: straightened(s, Selection(boundary=True), 90.0), "up to 30 degrees"),
+        (lambda s: simplify(s, Selection.of(0), 0.1), "select polygons, walls or the boundary"),
+        (lambda s: simplify(s, Selection(boundary=True), math.nan), "a tolerance"),
+        (lambda s: simplify(s, Selection(boundary=True), 0.1), "no vertex can be left out"),
+        (lambda s: straighten(s, Selection(boundary=True), 90.0), "up to 30 degrees"),
     ],
 )
 def test_what_cannot_be_done_is_said(deed, words):
-    sketch, _ = Sketch(boundary=HALL).added([CircleObstacle((1.0, 1.0), 0.5)])
+    sketch, _ = Sketch(boundary=HALL).with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])
     with pytest.raises(MapError, match=words):
         deed(sketch)

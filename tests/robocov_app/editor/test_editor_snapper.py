@@ -1,34 +1,34 @@
-"""What is snapped to: at once on small maps, a little later on large ones."""
+"""Snap targets: at once on small maps, a little later on large ones."""
 
 import time
 
 from driven_editor import sheet
 
 from robocov.environment import PolygonObstacle
-from robocov_app.editor.tools.snapping import MANY, Snapper, vertex_count
+from robocov_app.editor.tools.snap_targets import MANY_VERTICES, Snapper, count_vertices
 
 SMALL = sheet(PolygonObstacle(((1, 1), (2, 1), (2, 2))))
-LARGE = sheet(PolygonObstacle(tuple((5 + k * 1e-3, 5 + (k % 2) * 0.1) for k in range(MANY + 1))))
+LARGE = sheet(PolygonObstacle(tuple((5 + k * 1e-3, 5 + (k % 2) * 0.1) for k in range(MANY_VERTICES + 1))))
 
 
 def test_small_maps_are_known_at_once_and_kept() -> None:
     snapper = Snapper()
-    first = snapper.targets(SMALL)
-    assert first is not None and snapper.targets(SMALL) is first
-    assert snapper.targets(SMALL, (0,)) is not first
+    first = snapper.find_targets(SMALL)
+    assert first is not None and snapper.find_targets(SMALL) is first
+    assert snapper.find_targets(SMALL, (0,)) is not first
     snapper.close()
 
 
 def test_large_maps_are_known_later_unless_there_is_time() -> None:
-    assert vertex_count(LARGE) > MANY
+    assert count_vertices(LARGE) > MANY_VERTICES
     snapper = Snapper()
-    first = snapper.targets(LARGE)
+    first = snapper.find_targets(LARGE)
     began = time.monotonic()
     while first is None:
         assert time.monotonic() - began < 60
         time.sleep(0.01)
-        first = snapper.targets(LARGE)
+        first = snapper.find_targets(LARGE)
     snapper.close()
     patient = Snapper()
     patient.patient = True
-    assert patient.targets(LARGE) is not None
+    assert patient.find_targets(LARGE) is not None

@@ -9,25 +9,32 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.model.selection import Vertex, points_of
+from robocov_app.editor.model.selection import Vertex, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
-from robocov_app.editor.tools.snapping import KINDS, Snapping, Targets, snapped, snapped_angle, snapped_move
+from robocov_app.editor.tools.snapping import (
+    KINDS,
+    SnapSettings,
+    SnapTargets,
+    snap_angle,
+    snap_move,
+    snap_point,
+)
 
 BOX = PolygonObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0), (1.0, 3.0)))
 PILLAR = CircleObstacle((7.03, 5.04), 0.51)
-EVERYTHING = Snapping(0.15)
+EVERYTHING = SnapSettings(0.15)
 
 cursor = st.tuples(st.floats(-1.0, 13.0), st.floats(-1.0, 9.0))
 some_kinds = st.sets(st.sampled_from(sorted(KINDS))).map(frozenset)
 
 
-def to(*kinds: str, reach: float = 0.15) -> Snapping:
-    return Snapping(reach, to=frozenset(kinds))
+def to(*kinds: str, reach: float = 0.15) -> SnapSettings:
+    return SnapSettings(reach, kinds=frozenset(kinds))
 
 
 @pytest.fixture
-def targets() -> Targets:
-    return Targets(Sketch(boundary=HALL).added([BOX, PILLAR])[0])
+def targets() -> SnapTargets:
+    return SnapTargets(Sketch(boundary=HALL).with_obstacles([BOX, PILLAR])[0])
 
 
 @settings(max_examples=200)
@@ -40,9 +47,9 @@ def targets() -> Targets:
     st.one_of(st.none(), cursor),
 )
 def test_a_snap_never_moves_farther_than_its_reach_and_tells_why(sketch, point, reach, grid, kinds, origin):
-    targets = Targets(sketch)
-    snapping = Snapping(reach, grid, to=kinds)
-    snap = snapped(point, targets, snapping, origin)
+    targets = SnapTargets(sketch)
+    snapping = SnapSettings(reach, grid, kinds=kinds)
+    snap = snap_point(point, targets, snapping, origin)
     assert math.dist(snap.point, point) <= reach
     assert {guide.kind for guide in snap.guides} <= kinds
     assert bool(snap.guides) or snap.point == point
@@ -51,17 +58,17 @@ def test_a_snap_never_moves_farther_than_its_reach_and_tells_why(sketch, point, 
             assert shapely.LineString(guide.line).distance(shapely.Point(snap.point)) < 1e-8
         else:
             assert guide.line[-1] == snap.point
-        assert guide.words
-    moved = snapped_move([point, (point[0] + 1.0, point[1])], 0.3, -0.2, targets, snapping)
+        assert guide.label
+    moved = snap_move([point, (point[0] + 1.0, point[1])], 0.3, -0.2, targets, snapping)
     assert math.dist(moved.point, (0.3, -0.2)) <= reach
     if len(kinds) == 1 and snap.guides:
         # what has snapped stays where it is
-        assert math.dist(snapped(snap.point, targets, snapping, origin).point, snap.point) <= 1e-7
+        assert math.dist(snap_point(snap.point, targets, snapping, origin).point, snap.point) <= 1e-7
 
 
 @given(sound_sketches(least=1), cursor, st.sampled_from([0.05, 0.4, 2.0]))
 def test_the_nearest_vertex_wins(sketch, point, reach):
-    marks = [at for owner in (BOUNDARY, *sketch.places) for vertex, at in points_of(sketch, owner)]
+    marks = [at for owner in (BOUNDARY, *sketch.index_by_key) for vertex, at in list_vertices(sketch, owner)]
     centers = [item.shape.center for item in sketch.obstacles if isinstance(item.shape, CircleObstacle)]
     centers += [spec.center for _, spec in sketch.starts if isinstance(spec, DiscStart)]
     for _, spec in sketch.starts:
@@ -73,7 +80,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
             marks += [tuple(at) for at in shapely.get_coordinates(item.shape.polygon).tolist()]
     places = [at for at in marks if at not in centers]
     nearest = min(math.dist(point, at) for at in places)
-    snap = snapped(point, Targets(sketch), to("vertex", reach=reach))
+    snap = snap_point(point, SnapTargets(sketch), to("vertex", reach=reach))
     if nearest > reach:
         assert snap.guides == ()
     else:
@@ -99,118 +106,123 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
     ],
 )
 def test_what_is_near_is_snapped_to(targets, point, kinds, where, words):
-    snap = snapped(point, targets, to(*kinds))
+    snap = snap_point(point, targets, to(*kinds))
     assert snap.point == pytest.approx(where, abs=1e-9)
-    assert snap.guides[0].words == words
+    assert snap.guides[0].label == words
 
 
 def test_two_lines_come_before_one(targets):
     # in line with the pillar's rim at the right, and with the top of the box
-    snap = snapped((7.5, 3.05), targets, to("aligned", "grid"))
+    snap = snap_point((7.5, 3.05), targets, to("aligned", "grid"))
     assert snap.point == pytest.approx((7.54, 3.0))
     assert [guide.kind for guide in snap.guides] == ["aligned", "aligned"]
     assert {guide.line[0] for guide in snap.guides} == {(4.0, 3.0), (7.54, 5.04)}
     # an angle from the point before, up to an edge
-    snap = snapped((2.02, 1.04), targets, to("angle", "edge"), origin=(1.0, 0.0))
+    snap = snap_point((2.02, 1.04), targets, to("angle", "edge"), origin=(1.0, 0.0))
     assert snap.point == pytest.approx((2.0, 1.0))
-    assert {guide.words for guide in snap.guides} == {"45°", "edge"}
+    assert {guide.label for guide in snap.guides} == {"45°", "edge"}
 
 
 def test_crossings_of_edges():
     plank = PolygonObstacle(((0.0, 1.9), (8.0, 1.9), (8.0, 2.1), (0.0, 2.1)))
-    targets = Targets(Sketch().added([BOX, plank])[0])
-    snap = snapped((4.05, 2.06), targets, to("crossing", "edge"))
+    targets = SnapTargets(Sketch().with_obstacles([BOX, plank])[0])
+    snap = snap_point((4.05, 2.06), targets, to("crossing", "edge"))
     assert snap.point == pytest.approx((4.0, 2.1))
     assert snap.guides[0].kind == "crossing"
 
 
 def test_angles_and_lengths_on_the_grid(targets):
     origin = (8.0, 1.0)
-    snap = snapped((9.02, 1.05), targets, to("angle"), origin)
+    snap = snap_point((9.02, 1.05), targets, to("angle"), origin)
     assert snap.point == pytest.approx((9.02, 1.0))
     assert snap.guides[0].line == (origin, snap.point)
-    assert snap.guides[0].words == "0°"
-    snap = snapped((9.02, 1.05), targets, replace(to("angle", "grid"), grid=0.25), origin)
+    assert snap.guides[0].label == "0°"
+    snap = snap_point((9.02, 1.05), targets, replace(to("angle", "grid"), grid=0.25), origin)
     assert snap.point == pytest.approx((9.0, 1.0))
     # along a slanted ray the length is a multiple of the grid
-    snap = snapped((8.72, 1.71), targets, replace(to("angle", "grid"), grid=0.5), origin)
+    snap = snap_point((8.72, 1.71), targets, replace(to("angle", "grid"), grid=0.5), origin)
     assert math.dist(snap.point, origin) == pytest.approx(1.0)
-    assert snap.guides[0].words == "45°"
+    assert snap.guides[0].label == "45°"
     # upwards and to the left
-    assert snapped((7.0, 1.02), targets, to("angle"), origin).guides[0].words == "180°"
-    assert snapped((8.02, 0.0), targets, to("angle"), origin).guides[0].words == "270°"
+    assert snap_point((7.0, 1.02), targets, to("angle"), origin).guides[0].label == "180°"
+    assert snap_point((8.02, 0.0), targets, to("angle"), origin).guides[0].label == "270°"
     # too near to tell
-    assert snapped((8.05, 1.05), targets, to("angle"), origin).guides == ()
+    assert snap_point((8.05, 1.05), targets, to("angle"), origin).guides == ()
 
 
 def test_a_coarse_grid_pulls_along_one_axis_only(targets):
     snapping = replace(to("grid"), grid=1.0)
-    assert snapped((9.1, 6.5), targets, snapping).point == (9.0, 6.5)
-    assert snapped((9.1, 6.05), targets, snapping).point == (9.0, 6.0)
-    assert snapped((9.5, 6.5), targets, snapping).guides == ()
-    assert snapped((0.30000001, 0.1), targets, replace(to("grid"), grid=0.1)).point == (0.3, 0.1)
+    assert snap_point((9.1, 6.5), targets, snapping).point == (9.0, 6.5)
+    assert snap_point((9.1, 6.05), targets, snapping).point == (9.0, 6.0)
+    assert snap_point((9.5, 6.5), targets, snapping).guides == ()
+    assert snap_point((0.30000001, 0.1), targets, replace(to("grid"), grid=0.1)).point == (0.3, 0.1)
 
 
 def test_what_is_dragged_is_no_target():
-    sketch, (key,) = Sketch(starts=(("two", PointsStart(((6.0, 1.0), (8.0, 1.0)))),)).added([BOX])
+    sketch, (key,) = Sketch(starts=(("two", PointsStart(((6.0, 1.0), (8.0, 1.0)))),)).with_obstacles([BOX])
     near = (1.02, 1.02)
     assert (
-        snapped(near, Targets(sketch, without=[key]), to("vertex", "edge", "grid")).guides[0].kind == "grid"
+        snap_point(near, SnapTargets(sketch, without=[key]), to("vertex", "edge", "grid")).guides[0].kind
+        == "grid"
     )
-    one = Targets(sketch, without=[Vertex(key, 0, 0)])
-    assert snapped(near, one, to("vertex", "edge", "middle")).guides == ()
-    assert snapped((4.02, 2.97), one, to("vertex")).point == (4.0, 3.0)
+    one = SnapTargets(sketch, without=[Vertex(key, 0, 0)])
+    assert snap_point(near, one, to("vertex", "edge", "middle")).guides == ()
+    assert snap_point((4.02, 2.97), one, to("vertex")).point == (4.0, 3.0)
     # its edges go with it, the others stay
-    assert snapped((2.2, 1.02), one, to("edge", "middle")).guides == ()
-    assert snapped((2.2, 2.98), one, to("edge")).point == pytest.approx((2.2, 3.0))
+    assert snap_point((2.2, 1.02), one, to("edge", "middle")).guides == ()
+    assert snap_point((2.2, 2.98), one, to("edge")).point == pytest.approx((2.2, 3.0))
     # of a start's places, too
-    assert snapped((6.02, 1.0), Targets(sketch, without=[Vertex("two", 0, 0)]), to("centre")).guides == ()
-    assert snapped((8.02, 1.0), Targets(sketch, without=[Vertex("two", 0, 0)]), to("centre")).point == (
+    assert (
+        snap_point((6.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("centre")).guides == ()
+    )
+    assert snap_point(
+        (8.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("centre")
+    ).point == (
         8.0,
         1.0,
     )
-    assert snapped((6.02, 1.0), Targets(sketch, without=["two"]), to("centre")).guides == ()
+    assert snap_point((6.02, 1.0), SnapTargets(sketch, without=["two"]), to("centre")).guides == ()
     # what has been drawn so far is one
-    assert snapped((9.02, 5.0), Targets(sketch, more=[(9.0, 5.0)]), to("vertex")).point == (9.0, 5.0)
+    assert snap_point((9.02, 5.0), SnapTargets(sketch, more=[(9.0, 5.0)]), to("vertex")).point == (9.0, 5.0)
 
 
 def test_walls_have_faces_and_circles_rims():
     wall = WallObstacle(((1.0, 1.0), (5.0, 1.0)), 0.2)
-    targets = Targets(Sketch().added([wall, PILLAR])[0])
-    assert snapped((5.03, 1.12), targets, to("vertex", reach=0.05)).point == pytest.approx((5.0, 1.1))
-    assert snapped((3.3, 1.12), targets, to("edge", reach=0.05)).point == pytest.approx((3.3, 1.1))
-    assert snapped((3.3, 1.02), targets, to("edge", reach=0.05)).point == pytest.approx((3.3, 1.0))
+    targets = SnapTargets(Sketch().with_obstacles([wall, PILLAR])[0])
+    assert snap_point((5.03, 1.12), targets, to("vertex", reach=0.05)).point == pytest.approx((5.0, 1.1))
+    assert snap_point((3.3, 1.12), targets, to("edge", reach=0.05)).point == pytest.approx((3.3, 1.1))
+    assert snap_point((3.3, 1.02), targets, to("edge", reach=0.05)).point == pytest.approx((3.3, 1.0))
     at = (7.03 + 0.52 * math.cos(1.0), 5.04 + 0.52 * math.sin(1.0))
-    on_rim = snapped(at, targets, to("edge", reach=0.05)).point
+    on_rim = snap_point(at, targets, to("edge", reach=0.05)).point
     assert math.dist(on_rim, PILLAR.center) == pytest.approx(0.51, abs=2e-3)
 
 
 def test_what_is_moved_snaps_with_the_point_that_is_nearest(targets):
     corners = [(10.0, 6.0), (11.0, 6.0), (11.0, 7.0), (10.0, 7.0)]
     # the lower left corner comes near the upper right one of the box
-    snap = snapped_move(corners, -5.96, -2.95, targets, to("vertex"))
+    snap = snap_move(corners, -5.96, -2.95, targets, to("vertex"))
     assert snap.point == pytest.approx((-6.0, -3.0))
     assert snap.guides[0].line == ((4.0, 3.0),)
     # the grid is for the first point
-    snap = snapped_move(corners, -0.52, 0.03, targets, to("grid"))
+    snap = snap_move(corners, -0.52, 0.03, targets, to("grid"))
     assert snap.point == pytest.approx((-0.5, 0.0))
-    assert snapped_move(corners, 0.3, 0.2, targets, to()).point == (0.3, 0.2)
-    assert snapped_move([], 0.3, 0.2, targets, EVERYTHING).point == (0.3, 0.2)
+    assert snap_move(corners, 0.3, 0.2, targets, to()).point == (0.3, 0.2)
+    assert snap_move([], 0.3, 0.2, targets, EVERYTHING).point == (0.3, 0.2)
     many = [(10.0 + math.cos(k), 6.0 + math.sin(k)) for k in range(500)]
-    snap = snapped_move(many, -4.95, -3.0, targets, to("vertex"))
+    snap = snap_move(many, -4.95, -3.0, targets, to("vertex"))
     assert math.dist(snap.point, (-4.95, -3.0)) <= 0.15
 
 
 def test_angles_of_turning():
-    assert snapped_angle(44.0) == 45.0
-    assert snapped_angle(-1.0) == 0.0
-    assert math.copysign(1.0, snapped_angle(-1.0)) == 1.0
-    assert snapped_angle(40.0) == 40.0
-    assert snapped_angle(182.0, 90.0) == 180.0
+    assert snap_angle(44.0) == 45.0
+    assert snap_angle(-1.0) == 0.0
+    assert math.copysign(1.0, snap_angle(-1.0)) == 1.0
+    assert snap_angle(40.0) == 40.0
+    assert snap_angle(182.0, 90.0) == 180.0
 
 
 def test_nothing_is_no_target():
-    targets = Targets(Sketch())
-    assert snapped((1.04, 2.03), targets, EVERYTHING).point == (1.0, 2.0)
-    assert snapped((1.04, 2.03), targets, to("vertex", "edge", "aligned")).guides == ()
-    assert np.isfinite(snapped((0.0, 0.0), targets, Snapping(1.0, grid=0.0)).point).all()
+    targets = SnapTargets(Sketch())
+    assert snap_point((1.04, 2.03), targets, EVERYTHING).point == (1.0, 2.0)
+    assert snap_point((1.04, 2.03), targets, to("vertex", "edge", "aligned")).guides == ()
+    assert np.isfinite(snap_point((0.0, 0.0), targets, SnapSettings(1.0, grid=0.0)).point).all()

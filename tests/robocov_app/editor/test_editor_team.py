@@ -1,4 +1,4 @@
-"""How a team would stand at a start, beside the window."""
+"""The team that the editor shows at a start."""
 
 import time
 
@@ -6,35 +6,46 @@ import numpy as np
 from driven_editor import of_map, sheet
 
 from robocov.environment import PolygonObstacle
-from robocov_app.editor.ui.editor import TeamThread, placed
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.team import TeamRequest, TeamSampler, sample_team
 
 
-def test_the_team_stands_where_a_run_would_begin() -> None:
+def build_request(sketch: Sketch, robots: int, start: str | None = None, seed: int = 0) -> TeamRequest:
+    return TeamRequest(sketch, start, robots, seed, radius=0.1)
+
+
+def test_the_team_has_the_positions_of_a_run() -> None:
     sketch = of_map("rooms")
     name = sketch.starts[0][0]
-    team = placed(sketch, name, 5, 3, 0.1)
-    wanted = sketch.environment().start(name).sample(5, seed=3, radius=0.1)
-    assert np.array_equal(np.array(team.places), wanted) and team.words == ""
+    team = sample_team(build_request(sketch, 5, name, seed=3))
+    expected = sketch.build_environment().start(name).sample(5, seed=3, radius=0.1)
+    assert np.array_equal(np.array(team.positions), expected)
+    assert team.message == ""
 
 
-def test_why_it_cannot_stand_there_is_told() -> None:
-    assert "room for about" in placed(of_map("rooms"), None, 900, 0, 0.1).words
+def test_a_team_that_does_not_fit_has_a_message() -> None:
+    assert "room for about" in sample_team(build_request(of_map("rooms"), 900)).message
     crossed = sheet(PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))))
-    assert placed(crossed, None, 3, 0, 0.1).places == ()
-    assert placed(crossed, None, 3, 0, 0.1).words
+    team = sample_team(build_request(crossed, 3))
+    assert team.positions == ()
+    assert team.message
 
 
-def test_only_the_newest_question_is_answered_and_the_same_one_once() -> None:
-    sketch, thread = of_map("rooms"), TeamThread()
+def test_only_the_newest_team_is_returned_and_only_once() -> None:
+    sketch = of_map("rooms")
+    sampler = TeamSampler()
     try:
         for robots in range(1, 5):
-            thread.ask(sketch, None, robots, 0, 0.1)
-        began = time.monotonic()
-        while (answer := thread.ask(sketch, None, 5, 0, 0.1)) is None:
-            assert time.monotonic() - began < 60
+            sampler.poll(build_request(sketch, robots))
+        newest = build_request(sketch, 5)
+        deadline = time.monotonic() + 60
+        team = sampler.poll(newest)
+        while team is None:
+            assert time.monotonic() < deadline
             time.sleep(0.01)
-        assert answer.robots == len(answer.places) == 5 and thread._answer is None
+            team = sampler.poll(newest)
+        assert team.robots == len(team.positions) == 5
         time.sleep(0.05)
-        assert thread.ask(sketch, None, 5, 0, 0.1) is None
+        assert sampler.poll(newest) is None
     finally:
-        thread.close()
+        sampler.close()

@@ -5,14 +5,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.environment import ObstaclePath, UniformStart
-from robocov_app.editor.edits.create import free_name
-from robocov_app.editor.edits.paths import path_words
+from robocov_app.editor.edits.create import find_free_name
+from robocov_app.editor.edits.paths import describe_path
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model import geometry
-from robocov_app.editor.model.geometry import ANGLE, at_round_angle, bearing_words, distance, length_words
+from robocov_app.editor.model.geometry import (
+    SHIFT_ANGLE_DEG,
+    constrain_angle,
+    distance,
+    format_bearing,
+    format_length,
+)
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.model.validation import in_words, place_words
-from robocov_app.editor.tools.tool import PointerEvent, Tool
+from robocov_app.editor.model.validation import format_position, translate_message
+from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)
@@ -20,12 +26,12 @@ POINTS = st.tuples(NUMBERS, NUMBERS)
 
 @given(POINTS, POINTS)
 def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, point) -> None:
-    to = at_round_angle(origin, point)
+    to = constrain_angle(origin, point)
     if distance(origin, to) > 1e-3:
         angle = np.degrees(np.arctan2(to[1] - origin[1], to[0] - origin[0]))
-        assert abs(angle / ANGLE - round(angle / ANGLE)) < 1e-3
+        assert abs(angle / SHIFT_ANGLE_DEG - round(angle / SHIFT_ANGLE_DEG)) < 1e-3
     # no other line at a round angle comes nearer
-    directions = np.radians(np.arange(0, 180, ANGLE))
+    directions = np.radians(np.arange(0, 180, SHIFT_ANGLE_DEG))
     across = np.abs(
         (point[0] - origin[0]) * np.sin(directions) - (point[1] - origin[1]) * np.cos(directions)
     ).min()
@@ -34,37 +40,40 @@ def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, p
 
 def test_shift_holds_the_angle_and_nothing_else_does() -> None:
     aim = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1)
-    assert aim.constrained((0.0, 0.0)) == (3.0, 0.2)
+    assert aim.constrain((0.0, 0.0)) == (3.0, 0.2)
     shifted = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
-    assert shifted.constrained((0.0, 0.0)) == (3.0, 0.0)
-    assert shifted.constrained(None) == (3.0, 0.2)
+    assert shifted.constrain((0.0, 0.0)) == (3.0, 0.0)
+    assert shifted.constrain(None) == (3.0, 0.2)
 
 
 def test_lengths_and_angles_are_told_as_people_write_them() -> None:
-    assert bearing_words((0, 0), (-1, 0)) == "1.00 m  ∠ 180°"
-    assert bearing_words((0, 0), (1, 1)) == "1.41 m  ∠ 45°"
-    assert bearing_words((0, 0), (1, -1e-9)) == "1.00 m  ∠ 0°"
-    assert length_words(0.05) == "5.0 cm"
-    assert (length_words(12.3456), length_words(1234.5)) == ("12.35 m", "1234.5 m")
-    assert (geometry.point_words((1.0, -0.001)), place_words(1.25, 0.0)) == ("(1.00, 0.00) m", "(1.25, 0)")
-    assert path_words(ObstaclePath(((0.0, 0.0), (3.0, 0.0)), 0.5)) == "0.5 m/s, loop of 6 m in 12 s"
-    assert free_name(Sketch(starts=(("start", UniformStart()),)), "start") == "start 2"
-    assert in_words('map: starts["a b"].positions[1]: x', Sketch()) == "start “a b”, place 2: x"
+    assert format_bearing((0, 0), (-1, 0)) == "1.00 m  ∠ 180°"
+    assert format_bearing((0, 0), (1, 1)) == "1.41 m  ∠ 45°"
+    assert format_bearing((0, 0), (1, -1e-9)) == "1.00 m  ∠ 0°"
+    assert format_length(0.05) == "5.0 cm"
+    assert (format_length(12.3456), format_length(1234.5)) == ("12.35 m", "1234.5 m")
+    assert (geometry.format_point((1.0, -0.001)), format_position(1.25, 0.0)) == (
+        "(1.00, 0.00) m",
+        "(1.25, 0)",
+    )
+    assert describe_path(ObstaclePath(((0.0, 0.0), (3.0, 0.0)), 0.5)) == "0.5 m/s, loop of 6 m in 12 s"
+    assert find_free_name(Sketch(starts=(("start", UniformStart()),)), "start") == "start 2"
+    assert translate_message('map: starts["a b"].positions[1]: x', Sketch()) == "start “a b”, place 2: x"
 
 
 def test_points_and_angles_are_exact_where_they_are_round() -> None:
-    assert (geometry.rounded((0.1 + 0.2, -0.00001)), geometry.tenths(2 / 3)) == ((0.3, 0.0), 0.6667)
+    assert (geometry.round_point((0.1 + 0.2, -0.00001)), geometry.round_length(2 / 3)) == ((0.3, 0.0), 0.6667)
     ring = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 0.0)]
-    assert geometry.distinct(ring) == ((0.0, 0.0), (1.0, 0.0))
-    assert geometry.cos_sin(-90.0) == (0.0, -1.0)
-    assert geometry.angle_to_level((1.0, 1.0), (1.0, 3.0)) == 0.0
-    assert geometry.angle_to_level((0.0, 0.0), (1.0, 1.0)) == -45.0
-    assert at_round_angle((0.0, 0.0), (3.0, 0.1)) == (3.0, 0.0)
+    assert geometry.drop_repeated_points(ring) == ((0.0, 0.0), (1.0, 0.0))
+    assert geometry.compute_cos_sin(-90.0) == (0.0, -1.0)
+    assert geometry.compute_levelling_angle((1.0, 1.0), (1.0, 3.0)) == 0.0
+    assert geometry.compute_levelling_angle((0.0, 0.0), (1.0, 1.0)) == -45.0
+    assert constrain_angle((0.0, 0.0), (3.0, 0.1)) == (3.0, 0.0)
     assert Affine.turn(90.0, about=(1.0, 0.0)).ring([(2.0, 0.0)]) == ((1.0, 1.0),)
 
 
 def test_a_plain_tool_does_nothing() -> None:
     tool = Tool()
-    assert not tool.busy and tool.origin is None and tool.drawn == ()
-    assert not tool.finish(None) and not tool.back(None) and not tool.cancel(None)
-    assert tool.preview(None) is None
+    assert not tool.is_busy and tool.origin is None and tool.snap_points == ()
+    assert not tool.finish(None) and not tool.remove_last(None) and not tool.cancel(None)
+    assert tool.build_draw_state(None) == DrawState()

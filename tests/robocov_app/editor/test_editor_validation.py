@@ -18,12 +18,12 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
-from robocov_app.editor.model.validation import in_words
+from robocov_app.editor.model.validation import translate_message
 
 
 def hall(*shapes, starts=(), **others) -> Sketch:
     return (
-        Sketch("Hall", boundary=HALL, starts=starts).added(shapes)[0]
+        Sketch("Hall", boundary=HALL, starts=starts).with_obstacles(shapes)[0]
         if not others
         else replace(hall(*shapes, starts=starts), **others)
     )
@@ -31,7 +31,7 @@ def hall(*shapes, starts=(), **others) -> Sketch:
 
 def runs(sketch: Sketch) -> bool:
     try:
-        sketch.environment()
+        sketch.build_environment()
     except MapError:
         return False
     return True
@@ -41,20 +41,20 @@ def runs(sketch: Sketch) -> bool:
 @given(st.one_of(drafts(), sound_sketches()))
 def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
     found = problems(sketch)
-    assert any(problem.grave for problem in found) != runs(sketch), [problem.words for problem in found]
+    assert any(problem.is_error for problem in found) != runs(sketch), [problem.message for problem in found]
     keys = {item.key for item in sketch.obstacles} | {name for name, _ in sketch.starts} | {BOUNDARY, None}
     for problem in found:
-        assert problem.of in keys
-        assert problem.words.strip() and "\n" not in problem.words
-        if problem.where is not None:
-            assert not shapely.is_empty(problem.where)
-    graves = [problem.grave for problem in found]
+        assert problem.owner in keys
+        assert problem.message.strip() and "\n" not in problem.message
+        if problem.geometry is not None:
+            assert not shapely.is_empty(problem.geometry)
+    graves = [problem.is_error for problem in found]
     assert graves == sorted(graves, reverse=True)
 
 
 @pytest.mark.parametrize("name", list_bundled_maps())
 def test_bundled_maps_have_nothing_grave(name):
-    assert not any(each.grave for each in problems(Sketch.from_environment(load_map(name))))
+    assert not any(each.is_error for each in problems(Sketch.from_environment(load_map(name))))
 
 
 BOW_TIE = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
@@ -195,15 +195,15 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
     ],
 )
 def test_what_is_wrong_is_said_where_it_is(sketch, words, where, of):
-    (found, *_) = [problem for problem in problems(sketch) if problem.grave and problem.words == words] or [
-        pytest.fail(str([problem.words for problem in problems(sketch)]))
-    ]
-    assert found.of == of
+    (found, *_) = [
+        problem for problem in problems(sketch) if problem.is_error and problem.message == words
+    ] or [pytest.fail(str([problem.message for problem in problems(sketch)]))]
+    assert found.owner == of
     assert not runs(sketch)
     if where is None:
-        assert found.where is None
+        assert found.geometry is None
     else:
-        assert found.where.distance(shapely.Point(where)) < 1e-9
+        assert found.geometry.distance(shapely.Point(where)) < 1e-9
 
 
 def test_what_is_broken_keeps_nothing_else_from_being_found():
@@ -213,7 +213,7 @@ def test_what_is_broken_keeps_nothing_else_from_being_found():
         WallObstacle((), 0.1),
         starts=(("a", PointsStart(((6.0, 6.0),))), ("b", PointsStart(((1.5, 2.0), (2.0, 1.5))))),
     )
-    words = [problem.words for problem in problems(sketch) if problem.grave]
+    words = [problem.message for problem in problems(sketch) if problem.is_error]
     assert words == [
         "polygon 1: its outline crosses or touches itself at (2, 2)",
         "wall 3: it has no length: it needs two points that are apart",
@@ -225,8 +225,8 @@ def test_what_is_broken_keeps_nothing_else_from_being_found():
 
 def warned(sketch: Sketch, radius: float = 0.15) -> list[str]:
     found = problems(sketch, radius)
-    assert not any(problem.grave for problem in found)
-    return [problem.words for problem in found]
+    assert not any(problem.is_error for problem in found)
+    return [problem.message for problem in found]
 
 
 def test_warnings_of_what_may_be_a_mistake():
@@ -252,9 +252,9 @@ def test_paths_through_what_stands_are_told_where_they_do():
     cart = CircleObstacle((2.0, 2.0), 0.5, "cart", ObstaclePath(((2.0, 2.0), (10.0, 2.0)), 1.0))
     assert warned(hall(cart)) == []
     (problem,) = problems(hall(wall, cart))
-    assert problem.words == "circle “cart” moves through wall “screen”"
-    assert problem.of == 1 and not problem.grave
-    assert problem.where.bounds == pytest.approx((5.9, 1.5, 6.1, 2.5), abs=1e-3)
+    assert problem.message == "circle “cart” moves through wall “screen”"
+    assert problem.owner == 1 and not problem.is_error
+    assert problem.geometry.bounds == pytest.approx((5.9, 1.5, 6.1, 2.5), abs=1e-3)
     out = replace(cart, path=ObstaclePath(((2.0, 2.0), (14.0, 2.0)), 1.0))
     assert warned(hall(out)) == ["circle “cart” moves through the boundary"]
 
@@ -293,7 +293,7 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
 def test_each_spot_that_is_too_tight_is_told_of_where_it_is():
     spots = ((0.1, 1.0), (5.0, 5.0), (5.3, 5.0), (11.95, 7.0))
     found = problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
-    assert [(problem.words, problem.where.centroid.coords[0]) for problem in found] == [
+    assert [(problem.message, problem.geometry.centroid.coords[0]) for problem in found] == [
         ("start “a”: place 1 at (0.1, 1) is 0.1 m from a wall: robots need 0.2 m", (0.1, 1.0)),
         (
             "start “a”: place 4 at (11.95, 7) is 0.05 m from a wall: robots need 0.2 m",
@@ -321,4 +321,4 @@ def test_messages_of_the_map_name_things_and_where_they_are():
         ("starts.corner.positions[1]: is odd", "start “corner”, place 2: is odd"),
         ("boundary[3]: is odd", "boundary, corner 4: is odd"),
     ]:
-        assert in_words(message, sketch) == words
+        assert translate_message(message, sketch) == words

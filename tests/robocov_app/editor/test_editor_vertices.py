@@ -15,8 +15,8 @@ from robocov_app.editor.model.selection import (
     Edge,
     Selection,
     Vertex,
-    place_of,
-    points_of,
+    find_position,
+    list_vertices,
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
@@ -29,7 +29,7 @@ STARTS = (("disc", DiscStart((10.0, 6.0), 1.0)), ("two", PointsStart(((7.0, 6.0)
 
 @pytest.fixture
 def sketch() -> Sketch:
-    return Sketch("Hall", boundary=HALL, starts=STARTS).added([FRAME, PILLAR, WALL])[0]
+    return Sketch("Hall", boundary=HALL, starts=STARTS).with_obstacles([FRAME, PILLAR, WALL])[0]
 
 
 def picked(*chosen: Vertex) -> Selection:
@@ -43,21 +43,21 @@ def picked(*chosen: Vertex) -> Selection:
 def test_a_vertex_that_is_put_is_there(data):
     sketch = data.draw(sound_sketches(least=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
-    vertex, before = data.draw(st.sampled_from(points_of(sketch, owner)))
+    vertex, before = data.draw(st.sampled_from(list_vertices(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-5, 15), st.integers(-5, 15)))
     place = (to[0] + 0.25, to[1] + 0.5)
-    after = vertices.with_places(sketch, {vertex: place})
-    circle = isinstance(sketch.item(owner).shape, CircleObstacle) if owner != BOUNDARY else False
+    after = vertices.place_vertices(sketch, {vertex: place})
+    circle = isinstance(sketch.get_item(owner).shape, CircleObstacle) if owner != BOUNDARY else False
     if circle and vertex.index:
-        center = place_of(sketch, Vertex(owner, 0, 0))
-        assert place_of(after, Vertex(owner, 0, 0)) == center
-        assert after.item(owner).shape.radius == pytest.approx(math.dist(center, place), abs=1e-4)
+        center = find_position(sketch, Vertex(owner, 0, 0))
+        assert find_position(after, Vertex(owner, 0, 0)) == center
+        assert after.get_item(owner).shape.radius == pytest.approx(math.dist(center, place), abs=1e-4)
         return
-    assert place_of(after, vertex) == place
-    others = [other for other, _ in points_of(sketch, owner) if other != vertex]
+    assert find_position(after, vertex) == place
+    others = [other for other, _ in list_vertices(sketch, owner) if other != vertex]
     if not circle:
-        assert all(place_of(after, other) == place_of(sketch, other) for other in others)
-    back = vertices.with_places(after, {vertex: before})
+        assert all(find_position(after, other) == find_position(sketch, other) for other in others)
+    back = vertices.place_vertices(after, {vertex: before})
     assert back == sketch
 
 
@@ -70,59 +70,62 @@ def test_several_things_move_together(sketch):
         Vertex(BOUNDARY, 0, 0),
         Vertex("two", 0, 1),
     )
-    change = vertices.moved(sketch, chosen, 0.5, -0.25)
-    assert change.words == "6 vertices moved"
+    change = vertices.move_vertices(sketch, chosen, 0.5, -0.25)
+    assert change.description == "6 vertices moved"
     assert change.selection == chosen
     after = change.sketch
-    assert after.item(0).shape.vertices[2] == (5.5, 4.75)
-    assert after.item(0).shape.holes[0][0] == (2.5, 1.75)
-    assert after.item(1).shape == CircleObstacle((8.0, 4.0), round(math.hypot(1.0, 0.25), 4))
-    assert after.item(2).shape.points[2] == (9.5, 2.75)
+    assert after.get_item(0).shape.vertices[2] == (5.5, 4.75)
+    assert after.get_item(0).shape.holes[0][0] == (2.5, 1.75)
+    assert after.get_item(1).shape == CircleObstacle((8.0, 4.0), round(math.hypot(1.0, 0.25), 4))
+    assert after.get_item(2).shape.points[2] == (9.5, 2.75)
     assert after.boundary[0] == (0.5, -0.25)
-    assert after.start("two").positions == ((7.0, 6.0), (8.5, 5.75))
+    assert after.get_start("two").positions == ((7.0, 6.0), (8.5, 5.75))
 
 
 def test_centre_and_rim_of_discs(sketch):
-    assert vertices.with_places(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).start("disc") == DiscStart(
+    assert vertices.place_vertices(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).get_start("disc") == DiscStart(
         (9.0, 5.0), 1.0
     )
-    assert vertices.with_places(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).start("disc") == DiscStart(
-        (10.0, 6.0), 2.0
-    )
+    assert vertices.place_vertices(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).get_start(
+        "disc"
+    ) == DiscStart((10.0, 6.0), 2.0)
     both = {Vertex(1, 0, 0): (1.0, 1.0), Vertex(1, 0, 1): (9.0, 9.0)}
-    assert vertices.with_places(sketch, both).item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
+    assert vertices.place_vertices(sketch, both).get_item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
 
 
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
-        (lambda s: vertices.moved(s, Selection.of(0), 1, 1), "select vertices"),
-        (lambda s: vertices.moved(s, picked(Vertex(0, 0, 9)), 1, 1), "no such vertex"),
-        (lambda s: vertices.moved(s, picked(Vertex(99, 0, 0)), 1, 1), "no such vertex"),
-        (lambda s: vertices.moved(s, picked(Vertex("none", 0, 0)), 1, 1), "no such vertex"),
-        (lambda s: vertices.with_places(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
-        (lambda s: vertices.inserted(s, Edge(2, 0, 2, (9.0, 2.0))), "no such edge"),
-        (lambda s: vertices.inserted(s, Edge(1, 0, 0, (9.0, 2.0))), "no such edge"),
-        (lambda s: vertices.extended(s, Vertex(2, 0, 1), (1.0, 1.0)), "from its ends only"),
-        (lambda s: vertices.extended(s, Vertex(0, 0, 1), (1.0, 1.0)), "no wall"),
-        (lambda s: vertices.deleted(s, Selection.of(0)), "select vertices"),
-        (lambda s: vertices.deleted(s, picked(Vertex(1, 0, 1))), "delete the circle itself"),
-        (lambda s: vertices.deleted(s, picked(Vertex("disc", 0, 1))), "delete the start itself"),
-        (lambda s: vertices.deleted(s, picked(Vertex(-1, 0, 1), Vertex(-1, 0, 2))), "three corners at least"),
-        (lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0)), 0.0), "length above 0"),
-        (lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0)), 4.5), "of an edge that is 4 m long"),
+        (lambda s: vertices.move_vertices(s, Selection.of(0), 1, 1), "select vertices"),
+        (lambda s: vertices.move_vertices(s, picked(Vertex(0, 0, 9)), 1, 1), "no such vertex"),
+        (lambda s: vertices.move_vertices(s, picked(Vertex(99, 0, 0)), 1, 1), "no such vertex"),
+        (lambda s: vertices.move_vertices(s, picked(Vertex("none", 0, 0)), 1, 1), "no such vertex"),
+        (lambda s: vertices.place_vertices(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
+        (lambda s: vertices.insert_vertex(s, Edge(2, 0, 2, (9.0, 2.0))), "no such edge"),
+        (lambda s: vertices.insert_vertex(s, Edge(1, 0, 0, (9.0, 2.0))), "no such edge"),
+        (lambda s: vertices.extend_wall(s, Vertex(2, 0, 1), (1.0, 1.0)), "from its ends only"),
+        (lambda s: vertices.extend_wall(s, Vertex(0, 0, 1), (1.0, 1.0)), "no wall"),
+        (lambda s: vertices.delete_vertices(s, Selection.of(0)), "select vertices"),
+        (lambda s: vertices.delete_vertices(s, picked(Vertex(1, 0, 1))), "delete the circle itself"),
+        (lambda s: vertices.delete_vertices(s, picked(Vertex("disc", 0, 1))), "delete the start itself"),
         (
-            lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0), Vertex(0, 0, 1)), 2.5),
+            lambda s: vertices.delete_vertices(s, picked(Vertex(-1, 0, 1), Vertex(-1, 0, 2))),
+            "three corners at least",
+        ),
+        (lambda s: vertices.bevel_corners(s, picked(Vertex(0, 0, 0)), 0.0), "length above 0"),
+        (lambda s: vertices.bevel_corners(s, picked(Vertex(0, 0, 0)), 4.5), "of an edge that is 4 m long"),
+        (
+            lambda s: vertices.bevel_corners(s, picked(Vertex(0, 0, 0), Vertex(0, 0, 1)), 2.5),
             "5 m of .* both ends",
         ),
-        (lambda s: vertices.bevelled(s, picked(Vertex(2, 0, 0)), 0.1), "select corners"),
-        (lambda s: vertices.bevelled(s, picked(Vertex(1, 0, 0)), 0.1), "select corners"),
-        (lambda s: vertices.rounded_off(s, picked(Vertex(0, 0, 0)), -1.0), "radius above 0"),
-        (lambda s: vertices.hole_filled(s, 0, 2), "no such hole"),
-        (lambda s: vertices.split(s, Vertex(2, 0, 0)), "between its ends"),
-        (lambda s: vertices.split(s, Vertex(0, 0, 0)), "no wall"),
-        (lambda s: vertices.joined(s, Selection.of(0, 2)), "walls to join"),
-        (lambda s: vertices.joined(s, Selection.of(2)), "walls to join"),
+        (lambda s: vertices.bevel_corners(s, picked(Vertex(2, 0, 0)), 0.1), "select corners"),
+        (lambda s: vertices.bevel_corners(s, picked(Vertex(1, 0, 0)), 0.1), "select corners"),
+        (lambda s: vertices.round_corners(s, picked(Vertex(0, 0, 0)), -1.0), "radius above 0"),
+        (lambda s: vertices.fill_hole(s, 0, 2), "no such hole"),
+        (lambda s: vertices.split_wall(s, Vertex(2, 0, 0)), "between its ends"),
+        (lambda s: vertices.split_wall(s, Vertex(0, 0, 0)), "no wall"),
+        (lambda s: vertices.join_walls(s, Selection.of(0, 2)), "walls to join"),
+        (lambda s: vertices.join_walls(s, Selection.of(2)), "walls to join"),
     ],
 )
 def test_what_cannot_be_done_is_said(sketch, deed, words):
@@ -140,36 +143,36 @@ def test_inserting_on_an_edge_changes_nothing_but_the_count(data):
     edges = [
         Edge(owner, ring, k, (0.0, 0.0))
         for owner in (BOUNDARY, *(item.key for item in sketch.obstacles))
-        for ring, points, closed in sketch.rings_of(owner)
+        for ring, points, closed in sketch.list_rings(owner)
         for k in range(len(points) - (not closed))
     ]
     edge = data.draw(st.sampled_from(edges))
-    ring = sketch.ring_points(edge.of)[edge.ring]
+    ring = sketch.list_vertex_rings(edge.owner)[edge.ring]
     a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
     middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-    change = vertices.inserted(sketch, replace(edge, point=middle))
+    change = vertices.insert_vertex(sketch, replace(edge, point=middle))
     (new,) = change.selection.vertices
-    assert (new.of, new.ring, new.index) == (edge.of, edge.ring, edge.index + 1)
-    assert place_of(change.sketch, new) == pytest.approx(middle, abs=1e-4)
-    if edge.of != BOUNDARY:
-        difference = change.sketch.item(edge.of).geometry ^ sketch.item(edge.of).geometry
+    assert (new.owner, new.ring, new.index) == (edge.owner, edge.ring, edge.index + 1)
+    assert find_position(change.sketch, new) == pytest.approx(middle, abs=1e-4)
+    if edge.owner != BOUNDARY:
+        difference = change.sketch.get_item(edge.owner).geometry ^ sketch.get_item(edge.owner).geometry
         assert difference.area < 1e-3
-    assert vertices.deleted(change.sketch, change.selection).sketch == sketch
+    assert vertices.delete_vertices(change.sketch, change.selection).sketch == sketch
 
 
 def test_rings_with_too_few_vertices_go(sketch):
-    gone = vertices.deleted(sketch, picked(Vertex(0, 1, 0), Vertex(0, 1, 1)))
-    assert gone.sketch.item(0).shape.holes == ()
-    assert gone.words == "2 vertices deleted"
-    gone = vertices.deleted(sketch, picked(*(Vertex(0, 0, k) for k in (0, 1))))
-    assert 0 not in gone.sketch.places
-    gone = vertices.deleted(sketch, picked(Vertex(2, 0, 0), Vertex(2, 0, 1)))
-    assert 2 not in gone.sketch.places
-    gone = vertices.deleted(sketch, picked(Vertex("two", 0, 0)))
-    assert gone.sketch.start("two").positions == ((8.0, 6.0),)
-    gone = vertices.deleted(gone.sketch, picked(Vertex("two", 0, 0)))
+    gone = vertices.delete_vertices(sketch, picked(Vertex(0, 1, 0), Vertex(0, 1, 1)))
+    assert gone.sketch.get_item(0).shape.holes == ()
+    assert gone.description == "2 vertices deleted"
+    gone = vertices.delete_vertices(sketch, picked(*(Vertex(0, 0, k) for k in (0, 1))))
+    assert 0 not in gone.sketch.index_by_key
+    gone = vertices.delete_vertices(sketch, picked(Vertex(2, 0, 0), Vertex(2, 0, 1)))
+    assert 2 not in gone.sketch.index_by_key
+    gone = vertices.delete_vertices(sketch, picked(Vertex("two", 0, 0)))
+    assert gone.sketch.get_start("two").positions == ((8.0, 6.0),)
+    gone = vertices.delete_vertices(gone.sketch, picked(Vertex("two", 0, 0)))
     assert "two" not in dict(gone.sketch.starts)
-    assert len(vertices.deleted(sketch, picked(Vertex(BOUNDARY, 0, 0))).sketch.boundary) == 3
+    assert len(vertices.delete_vertices(sketch, picked(Vertex(BOUNDARY, 0, 0))).sketch.boundary) == 3
 
 
 # corners
@@ -179,17 +182,17 @@ def test_rings_with_too_few_vertices_go(sketch):
 def test_a_bevel_is_as_long_as_asked_and_a_rounding_touches_both_edges(degrees, length):
     angle = math.radians(degrees)
     corner = ((2.0, 0.0), (0.0, 0.0), (2.0 * math.cos(angle), 2.0 * math.sin(angle)))
-    sketch, (key,) = Sketch().added([WallObstacle(corner, 0.1)])
-    change = vertices.bevelled(sketch, picked(Vertex(key, 0, 1)), length)
-    points = np.array(change.sketch.item(key).shape.points)
+    sketch, (key,) = Sketch().with_obstacles([WallObstacle(corner, 0.1)])
+    change = vertices.bevel_corners(sketch, picked(Vertex(key, 0, 1)), length)
+    points = np.array(change.sketch.get_item(key).shape.points)
     assert len(points) == 4
     np.testing.assert_allclose(points[1], (length, 0.0), atol=1e-4)
     np.testing.assert_allclose(points[-2], (length * math.cos(angle), length * math.sin(angle)), atol=1e-4)
     # the circle that touches both edges there: its centre lies on the bisector
     radius = length * math.tan(angle / 2)
     center = np.array([length, radius])
-    rounded = vertices.rounded_off(sketch, picked(Vertex(key, 0, 1)), radius)
-    points = np.array(rounded.sketch.item(key).shape.points)
+    rounded = vertices.round_corners(sketch, picked(Vertex(key, 0, 1)), radius)
+    points = np.array(rounded.sketch.get_item(key).shape.points)
     np.testing.assert_allclose(np.hypot(*(points[1:-1] - center).T), radius, atol=2e-4)
     middles = (points[1:-2] + points[2:-1]) / 2
     assert (radius - np.hypot(*(middles - center).T)).max() <= 1.2e-3
@@ -197,31 +200,33 @@ def test_a_bevel_is_as_long_as_asked_and_a_rounding_touches_both_edges(degrees, 
 
 def test_corners_of_rings_are_cut_all_at_once(sketch):
     corners = picked(*(Vertex(0, 0, k) for k in range(4)), *(Vertex(0, 1, k) for k in range(4)))
-    change = vertices.bevelled(sketch, corners, 0.5)
-    shape = change.sketch.item(0).shape
-    assert change.words == "8 corners bevelled"
+    change = vertices.bevel_corners(sketch, corners, 0.5)
+    shape = change.sketch.get_item(0).shape
+    assert change.description == "8 corners bevelled"
     assert shape.polygon.is_valid
     assert shape.polygon.area == pytest.approx(16.0 - 4 * 0.125 - (1.0 - 4 * 0.125))
     assert len(shape.vertices) == 8
     # cuts that meet in the middle of an edge leave one vertex there
     assert len(shape.holes[0]) == 4
-    bounded = vertices.bevelled(sketch, picked(Vertex(BOUNDARY, 0, 0)), 1.0).sketch.boundary
+    bounded = vertices.bevel_corners(sketch, picked(Vertex(BOUNDARY, 0, 0)), 1.0).sketch.boundary
     assert bounded == ((0.0, 1.0), (1.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
     disc = (
-        vertices.rounded_off(sketch, picked(*(Vertex(0, 0, k) for k in range(4))), 2.0).sketch.item(0).shape
+        vertices.round_corners(sketch, picked(*(Vertex(0, 0, k) for k in range(4))), 2.0)
+        .sketch.get_item(0)
+        .shape
     )
     assert shapely.Polygon(disc.vertices).area == pytest.approx(math.pi * 4.0, abs=0.02)
 
 
 def test_what_has_no_angle_is_no_corner():
     ring = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0))
-    sketch, (key,) = Sketch().added([PolygonObstacle(ring)])
+    sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     with pytest.raises(MapError, match="select corners"):
-        vertices.bevelled(sketch, picked(Vertex(key, 0, 1)), 0.1)
+        vertices.bevel_corners(sketch, picked(Vertex(key, 0, 1)), 0.1)
     spike = WallObstacle(((0.0, 0.0), (1.0, 0.0), (0.2, 0.0)), 0.1)
-    sketch, (key,) = Sketch().added([spike])
+    sketch, (key,) = Sketch().with_obstacles([spike])
     with pytest.raises(MapError, match="turns right back"):
-        vertices.bevelled(sketch, picked(Vertex(key, 0, 1)), 0.1)
+        vertices.bevel_corners(sketch, picked(Vertex(key, 0, 1)), 0.1)
 
 
 # edges
@@ -231,39 +236,39 @@ def test_what_has_no_angle_is_no_corner():
 
 
 def test_holes_are_filled(sketch):
-    filled = vertices.hole_filled(sketch, 0, 1)
-    assert filled.words == "hole of polygon “frame” filled"
-    assert filled.sketch.item(0).shape.holes == ()
+    filled = vertices.fill_hole(sketch, 0, 1)
+    assert filled.description == "hole of polygon “frame” filled"
+    assert filled.sketch.get_item(0).shape.holes == ()
 
 
 def test_a_wall_goes_on_is_cut_and_joined(sketch):
-    longer = vertices.extended(sketch, Vertex(2, 0, 2), (11.0, 3.0))
-    assert longer.sketch.item(2).shape.points[-1] == (11.0, 3.0)
+    longer = vertices.extend_wall(sketch, Vertex(2, 0, 2), (11.0, 3.0))
+    assert longer.sketch.get_item(2).shape.points[-1] == (11.0, 3.0)
     assert longer.selection == picked(Vertex(2, 0, 3))
-    before = vertices.extended(sketch, Vertex(2, 0, 0), (6.0, 0.0))
-    assert before.sketch.item(2).shape.points[0] == (6.0, 0.0)
+    before = vertices.extend_wall(sketch, Vertex(2, 0, 0), (6.0, 0.0))
+    assert before.sketch.get_item(2).shape.points[0] == (6.0, 0.0)
     assert before.selection == picked(Vertex(2, 0, 0))
-    halves = vertices.split(longer.sketch, Vertex(2, 0, 1))
-    first, second = (halves.sketch.item(key).shape for key in sorted(halves.selection.items))
+    halves = vertices.split_wall(longer.sketch, Vertex(2, 0, 1))
+    first, second = (halves.sketch.get_item(key).shape for key in sorted(halves.selection.items))
     assert first.points == ((6.0, 1.0), (9.0, 1.0))
     assert second.points == ((9.0, 1.0), (9.0, 3.0), (11.0, 3.0))
     assert first.name == second.name == "west"
-    again = vertices.joined(halves.sketch, halves.selection)
+    again = vertices.join_walls(halves.sketch, halves.selection)
     assert again.sketch == longer.sketch
-    assert again.words == "2 walls joined"
+    assert again.description == "2 walls joined"
 
 
 @given(st.permutations(range(4)), st.lists(st.booleans(), min_size=4, max_size=4))
 def test_walls_join_in_any_order_either_way_round(order, turned):
     whole = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (3.0, 1.0), (3.0, 5.0)]
     pieces = [whole[k : k + 2][:: -1 if turned[k] else 1] for k in order]
-    sketch, keys = Sketch().added([WallObstacle(tuple(piece), 0.1) for piece in pieces])
-    (item,) = vertices.joined(sketch, Selection.of(*keys)).sketch.obstacles
+    sketch, keys = Sketch().with_obstacles([WallObstacle(tuple(piece), 0.1) for piece in pieces])
+    (item,) = vertices.join_walls(sketch, Selection.of(*keys)).sketch.obstacles
     assert list(item.shape.points) in (whole, whole[::-1])
 
 
 def test_walls_that_are_apart_are_joined_where_they_are_nearest():
     walls = [WallObstacle(((0.0, 0.0), (1.0, 0.0)), 0.1), WallObstacle(((5.0, 0.0), (2.0, 0.5)), 0.3, "b")]
-    sketch, keys = Sketch().added(walls)
-    (item,) = vertices.joined(sketch, Selection.of(*keys)).sketch.obstacles
+    sketch, keys = Sketch().with_obstacles(walls)
+    (item,) = vertices.join_walls(sketch, Selection.of(*keys)).sketch.obstacles
     assert item.shape == WallObstacle(((0.0, 0.0), (1.0, 0.0), (2.0, 0.5), (5.0, 0.0)), 0.1, "b")

@@ -10,11 +10,12 @@ from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.canvas import canvas
-from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
+from robocov_app.editor.edits.create import add_circle, add_polygon
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.panel import TABS, number
-from robocov_app.editor.ui.window import facts
+from robocov_app.editor.ui.fields import format_number
+from robocov_app.editor.ui.map_facts import list_status
+from robocov_app.editor.ui.panel import TABS
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import command as help_page
 from robocov_app.toolkit.command import Menu
@@ -42,7 +43,7 @@ def test_every_button_does_what_its_action_does(hands: Hands) -> None:
     hands.select(0)
     hands.turn("object")
     hands.push("rotate:left")
-    assert hands.editor.document.history.past
+    assert hands.editor.document.history.undo_descriptions
     hands.push("undo")
     assert hands.shapes[0] == BOX
     hands.push("help")
@@ -59,7 +60,7 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
     assert hands.editor.radius == 0.25 and hands.editor.measurement.radius == 0.25
     hands.write("robots", "nine")
     hands.key("return")
-    assert hands.editor.trouble and hands.editor.robots == 6
+    assert hands.editor.has_error_message and hands.editor.robots == 6
     hands.push("more")
     assert hands.editor.robots == 7
     hands.tick("show:robots")
@@ -67,7 +68,7 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
 
 
 def test_numbers_stand_in_fields_without_needless_zeros() -> None:
-    assert [number(value) for value in (2.0, 0.30004, -0.00001, None)] == ["2", "0.3", "0", ""]
+    assert [format_number(value) for value in (2.0, 0.30004, -0.00001, None)] == ["2", "0.3", "0", ""]
 
 
 def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
@@ -78,10 +79,10 @@ def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
     hands.key("return")
     hands.write("wide", "120cm")
     hands.key("return")
-    assert hands.sketch.item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
+    assert hands.sketch.get_item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
     hands.write("note", "oak")
     hands.key("return")
-    assert hands.sketch.item(0).note == "oak"
+    assert hands.sketch.get_item(0).note == "oak"
     hands.select(1)
     hands.write("size:radius", "0.5")
     hands.key("return")
@@ -111,7 +112,7 @@ def test_every_kind_of_selection_has_its_page(hands: Hands) -> None:
 
 def test_the_list_of_vertices_selects_and_scrolls(hands: Hands) -> None:
     ring = tuple((5 + np.cos(a), 5 + np.sin(a)) for a in np.arange(0, 6.2, 0.1))
-    hands.editor.change(polygon_drawn(hands.sketch, ring))
+    hands.editor.apply(add_polygon(hands.sketch, ring))
     hands.turn("object")
     hands.click(*hands.widget("option", "vertex:1").rect.center)
     assert hands.editor.selection.vertices == {Vertex(hands.sketch.obstacles[-1].key, 0, 1)}
@@ -169,7 +170,7 @@ def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> No
 
 
 def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:
-    hands.editor.change(circle_drawn(hands.sketch, (5, 5), 0.2))
+    hands.editor.apply(add_circle(hands.sketch, (5, 5), 0.2))
     drawn = hands.sketch
     hands.turn("map")
     hands.write("title", "ab")
@@ -185,7 +186,7 @@ def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Ha
 
 def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
     for radius in (0.2, 0.3, 0.4):
-        hands.editor.change(circle_drawn(hands.sketch, (5, 5), radius))
+        hands.editor.apply(add_circle(hands.sketch, (5, 5), radius))
     hands.turn("history")
 
     def lines() -> list[tuple[str, bool]]:
@@ -294,7 +295,7 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.key("ctrl+k")
     hands.type("mirror left")
     hands.key("return")
-    assert hands.editor.document.history.past
+    assert hands.editor.document.history.undo_descriptions
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")
@@ -344,10 +345,10 @@ def test_a_screenshot_is_saved(hands: Hands, tmp_path: Path) -> None:
 def test_the_status_line_says_where_what_and_how(hands: Hands) -> None:
     hands.go((3, 3))
     hands.select(0)
-    said = facts(hands.editor, 60.0, None)
+    said = list_status(hands.editor, 60.0, None)
     assert said[0].startswith("(3.0") and any("box" in each for each in said) and "60 fps" in said
     hands.key("w")
-    assert any(each.startswith("Wall: click its points") for each in facts(hands.editor, 60.0, None))
+    assert any(each.startswith("Wall: click its points") for each in list_status(hands.editor, 60.0, None))
 
 
 def test_the_title_of_the_window_tells_what_is_unsaved(hands: Hands) -> None:
@@ -372,7 +373,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
         points = np.column_stack([np.cos(angles), np.sin(angles)]) * generator.uniform(0.25, 0.42, (20, 1))
         rings.append(np.round(points + (k % 32 + 0.5, k // 32 + 0.5), 4))
     shapes = [PolygonObstacle(tuple(map(tuple, ring.tolist()))) for ring in rings]
-    sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).added(shapes)[0]
+    sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).with_obstacles(shapes)[0]
     with opened_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as hands:
         window, sheet = hands.window, hands.window.canvas.sheet
         hands.editor.snapper.patient = False
@@ -385,7 +386,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
             at = round(x + 2 * k), round(y + k % 7)
             hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
             window.frame(1 / 60)
-        assert hands.editor.preview[0] is not hands.sketch
+        assert hands.editor.displayed[0] is not hands.sketch
         whole = window.canvas.camera.view[2] * window.canvas.camera.view[3]
         assert boxes and all(box.width * box.height < whole / 10 for box in boxes)
 
@@ -450,7 +451,7 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         assert not drawn
         hands.move(310, 300)
         assert drawn
-        hands.editor.say("something new")
+        hands.editor.show_message("something new")
         drawn.clear()
         hands.frames(1)
         assert drawn

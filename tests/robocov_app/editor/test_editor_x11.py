@@ -15,7 +15,7 @@ from x11_hands import MARKS, PATIENCE, Hands, ended, invisible_display, run_wind
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
-from robocov_app.editor.canvas.canvas import MARGIN
+from robocov_app.editor.canvas.canvas import MARGIN_PX
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import Camera
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
@@ -51,7 +51,7 @@ class Sheet:
         left, top, width, height = laid_out(SIZE, 1.0, 1, 1.0, plot=False).arena
         above = 10 + 22 * legend_rows
         view = float(left), float(top + above), float(width), height - above - STRIP
-        self.camera = Camera.fit(bounds, view, MARGIN)
+        self.camera = Camera.fit(bounds, view, MARGIN_PX)
 
     def __call__(self, x: float, y: float) -> tuple[float, float]:
         px, py = self.camera.to_pixels(np.array([x, y])).tolist()

@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits import properties, transform
-from robocov_app.editor.model.measurement import MeasurementWire, Measuring, measure, measurement_worker
+from robocov_app.editor.model.measurement import (
+    MeasurementWire,
+    SketchMeasurer,
+    create_measurement_worker,
+    measure,
+)
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.jobs.messages import Line
@@ -16,7 +21,7 @@ from robocov_app.jobs.messages import Line
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""
 
-SKETCH, _ = Sketch("Hall", boundary=HALL).added(
+SKETCH, _ = Sketch("Hall", boundary=HALL).with_obstacles(
     [CircleObstacle((3.0, 3.0), 1.0), WallObstacle(((6.0, -1.0), (6.0, 7.7)), 0.2)]
 )
 
@@ -24,7 +29,7 @@ SKETCH, _ = Sketch("Hall", boundary=HALL).added(
 def same(a, b) -> bool:
     """Whether two measurements say the same."""
     numbers = ("free_area", "components", "reached", "gap", "vertices", "radius")
-    words = [[problem.words for problem in each.problems] for each in (a, b)]
+    words = [[problem.message for problem in each.problems] for each in (a, b)]
     return (
         all(getattr(a, name) == getattr(b, name) for name in numbers)
         and a.impassable.equals(b.impassable)
@@ -35,12 +40,15 @@ def same(a, b) -> bool:
 @pytest.mark.slow
 def test_it_says_what_the_function_says_after_every_change():
     history = [SKETCH]
-    history.append(transform.moved(history[-1], Selection.of(0), 1.0, 0.0).sketch)
-    history.append(history[-1].added([PolygonObstacle(((9.0, 1.0), (11.0, 1.0), (10.0, 3.0)))])[0])
+    history.append(transform.move(history[-1], Selection.of(0), 1.0, 0.0).sketch)
+    history.append(history[-1].with_obstacles([PolygonObstacle(((9.0, 1.0), (11.0, 1.0), (10.0, 3.0)))])[0])
     history.append(history[-1].without([0]))
-    history.append(properties.raised(history[-1], Selection.of(1), "top").sketch)
+    history.append(properties.restack(history[-1], Selection.of(1), "top").sketch)
     history.append(SKETCH)
-    with closing(measurement_worker()) as worker, closing(measurement_worker(direct=True)) as direct:
+    with (
+        closing(create_measurement_worker()) as worker,
+        closing(create_measurement_worker(direct=True)) as direct,
+    ):
         for sketch in history:
             for each in (worker, direct):
                 each.put((sketch, 0.2))
@@ -54,7 +62,7 @@ def test_it_says_what_the_function_says_after_every_change():
 @settings(max_examples=20)
 @given(st.data())
 def test_what_has_changed_is_enough_to_know_the_whole(data):
-    measuring, wire = Measuring(), MeasurementWire()
+    measuring, wire = SketchMeasurer(), MeasurementWire()
     sketch, known = data.draw(sound_sketches(least=1)), {}
     questions = []
     for _ in range(4):

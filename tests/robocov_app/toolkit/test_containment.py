@@ -13,7 +13,7 @@ from driven_window import opened
 from touched_run import begun
 
 from robocov.environment import CircleObstacle
-from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.editor.edits.create import add_circle
 from robocov_app.toolkit import clipboard, faults
 from robocov_app.toolkit.display import open_display, set_title
 from robocov_app.toolkit.faults import LOG_FILE, FaultLog
@@ -185,17 +185,17 @@ def test_an_edit_of_the_map_that_raises_is_taken_back(
     with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
         window, editor = hands.window, hands.editor
         window.contains_faults = True
-        editor.change(circle_drawn(editor.sketch, (2.0, 2.0), 0.5))
+        editor.apply(add_circle(editor.sketch, (2.0, 2.0), 0.5))
         before = editor.sketch
 
         def half_way() -> None:
-            editor.document.history.do(circle_drawn(editor.sketch, (5.0, 5.0), 0.5))
+            editor.document.history.apply(add_circle(editor.sketch, (5.0, 5.0), 0.5))
             raise ZeroDivisionError("half-way")
 
         monkeypatch.setattr(window, "try_it", half_way)
         monkeypatch.setattr(window, "do", lambda name: half_way())
         hands.key("f5")
-        assert editor.sketch == before and "Internal error" in editor.message and editor.trouble
+        assert editor.sketch == before and "Internal error" in editor.message and editor.has_error_message
         monkeypatch.undo()
         hands.key("ctrl+z")
         assert editor.sketch.obstacles == ()
@@ -285,8 +285,8 @@ def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
 
 def test_a_map_with_controls_in_its_texts_is_drawn(tmp_path: Path) -> None:
     with opened_editor(tmp_path) as hands:
-        hands.editor.change(circle_drawn(hands.sketch, (5.0, 5.0), 1.0))
+        hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
         (item,) = hands.sketch.obstacles
         assert isinstance(item.shape, CircleObstacle)
-        hands.editor.say("a\x00b\udcff", trouble=True)
+        hands.editor.show_message("a\x00b\udcff", is_error=True)
         hands.window.frame(0.1)

@@ -13,9 +13,9 @@ from driven_editor import opened_editor, sheet
 from driven_window import Driver, opened
 
 from robocov.environment import CircleObstacle
-from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import Document, recoverable
+from robocov_app.editor.model.document import Document, find_recoverable
 from robocov_app.editor.model.selection import Selection
 from robocov_app.jobs.workers import LatestWorker
 from robocov_app.toolkit.input import wheel_notches
@@ -107,11 +107,11 @@ def test_a_map_whose_file_name_is_no_text_has_drafts(tmp_path: Path) -> None:
     path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.json"))
     document = Document.new(tmp_path / "drafts", path)
     with opened_editor(tmp_path, document=document) as hands:
-        hands.editor.change(circle_drawn(hands.sketch, (5.0, 5.0), 1.0))
+        hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
         hands.window.frame(0.1)
         assert document.flush()
-    (draft,) = recoverable(tmp_path / "drafts")
-    assert draft.path == path and len(draft.sketch().obstacles) == 1
+    (draft,) = find_recoverable(tmp_path / "drafts")
+    assert draft.path == path and len(draft.read_sketch().obstacles) == 1
 
 
 def test_a_question_that_cannot_be_sent_is_not_waited_for(capfd: pytest.CaptureFixture[str]) -> None:

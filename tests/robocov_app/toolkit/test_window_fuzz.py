@@ -13,7 +13,7 @@ from driven_window import Driver, opened
 from random_events import RandomEvents
 
 from robocov.environment import Environment
-from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.model.document import History
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.window import BaseWindow
@@ -53,7 +53,7 @@ def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
         leave_everything(hands)
         history: History = hands.editor.document.history
         before = history.sketch
-        hands.editor.change(circle_drawn(history.sketch, (1.0, 1.0), 0.25))
+        hands.editor.apply(add_circle(history.sketch, (1.0, 1.0), 0.25))
         hands.key("ctrl+z")
         assert history.sketch == before
     return log

@@ -14,7 +14,7 @@ import pytest
 from served_window import Link, served
 from touched_run import begun
 
-from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.ui.launch import editor_window
 from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
 from robocov_app.viewer.launch import Launcher
@@ -50,7 +50,7 @@ def test_a_served_editor_offers_its_draft_at_the_next_start(tmp_path: Path) -> N
     with editor_window(None, tmp_path, served=True) as window:
         editor = window.editor
         assert editor.dialogs.asked is None
-        editor.attempt(lambda: editor.change(circle_drawn(editor.sketch, (5.0, 5.0), 1.0)))
+        editor.attempt(lambda: editor.apply(add_circle(editor.sketch, (5.0, 5.0), 1.0)))
         window.frame(0.1)
     assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
     with editor_window(None, tmp_path, served=True) as window:

@@ -11,7 +11,7 @@ from robocov.environment import GRID_M, CircleObstacle, Obstacle, PolygonObstacl
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import outlines, tenths
+from robocov_app.editor.model.geometry import extract_polygons, round_length
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
@@ -19,32 +19,32 @@ _difference = partial(shapely.difference, grid_size=GRID_M)
 _intersection = partial(shapely.intersection, grid_size=GRID_M)
 
 
-def united(sketch: Sketch, selection: Selection) -> Change:
-    items = _chosen(sketch, selection, "unite")
-    return _in_place(sketch, items, [_union(items)], f"{format_count(len(items), 'obstacle')} united")
+def unite(sketch: Sketch, selection: Selection) -> Change:
+    items = _require_solid_items(sketch, selection, "unite")
+    return _replace_items(sketch, items, [_union(items)], f"{format_count(len(items), 'obstacle')} united")
 
 
-def subtracted(sketch: Sketch, selection: Selection) -> Change:
+def subtract(sketch: Sketch, selection: Selection) -> Change:
     """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
-    lowest, *uppers = items = _chosen(sketch, selection, "subtract")
+    lowest, *uppers = items = _require_solid_items(sketch, selection, "subtract")
     left = _difference(lowest.geometry, _union(uppers))
     what = sketch.display_name(lowest.key)
     words = f"{format_count(len(uppers), 'obstacle')} cut out of {what}"
-    return _in_place(sketch, items, [left], words, f"nothing is left of {what}")
+    return _replace_items(sketch, items, [left], words, f"nothing is left of {what}")
 
 
-def intersected(sketch: Sketch, selection: Selection) -> Change:
-    items = _chosen(sketch, selection, "intersect")
+def intersect(sketch: Sketch, selection: Selection) -> Change:
+    items = _require_solid_items(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
     words = f"{format_count(len(items), 'obstacle')} intersected"
-    return _in_place(sketch, items, [common], words, "they have nothing in common")
+    return _replace_items(sketch, items, [common], words, "they have nothing in common")
 
 
-def divided(sketch: Sketch, selection: Selection) -> Change:
+def divide(sketch: Sketch, selection: Selection) -> Change:
     """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
-    lowest, *uppers = items = _chosen(sketch, selection, "divide")
+    lowest, *uppers = items = _require_solid_items(sketch, selection, "divide")
     parts = [cut(lowest.geometry, _union(uppers)) for cut in (_difference, _intersection)]
-    return _in_place(sketch, items, parts, f"{sketch.display_name(lowest.key)} divided")
+    return _replace_items(sketch, items, parts, f"{sketch.display_name(lowest.key)} divided")
 
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
@@ -52,27 +52,27 @@ def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
     require(MIN_SIZE_M <= abs(by) <= MAX_SIZE_M, f"expected a length of at least {1000 * MIN_SIZE_M:g} mm")
     require(selection.items, "select obstacles first")
     shapes: dict[int, Sequence[Obstacle]] = {}
-    for item in selection.items_in(sketch):
+    for item in selection.list_items(sketch):
         if isinstance(item.shape, CircleObstacle):
-            radius = tenths(item.shape.radius + by)
+            radius = round_length(item.shape.radius + by)
             shapes[item.key] = [replace(item.shape, radius=radius)] if radius >= MIN_SIZE_M else []
         else:
             # corners sharper than a right angle would reach far out: they are cut off
             buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
-            shapes[item.key] = outlines(buffered, item.shape.name)
+            shapes[item.key] = extract_polygons(buffered, item.shape.name)
         require(shapes[item.key], f"nothing would be left of the {sketch.display_name(item.key)}")
-    words = f"{Selection(items=selection.items).words(sketch)} {'grown' if by > 0 else 'shrunk'}"
-    return replace_obstacles(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
+    words = f"{Selection(items=selection.items).describe(sketch)} {'grown' if by > 0 else 'shrunk'}"
+    return replace_obstacles(sketch, shapes, f"{words} by {abs(round_length(by)):g} m")
 
 
-def clipped(sketch: Sketch, selection: Selection) -> Change:
+def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
     """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected."""
     if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be sound first")
     inside = shapely.Polygon(sketch.boundary)
     shapely.prepare(inside)
     shapes: dict[int, Sequence[Obstacle]] = {
-        item.key: outlines(_intersection(item.geometry, inside), item.shape.name)
+        item.key: extract_polygons(_intersection(item.geometry, inside), item.shape.name)
         for item in sketch.obstacles
         if (not selection.items or item.key in selection.items) and not inside.covers(item.geometry)
     }
@@ -82,7 +82,7 @@ def clipped(sketch: Sketch, selection: Selection) -> Change:
     )
 
 
-def repaired(sketch: Sketch, selection: Selection) -> Change:
+def repair_outlines(sketch: Sketch, selection: Selection) -> Change:
     """Make crossing outlines valid, of what is selected or of all; the boundary keeps its largest part."""
     everything = not (selection.items or selection.boundary)
     shapes: dict[int, Sequence[Obstacle]] = {}
@@ -91,11 +91,11 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
         if not isinstance(shape, PolygonObstacle) or not (everything or item.key in selection.items):
             continue
         if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
-            shapes[item.key] = outlines(item.geometry, shape.name)
+            shapes[item.key] = extract_polygons(item.geometry, shape.name)
     boundary = sketch.boundary
     meant = everything or selection.boundary
     if meant and boundary is not None and len(boundary) >= 3 and not shapely.Polygon(boundary).is_valid:
-        parts = outlines(shapely.make_valid(shapely.Polygon(boundary)))
+        parts = extract_polygons(shapely.make_valid(shapely.Polygon(boundary)))
         boundary = parts[0].vertices if parts else None
     redrawn = boundary is not sketch.boundary
     require(shapes or redrawn, "there is nothing to repair: no outline crosses itself")
@@ -108,8 +108,8 @@ def _union(items: Sequence[Item]) -> shapely.Geometry:
     return shapely.union_all([item.geometry for item in items], grid_size=GRID_M)
 
 
-def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
-    items = selection.items_in(sketch)
+def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
+    items = selection.list_items(sketch)
     require(len(items) >= 2, f"select two or more obstacles to {verb}")
     for item in items:
         if not item.geometry.area > 0.0:
@@ -117,9 +117,11 @@ def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
     return items
 
 
-def _in_place(sketch: Sketch, items: list[Item], parts: list[Any], words: str, empty: str = "") -> Change:
+def _replace_items(
+    sketch: Sketch, items: list[Item], parts: list[Any], words: str, empty: str = ""
+) -> Change:
     """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
     lowest, *others = items
-    shapes = [shape for part in parts for shape in outlines(part, lowest.shape.name)]
+    shapes = [shape for part in parts for shape in extract_polygons(part, lowest.shape.name)]
     require(shapes, empty or "nothing is left")
     return replace_obstacles(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)

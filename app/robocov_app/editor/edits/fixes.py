@@ -14,17 +14,22 @@ from robocov.environment import MAX_SAGITTA_M, Obstacle, Point, PointsStart, Wal
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties, transform, vertices
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import distinct, outlines, rectangle, rounded
-from robocov_app.editor.model.measurement import reach_of
-from robocov_app.editor.model.selection import Change, Selection, Vertex, numbered_name, place_of
+from robocov_app.editor.model.geometry import (
+    build_rectangle,
+    drop_repeated_points,
+    extract_polygons,
+    round_point,
+)
+from robocov_app.editor.model.measurement import compute_reach
+from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position, format_numbered_name
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.model.validation import Kind, Problem, examined
+from robocov_app.editor.model.validation import Kind, Problem, find_problems
 
 _TITLES: dict[str, tuple[Kind, ...]] = {
     "Draw one": ("no boundary",), "Repair": ("crossing",), "Merge": ("double",), "Widen": ("narrow",),
     "Move": ("spot", "no room"), "Delete": ("outside", "twice"), "Fill": ("sealed", "cut off"),
 }  # fmt: skip
-TITLES: Final = {kind: title for title, kinds in _TITLES.items() for kind in kinds}
+FIX_TITLES: Final = {kind: title for title, kinds in _TITLES.items() for kind in kinds}
 """Button label of the fix for each kind of problem; other kinds have none."""
 
 _MARGIN = 0.5  # metres between a boundary that is drawn round everything and what it is drawn round
@@ -32,48 +37,53 @@ _OVER = 0.002  # metres by which what fills a place reaches into what is round i
 _SPARE = 1e-3  # metres by which a widened gap is wider than a robot
 
 
-def fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
-    owner: Any = problem.of  # problems of each kind have the place and the owner that its fix needs
-    where: Any = problem.where
+def find_fix(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
+    owner: Any = problem.owner  # problems of each kind have the place and the owner that its fix needs
+    where: Any = problem.geometry
     with suppress(MapError):
         match problem.kind:
             case "no boundary":
                 low_x, low_y, high_x, high_y = sketch.bounds or (0.0, 0.0, 10.0, 10.0)
                 by = _MARGIN if sketch.bounds else 0.0
-                ring = rectangle(rounded((low_x - by, low_y - by)), rounded((high_x + by, high_y + by)))
+                ring = build_rectangle(
+                    round_point((low_x - by, low_y - by)), round_point((high_x + by, high_y + by))
+                )
                 words = "boundary drawn round everything"
                 return Change(replace(sketch, boundary=ring), Selection(boundary=True), words)
             case "sealed":
                 return _filled(sketch, where)
             case "cut off":
-                free = examined(sketch, radius)[1]
-                return _filled(sketch, _beyond(free, reach_of(free, radius)[0][0], [where]))
+                free = find_problems(sketch, radius)[1]
+                return _filled(sketch, _beyond(free, compute_reach(free, radius)[0][0], [where]))
             case "narrow":
                 return _widened(sketch, where, 2.0 * radius)
             case "crossing":
-                return boolean.repaired(sketch, Selection.of(owner))
+                return boolean.repair_outlines(sketch, Selection.of(owner))
             case "outside" | "twice":
-                return properties.deleted(sketch, Selection.of(owner))
+                return properties.delete(sketch, Selection.of(owner))
             case "double":
-                rings = [distinct(points, closed=closed) for _, points, closed in sketch.rings_of(owner)]
-                words = f"{numbered_name(sketch, owner)}: vertices merged"
+                rings = [
+                    drop_repeated_points(points, closed=closed)
+                    for _, points, closed in sketch.list_rings(owner)
+                ]
+                words = f"{format_numbered_name(sketch, owner)}: vertices merged"
                 return Change(sketch.with_rings(owner, rings), Selection.of(owner), words)
             case "spot" | "no room":
                 return _start_moved(sketch, owner, where, radius)
     return None
 
 
-def unreachable_filled(sketch: Sketch, radius: float) -> Change:
-    free = examined(sketch, radius)[1]
-    reached, untouched = reach_of(free, radius)
+def fill_unreachable(sketch: Sketch, radius: float) -> Change:
+    free = find_problems(sketch, radius)[1]
+    reached, untouched = compute_reach(free, radius)
     require(reached, f"no robot of radius {radius:g} m fits anywhere")
     return _filled(sketch, _beyond(free, reached[0], [*reached[1:], untouched, *list(free.geoms)[1:]]))
 
 
 def _filled(sketch: Sketch, where: Geometry) -> Change:
-    shapes = outlines(where.buffer(_OVER, join_style="mitre", mitre_limit=2.0))
+    shapes = extract_polygons(where.buffer(_OVER, join_style="mitre", mitre_limit=2.0))
     require(shapes, "there is nothing to fill")
-    after, keys = sketch.added(shapes)
+    after, keys = sketch.with_obstacles(shapes)
     return Change(after, Selection.of(*keys), "filled what cannot be reached")
 
 
@@ -87,8 +97,8 @@ def _beyond(free: MultiPolygon, largest: Geometry, others: list[Geometry]) -> Ge
 
 def _start_moved(sketch: Sketch, name: str, where: Geometry, radius: float) -> Change:
     """Move the spot at the last of some points, or a disc, to where a robot fits that is nearest."""
-    room = examined(sketch, radius)[1].buffer(-radius - _SPARE)
-    spec, number, spot = sketch.start(name), 0, ""
+    room = find_problems(sketch, radius)[1].buffer(-radius - _SPARE)
+    spec, number, spot = sketch.get_start(name), 0, ""
     if isinstance(spec, PointsStart):
         x, y = shapely.get_coordinates(where)[-1].tolist()
         number = max(k for k, at in enumerate(spec.positions) if at == (x, y))
@@ -97,8 +107,8 @@ def _start_moved(sketch: Sketch, name: str, where: Geometry, radius: float) -> C
         spot = f": place {number + 1}"
     require(not room.is_empty, "a robot fits nowhere")
     vertex = Vertex(name, 0, number)
-    way = shapely.shortest_line(room, shapely.Point(place_of(sketch, vertex)))
-    after = vertices.with_places(sketch, {vertex: rounded(way.coords[0])})
+    way = shapely.shortest_line(room, shapely.Point(find_position(sketch, vertex)))
+    after = vertices.place_vertices(sketch, {vertex: round_point(way.coords[0])})
     return Change(after, Selection.of(name), f"start “{name}”{spot} moved to where a robot fits")
 
 
@@ -112,15 +122,15 @@ def _widened(sketch: Sketch, gap: LineString, width: float) -> Change:
         sides += [(sketch.obstacles[k], a, b) for k in near if not sketch.obstacles[k].locked]
     for item, a, _ in sides:
         if shorter := _shortened(item.shape, a, lack):
-            words = f"{numbered_name(sketch, item.key)} shortened by {lack:.2g} m"
-            return Change(sketch.with_things({item.key: shorter}), Selection.of(item.key), words)
+            words = f"{format_numbered_name(sketch, item.key)} shortened by {lack:.2g} m"
+            return Change(sketch.with_objects({item.key: shorter}), Selection.of(item.key), words)
     here, there = ({item.key for item, a, _ in sides if a == end} for end, _ in ends)
     alone = [side for side in sides if side[0].key not in here & there]
     require(alone and gap.length > 0.0, "nothing can move away")
     item, a, b = min(alone, key=lambda side: side[0].geometry.area)
     dx, dy = (lack * (a[k] - b[k]) / gap.length for k in (0, 1))
-    change = transform.moved(sketch, Selection.of(item.key), dx, dy)
-    return replace(change, words=f"{numbered_name(sketch, item.key)} moved by {lack:.2g} m")
+    change = transform.move(sketch, Selection.of(item.key), dx, dy)
+    return replace(change, description=f"{format_numbered_name(sketch, item.key)} moved by {lack:.2g} m")
 
 
 def _shortened(wall: Obstacle, end: Point, by: float) -> WallObstacle | None:
@@ -130,5 +140,5 @@ def _shortened(wall: Obstacle, end: Point, by: float) -> WallObstacle | None:
     line = LineString(wall.points)
     for at, low, high in ((wall.points[0], by, line.length), (wall.points[-1], 0.0, line.length - by)):
         if math.dist(at, end) <= wall.width / 2 + MAX_SAGITTA_M and high - low > wall.width:
-            return replace(wall, points=tuple(map(rounded, substring(line, low, high).coords)))
+            return replace(wall, points=tuple(map(round_point, substring(line, low, high).coords)))
     return None

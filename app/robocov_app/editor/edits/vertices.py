@@ -20,8 +20,21 @@ from robocov.environment import Point, Ring
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import as_array, distinct, point_near, ring_near, tenths
-from robocov_app.editor.model.selection import Change, Edge, Selection, Vertex, place_of, replace_obstacles
+from robocov_app.editor.model.geometry import (
+    check_point,
+    drop_repeated_points,
+    round_length,
+    round_ring,
+    to_array,
+)
+from robocov_app.editor.model.selection import (
+    Change,
+    Edge,
+    Selection,
+    Vertex,
+    find_position,
+    replace_obstacles,
+)
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
@@ -32,92 +45,92 @@ _Redraw: TypeAlias = Callable[[tuple[Ring, ...], bool], tuple[Ring, ...]]  # of 
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
 
-def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
+def move_vertices(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
     """Move the selected vertices by (dx, dy) m; a rim's vertex changes the radius."""
     require(selection.vertices, "select vertices first")
-    places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
-    after = with_places(sketch, {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()})
-    return Change(after, selection, f"{Selection(vertices=selection.vertices).words(sketch)} moved")
+    places = {vertex: find_position(sketch, vertex) for vertex in selection.vertices}
+    after = place_vertices(sketch, {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()})
+    return Change(after, selection, f"{Selection(vertices=selection.vertices).describe(sketch)} moved")
 
 
-def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
+def place_vertices(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
     """Return the sketch with vertices elsewhere; a circle's centre moves it, its rim gives the radius."""
     by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
     for vertex, place in places.items():
-        place_of(sketch, vertex)
-        by_owner[vertex.of][vertex] = place
+        find_position(sketch, vertex)
+        by_owner[vertex.owner][vertex] = place
     for owner, moves in by_owner.items():
-        disc = sketch.thing(owner)
+        disc = sketch.find_object(owner)
         if isinstance(disc, env.CircleObstacle | env.DiscStart):
             first = min(moves, key=lambda vertex: vertex.index)
-            place = point_near(moves[first])
-            radius = disc.radius if first.index == 0 else tenths(math.dist(disc.center, place))
+            place = check_point(moves[first])
+            radius = disc.radius if first.index == 0 else round_length(math.dist(disc.center, place))
             if first.index and radius < MIN_SIZE_M:
                 raise MapError("a circle needs a radius: drag its rim away from its centre")
             center = disc.center if first.index else place
-            sketch = sketch.with_things({owner: replace(disc, center=center, radius=radius)})
+            sketch = sketch.with_objects({owner: replace(disc, center=center, radius=radius)})
             continue
-        rings = [list(ring) for ring in sketch.ring_points(owner)]
-        for vertex, place in zip(moves, ring_near(list(moves.values())), strict=True):
+        rings = [list(ring) for ring in sketch.list_vertex_rings(owner)]
+        for vertex, place in zip(moves, round_ring(list(moves.values())), strict=True):
             rings[vertex.ring][vertex.index] = place
         sketch = sketch.with_rings(owner, rings)
     return sketch
 
 
-def inserted(sketch: Sketch, edge: Edge) -> Change:
-    rings = [list(ring) for ring in sketch.ring_points(edge.of)]
-    counts = {number: len(ring) - (not closed) for number, ring, closed in sketch.rings_of(edge.of)}
+def insert_vertex(sketch: Sketch, edge: Edge) -> Change:
+    rings = [list(ring) for ring in sketch.list_vertex_rings(edge.owner)]
+    counts = {number: len(ring) - (not closed) for number, ring, closed in sketch.list_rings(edge.owner)}
     require(0 <= edge.index < counts.get(edge.ring, 0), "there is no such edge any more")
-    rings[edge.ring].insert(edge.index + 1, point_near(edge.point))
-    new = Selection(vertices=frozenset({Vertex(edge.of, edge.ring, edge.index + 1)}))
-    after = sketch.with_rings(edge.of, rings)
-    return Change(after, new, f"vertex inserted in {sketch.display_name(edge.of)}")
+    rings[edge.ring].insert(edge.index + 1, check_point(edge.point))
+    new = Selection(vertices=frozenset({Vertex(edge.owner, edge.ring, edge.index + 1)}))
+    after = sketch.with_rings(edge.owner, rings)
+    return Change(after, new, f"vertex inserted in {sketch.display_name(edge.owner)}")
 
 
-def deleted(sketch: Sketch, selection: Selection) -> Change:
+def delete_vertices(sketch: Sketch, selection: Selection) -> Change:
     """Delete the selected vertices, and with too few left the hole or obstacle; the boundary keeps three."""
     require(selection.vertices, "select vertices first")
     after = sketch
     for owner, gone in _by_ring(sketch, selection.vertices).items():
-        thing, rings = sketch.thing(owner), []
+        thing, rings = sketch.find_object(owner), []
         if isinstance(thing, env.DiscStart | env.CircleObstacle):
             what, whole = ("disc", "start") if isinstance(owner, str) else ("circle", "circle")
             raise MapError(f"the points of a {what} cannot be deleted: delete the {whole} itself")
         least = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(thing), 3)
-        for number, ring in enumerate(sketch.ring_points(owner)):
+        for number, ring in enumerate(sketch.list_vertex_rings(owner)):
             kept = tuple(point for k, point in enumerate(ring) if k not in gone[number])
             # a hole goes that has too few left, but one that was broken before and is not touched stays
             if number == 0 or not gone[number] or len(kept) >= 3:
                 rings.append(kept)
         require(owner != BOUNDARY or len(rings[0]) >= least, "the boundary needs three corners at least")
         after = after.with_rings(owner, rings) if len(rings[0]) >= least else after.without({owner})
-    words = f"{Selection(vertices=selection.vertices).words(sketch)} deleted"
-    return Change(after, selection.without_vertices().within(after), words)
+    words = f"{Selection(vertices=selection.vertices).describe(sketch)} deleted"
+    return Change(after, selection.without_vertices().restrict_to(after), words)
 
 
 def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int, set[int]]]:
     found: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
     for vertex in vertices:
-        place_of(sketch, vertex)
-        found[vertex.of][vertex.ring].add(vertex.index)
+        find_position(sketch, vertex)
+        found[vertex.owner][vertex.ring].add(vertex.index)
     return found
 
 
-def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
-    rings = sketch.ring_points(key)
-    if not isinstance(sketch.thing(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
+def fill_hole(sketch: Sketch, key: int, ring: int) -> Change:
+    rings = sketch.list_vertex_rings(key)
+    if not isinstance(sketch.find_object(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
         raise MapError("there is no such hole")
     after = sketch.with_rings(key, rings[:ring] + rings[ring + 1 :])
     return Change(after, Selection.of(key), f"hole of {sketch.display_name(key)} filled")
 
 
-def bevelled(sketch: Sketch, selection: Selection, length: float) -> Change:
+def bevel_corners(sketch: Sketch, selection: Selection, length: float) -> Change:
     """Cut the selected corners off, `length` metres from each along both edges; ends of walls are none."""
     require(0.0 < length < math.inf, "a bevel needs a length above 0 m")
     return _cut(sketch, selection, lambda turn: (length, 1), "bevelled")
 
 
-def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
+def round_corners(sketch: Sketch, selection: Selection, radius: float) -> Change:
     """Round the selected corners with a radius in metres, to a millimetre, by arcs that touch both edges."""
     require(0.0 < radius < math.inf, "expected a radius above 0 m")
 
@@ -131,12 +144,12 @@ def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
 def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Change:
     after, count = sketch, 0
     for owner, by_ring in _by_ring(sketch, selection.vertices).items():
-        rings = list(sketch.ring_points(owner))
-        for number, ring, closed in sketch.rings_of(owner):
+        rings = list(sketch.list_vertex_rings(owner))
+        for number, ring, closed in sketch.list_rings(owner):
             cuts = _cuts(ring, by_ring[number], closed, wanted)
             arcs = [_arc(ring, k, *cuts[k]) if k in cuts else [ring[k]] for k in range(len(ring))]
             if cuts:
-                rings[number] = distinct(ring_near(np.concatenate(arcs)), closed=closed)
+                rings[number] = drop_repeated_points(round_ring(np.concatenate(arcs)), closed=closed)
                 count += len(cuts)
                 after = after.with_rings(owner, rings)
     require(count, "select corners first, of polygons, walls or the boundary")
@@ -162,8 +175,8 @@ def _cuts(ring: Ring, indices: set[int], closed: bool, wanted: _Cut) -> dict[int
             taken = length + (cuts[other][0] if other in cuts else 0.0)
             if taken > edge + 1e-9:
                 more = " for the corners at both ends" if other in cuts else ""
-                found = f"that takes {tenths(taken):g} m of an edge that is {tenths(edge):g} m long{more}"
-                raise MapError(f"{found}: expected less")
+                lengths = f"{round_length(taken):g} m of an edge that is {round_length(edge):g} m long{more}"
+                raise MapError(f"that takes {lengths}: expected less")
     return cuts
 
 
@@ -179,36 +192,36 @@ def _arc(ring: Ring, k: int, length: float, segments: int) -> Array:
     return np.column_stack([points.real, points.imag])
 
 
-def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
+def extend_wall(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     """Go on with a wall from its first or last vertex; the new one is selected then."""
     points = _wall(sketch, vertex).points
     require(vertex.index in (0, len(points) - 1), "a wall goes on from its ends only")
     at = 0 if vertex.index == 0 else len(points)
-    after = sketch.with_rings(vertex.of, [(*points[:at], point_near(point), *points[at:])])
-    selection = Selection(vertices=frozenset({Vertex(vertex.of, 0, at)}))
-    return Change(after, selection, f"{sketch.display_name(vertex.of)} extended")
+    after = sketch.with_rings(vertex.owner, [(*points[:at], check_point(point), *points[at:])])
+    selection = Selection(vertices=frozenset({Vertex(vertex.owner, 0, at)}))
+    return Change(after, selection, f"{sketch.display_name(vertex.owner)} extended")
 
 
-def split(sketch: Sketch, vertex: Vertex) -> Change:
+def split_wall(sketch: Sketch, vertex: Vertex) -> Change:
     wall = _wall(sketch, vertex)
     if not 0 < vertex.index < len(wall.points) - 1:
         raise MapError("a wall is cut at a vertex between its ends: insert one first")
     halves = wall.points[: vertex.index + 1], wall.points[vertex.index :]
-    pieces = {vertex.of: [replace(wall, points=points) for points in halves]}
-    return replace_obstacles(sketch, pieces, f"{sketch.display_name(vertex.of)} cut in two")
+    pieces = {vertex.owner: [replace(wall, points=points) for points in halves]}
+    return replace_obstacles(sketch, pieces, f"{sketch.display_name(vertex.owner)} cut in two")
 
 
 def _wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
-    place_of(sketch, vertex)
-    wall = sketch.thing(vertex.of)
+    find_position(sketch, vertex)
+    wall = sketch.find_object(vertex.owner)
     if not isinstance(wall, env.WallObstacle):
         raise MapError("that is no wall")
     return wall
 
 
-def joined(sketch: Sketch, selection: Selection) -> Change:
+def join_walls(sketch: Sketch, selection: Selection) -> Change:
     """Join the selected walls by their nearest ends, as wide as the lowest, with the first name and note."""
-    items = selection.items_in(sketch)
+    items = selection.list_items(sketch)
     shapes = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
     require(len(shapes) == len(items) >= 2, "select two or more walls to join, and nothing else")
     chain, *rest = [wall.points for wall in shapes]
@@ -225,7 +238,7 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
     return Change(after, Selection.of(whole.key), f"{len(items)} walls joined")
 
 
-def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
+def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
     """Leave vertices out, to `tolerance` m, by Douglas and Peucker (1973): nothing comes to cross itself."""
     require(0.0 <= tolerance <= MAX_SIZE_M, "expected a tolerance of 0 m or more")
     after, changed = _redrawn(sketch, selection, lambda rings, closed: _simpler(rings, tolerance, closed))
@@ -235,7 +248,7 @@ def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change
     return Change(after, selection.without_vertices(), words)
 
 
-def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
+def straighten(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
     """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
     require(0.0 < degrees <= 30.0, "expected an angle of up to 30 degrees")
     after, changed = _redrawn(
@@ -249,12 +262,14 @@ def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> 
 
 def _redrawn(sketch: Sketch, selection: Selection, redraw: _Redraw) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
     """Redraw what is selected, or all obstacles; return the sketch, and what rings were and became."""
-    chosen = selection.owners if selection.items or selection.boundary else sketch.places.keys()
-    outlines = {each: found for each in sketch.owners if each in chosen and (found := sketch.rings_of(each))}
+    chosen = selection.owners if selection.items or selection.boundary else sketch.index_by_key.keys()
+    outlines = {
+        each: found for each in sketch.owners if each in chosen and (found := sketch.list_rings(each))
+    }
     require(outlines, "select polygons, walls or the boundary first")
     after, changed = sketch, []
     for owner, ((_, _, closed), *_) in outlines.items():
-        rings = sketch.ring_points(owner)
+        rings = sketch.list_vertex_rings(owner)
         new = redraw(rings, closed)
         changed += [pair for pair in zip(rings, new, strict=True) if pair[0] != pair[1]]
         after = after.with_rings(owner, new) if new != rings else after
@@ -289,7 +304,7 @@ def _fewer(ring: Ring, tolerance: float, closed: bool) -> Ring:
 
 
 def _straight(ring: Ring, degrees: float, closed: bool) -> Ring:
-    points = as_array(ring)
+    points = to_array(ring)
     if len(points) < 2:
         return ring
     edges = np.roll(points, -1, axis=0) - points
@@ -307,4 +322,4 @@ def _straight(ring: Ring, degrees: float, closed: bool) -> Ring:
             moved[:, axis] = (ends[0] + ends[1]) / 2
     if closed and (len({tuple(p) for p in moved.tolist()}) < 3 or Polygon(moved).area == 0.0):
         return ring
-    return ring_near(moved)
+    return round_ring(moved)

@@ -13,9 +13,9 @@ from robocov.environment import Point
 from robocov.errors import MapError
 from robocov.mapfile.models import to_json_value
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import angle_to_level, cos_sin
+from robocov_app.editor.model.geometry import compute_cos_sin, compute_levelling_angle
 
-MOST_PIXELS = 64_000_000  # pixels of the largest picture that is taken
+MAX_PIXELS = 64_000_000  # pixels of the largest picture that is taken
 
 
 @dataclass(frozen=True)
@@ -32,23 +32,23 @@ class Background:
     opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5  # from 0, not to be seen, to 1
     shown: bool = True
 
-    def place_of(self, pixel: Point) -> Point:
+    def to_world(self, pixel: Point) -> Point:
         x, y = pixel[0] * self.scale, (self.pixels[1] - pixel[1]) * self.scale
-        cos, sin = cos_sin(self.turn)
+        cos, sin = compute_cos_sin(self.turn)
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
 
     @property
     def corners(self) -> tuple[Point, Point, Point, Point]:
         """Corners, m: lower left, lower right, upper right, upper left."""
         width, height = self.pixels
-        left, right = self.place_of((0, height)), self.place_of((width, height))
-        return left, right, self.place_of((width, 0)), self.place_of((0, 0))
+        left, right = self.to_world((0, height)), self.to_world((width, height))
+        return left, right, self.to_world((width, 0)), self.to_world((0, 0))
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         return {name: to_json_value(value) for name, value in asdict(self).items()} | {"shown": self.shown}
 
     @classmethod
-    def of_document(cls, document: Any) -> "Background | None":
+    def from_document(cls, document: Any) -> "Background | None":
         """Return the picture that stands in a map; None where that is something else."""
         if not isinstance(document, dict) or set(document) != {item.name for item in fields(cls)}:
             return None
@@ -56,21 +56,21 @@ class Background:
             found = _ADAPTER.validate_json(json.dumps(document), strict=True)
         except ValidationError:
             return None
-        return found if math.prod(found.pixels) <= MOST_PIXELS else None
+        return found if math.prod(found.pixels) <= MAX_PIXELS else None
 
 
 _ADAPTER = TypeAdapter(Background)
 
 
-def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
+def create_background(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
     """Return a picture just taken, so many metres wide, its lower left corner in the origin."""
-    if min(pixels) < 1 or math.prod(pixels) > MOST_PIXELS:
-        wanted = f"expected 1 to {MOST_PIXELS // 1_000_000} million pixels"
+    if min(pixels) < 1 or math.prod(pixels) > MAX_PIXELS:
+        wanted = f"expected 1 to {MAX_PIXELS // 1_000_000} million pixels"
         raise MapError(f"the picture has {pixels[0]} x {pixels[1]} pixels: {wanted}")
     return Background(path, pixels, width / pixels[0])
 
 
-def to_scale(background: Background, a: Point, b: Point, metres: float) -> Background:
+def scale_to_length(background: Background, a: Point, b: Point, metres: float) -> Background:
     """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays."""
     require(0.0 < metres < math.inf, "the length between the two points must be above 0 m")
     _require_apart(background, a, b)
@@ -82,14 +82,14 @@ def to_scale(background: Background, a: Point, b: Point, metres: float) -> Backg
     return replace(background, scale=background.scale * factor, corner=moved)
 
 
-def levelled(background: Background, a: Point, b: Point) -> Background:
+def level_background(background: Background, a: Point, b: Point) -> Background:
     _require_apart(background, a, b)
-    return turned(background, angle_to_level(a, b), a)
+    return rotate_background(background, compute_levelling_angle(a, b), a)
 
 
-def turned(background: Background, degrees: float, about: Point) -> Background:
+def rotate_background(background: Background, degrees: float, about: Point) -> Background:
     """Return the picture turned counter-clockwise about a place, m."""
-    cos, sin = cos_sin(degrees)
+    cos, sin = compute_cos_sin(degrees)
     dx, dy = background.corner[0] - about[0], background.corner[1] - about[1]
     corner = about[0] + cos * dx - sin * dy, about[1] + sin * dx + cos * dy
     return replace(background, corner=corner, turn=math.remainder(background.turn + degrees, 360.0))
@@ -111,7 +111,7 @@ _Names: TypeAlias = Sequence[str | None]  # of the obstacles
 _LOST = "notes of obstacles that are gone"
 
 
-def annotated(extra: _Keys, marks: _Marks, names: _Names, background: Background | None) -> dict[str, Any]:
+def write_marks(extra: _Keys, marks: _Marks, names: _Names, background: Background | None) -> dict[str, Any]:
     """Return the free keys of a map, `extra`, with the editor's; marks come by the place of an obstacle."""
     ours: dict[str, Any] = {}
     for key, kept in _LISTS.items():
@@ -120,20 +120,20 @@ def annotated(extra: _Keys, marks: _Marks, names: _Names, background: Background
             if held := {name: marks[k][name] for name in kept if name in marks[k]}:
                 ours.setdefault(key, []).append({**of, **held})
     if background is not None:
-        ours["background"] = background.document()
+        ours["background"] = background.to_document()
     if not ours:
         return dict(extra)
     home = next(key for key in _homes() if _is_free(extra.get(key, {})))
     return {**extra, home: {**extra.get(home, {}), **ours}}
 
 
-def taken_apart(extra: _Keys, names: _Names) -> tuple[_Marks, Background | None, dict[str, Any]]:
+def read_marks(extra: _Keys, names: _Names) -> tuple[_Marks, Background | None, dict[str, Any]]:
     """Return marks by the place of their obstacle, the picture, and the free keys of everybody else."""
     for home in islice(_homes(), len(extra) + 1):
         held = extra.get(home)
         if not isinstance(held, dict) or _is_free(held):
             continue
-        background = Background.of_document(held.get("background"))
+        background = Background.from_document(held.get("background"))
         sound = all(_are_entries(held.get(key, []), kept) for key, kept in _LISTS.items())
         if not sound or ("background" in held and background is None):
             continue

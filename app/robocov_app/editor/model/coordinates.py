@@ -10,7 +10,7 @@ from robocov.environment import Point
 from robocov.errors import MapError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import cos_sin
+from robocov_app.editor.model.geometry import compute_cos_sin
 
 _METRIC = {"": 1.0, "m": 1.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
 _UNITS = _METRIC | {"in": 0.0254, '"': 0.0254, "ft": 0.3048, "'": 0.3048}
@@ -23,7 +23,7 @@ _POINTS = "type x and y in metres, such as 3.2 1.5, relative as +0.5 0 or @2<45"
 _SIZES = "type width and height in metres, such as 3 x 2"
 
 
-def length_of(text: str, *, now: float | None = None) -> float:
+def parse_length(text: str, *, now: float | None = None) -> float:
     """Return a length, m: ``3,2``, ``1200 mm``, ``4'6"``; from `now` also ``+0.5``, ``/2``, ``50%``."""
     typed = _clean(text)
     sign = typed[:1]
@@ -37,7 +37,7 @@ def length_of(text: str, *, now: float | None = None) -> float:
     return _limited(_wanted(_length(typed), text, _LENGTHS) + relative, text)
 
 
-def point_of(text: str, *, last: Point | None = None) -> Point:
+def parse_point(text: str, *, last: Point | None = None) -> Point:
     """Return a place, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``; from `last` ``@2<45``, ``+0.5 0``."""
     typed = _clean(text)
     relative = typed[:1] in ("@", "+")
@@ -54,7 +54,7 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
     return _exact(x), _exact(y)
 
 
-def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point:
+def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Point:
     """Return the next point of a line: as `point_of`, a length towards the cursor, or its own at ``<45``."""
     typed = _clean(text)
     if last is not None and towards is not None:
@@ -67,10 +67,10 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
             length = _limited(length, text)
             require(away != 0.0, f"{quote(text)}: point the cursor where the line is to go")
             return _exact(last[0] + dx / away * length), _exact(last[1] + dy / away * length)
-    return point_of(text, last=last)
+    return parse_point(text, last=last)
 
 
-def size_of(text: str) -> tuple[float, float]:
+def parse_size(text: str) -> tuple[float, float]:
     """Return width and height in metres: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both."""
     typed = _clean(text)
     both = _length(typed)
@@ -80,7 +80,7 @@ def size_of(text: str) -> tuple[float, float]:
     return _limited(width, text), _limited(height, text)
 
 
-def angle_of(text: str) -> float:
+def parse_angle(text: str) -> float:
     """Return an angle in degrees: ``45``, ``45°``, ``-90``, ``0.5rad``."""
     return _wanted(_angle(_clean(text)), text, "type an angle in degrees, such as 45")
 
@@ -128,7 +128,7 @@ def _angle(typed: str) -> float:
 
 
 def _polar(length: float, degrees: float, text: str) -> tuple[float, float]:
-    cos, sin = cos_sin(_wanted(degrees, text, _POINTS))
+    cos, sin = compute_cos_sin(_wanted(degrees, text, _POINTS))
     return _wanted(length, text, _POINTS) * cos, length * sin
 
 

@@ -15,9 +15,9 @@ from robocov.errors import MapError, OutputError, format_count, to_one_line
 from robocov.files.strictjson import read_bytes
 from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import list_bundled_maps, load_map
-from robocov_app.editor.model.parser import parse_sketch, sketch_of
+from robocov_app.editor.model.parser import build_sketch, parse_sketch
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
+from robocov_app.editor.model.sketch import Sketch, dump_sketch, to_document
 from robocov_app.storage import autosave
 
 
@@ -37,17 +37,17 @@ class History:
         self._done: list[_Step] = []
         self._undone: list[_Step] = []
         self.saved = sketch if saved else None  # what the file holds; None where that is none of it
-        self.broken = False  # whether the next change stands alone, as after the mouse was released
+        self.starts_new_step = False  # whether the next change stands alone, as after the mouse was released
 
-    def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
+    def apply(self, change: Change, *, drag: Hashable | None = None) -> bool:
         """Take a change, merged with the last of the same `drag`; return whether it changed anything."""
-        before, done = Change(self.sketch, self.selection, change.words), self._done
-        merges = drag is not None and not self.broken and bool(done) and done[-1].drag == drag
-        self.broken, self.selection = False, change.selection
+        before, done = Change(self.sketch, self.selection, change.description), self._done
+        merges = drag is not None and not self.starts_new_step and bool(done) and done[-1].drag == drag
+        self.starts_new_step, self.selection = False, change.selection
         if change.sketch == self.sketch:
             return False
         if merges:
-            before = replace(done.pop().before, words=change.words)
+            before = replace(done.pop().before, description=change.description)
         self.sketch, self._undone = change.sketch, []
         if change.sketch != before.sketch:
             done.append(_Step(before, change, drag))
@@ -68,10 +68,10 @@ class History:
 
     def _go_to(self, state: Change) -> Change:
         self.sketch, self.selection = state.sketch, state.selection
-        self.broken = True
+        self.starts_new_step = True
         return state
 
-    def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
+    def rewrite_all(self, change: Callable[[Sketch], Sketch]) -> None:
         """Change the sketch as it is and at every step, without a step of its own."""
         steps = [*self._done, *self._undone]
         sketches = [self.sketch, *(state.sketch for step in steps for state in (step.before, step.after))]
@@ -83,12 +83,12 @@ class History:
         self.sketch = new[id(self.sketch)]
 
     @property
-    def past(self) -> tuple[str, ...]:
-        return tuple(step.after.words for step in reversed(self._done))
+    def undo_descriptions(self) -> tuple[str, ...]:
+        return tuple(step.after.description for step in reversed(self._done))
 
     @property
-    def future(self) -> tuple[str, ...]:
-        return tuple(step.after.words for step in reversed(self._undone))
+    def redo_descriptions(self) -> tuple[str, ...]:
+        return tuple(step.after.description for step in reversed(self._undone))
 
     def save_point(self) -> Callable[[], None]:
         """Return a function that takes everything back to the present state."""
@@ -103,10 +103,10 @@ class History:
 
     def mark_saved(self) -> None:
         self.saved = self.sketch
-        self.broken = True
+        self.starts_new_step = True
 
     @property
-    def unsaved(self) -> bool:
+    def has_unsaved_changes(self) -> bool:
         """Whether something would be lost; undoing back to what was saved makes it false again."""
         return self.saved is not self.sketch and self.saved != self.sketch
 
@@ -134,10 +134,10 @@ class Autosave:
     obstacles: int
     disk: OnDisk | None  # what the file was like when it was read or written last
 
-    def sketch(self) -> Sketch:
-        return sketch_of(autosave.read_draft(self.folder, KIND).content.get("sketch"), str(self.folder))
+    def read_sketch(self) -> Sketch:
+        return build_sketch(autosave.read_draft(self.folder, KIND).content.get("sketch"), str(self.folder))
 
-    def words(self, now: datetime | None = None) -> str:
+    def describe(self, now: datetime | None = None) -> str:
         """Return what to offer: "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
         now = now or datetime.now().astimezone()
         day = {0: "today", 1: "yesterday"}.get((now.date() - self.when.date()).days, f"{self.when:%Y-%m-%d}")
@@ -146,9 +146,9 @@ class Autosave:
         return f"{what}, {day} {self.when:%H:%M}, {where}"
 
 
-def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
+def build_record(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
     file = disk and {"digest": disk.digest, "stamp": list(disk.stamp)}
-    return {"disk": file, "sketch": draft_document(sketch)}
+    return {"disk": file, "sketch": to_document(sketch)}
 
 
 def _autosave(record: autosave.Draft) -> Autosave | None:
@@ -156,9 +156,9 @@ def _autosave(record: autosave.Draft) -> Autosave | None:
     kept, path, disk = record.content.get("sketch"), record.path, record.content.get("disk")
     if kept is None:
         return None
-    sketch = sketch_of(kept, str(record.folder))
+    sketch = build_sketch(kept, str(record.folder))
     with suppress(MapError):
-        if path is not None and read_bytes(path) == sketch_text(sketch).encode():
+        if path is not None and read_bytes(path) == dump_sketch(sketch).encode():
             return None
     known = None
     try:
@@ -170,9 +170,9 @@ def _autosave(record: autosave.Draft) -> Autosave | None:
     return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
 
 
-recoverable = partial(autosave.find_drafts, kind=KIND, read=_autosave)
-opened_elsewhere = partial(autosave.is_open_elsewhere, kind=KIND)  # asked by `path=`
-State: TypeAlias = Literal["same", "changed", "gone"]
+find_recoverable = partial(autosave.find_drafts, kind=KIND, read=_autosave)
+is_open_elsewhere = partial(autosave.is_open_elsewhere, kind=KIND)  # asked by `path=`
+FileState: TypeAlias = Literal["same", "changed", "gone"]
 
 
 class ChangedError(OutputError):
@@ -189,12 +189,12 @@ def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
 
 def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
     """Write a file whole or not at all; ChangedError, unless `over`, when it is not as it was `before`."""
-    path, text = path.absolute(), sketch_text(sketch).encode()
+    path, text = path.absolute(), dump_sketch(sketch).encode()
     resolve_target(path)
     ours = before if before is not None and before.path == path else None
     if not over and ours is None and _stamp(path) is not None:
         raise ChangedError(f"{to_one_line(path)}: there is such a file already")
-    if not over and ours is not None and state_of(ours) == "changed":
+    if not over and ours is not None and check_file(ours) == "changed":
         what = "has been changed by something else since it was opened or saved here"
         raise ChangedError(f"{to_one_line(path)}: {what}")
     with replace_file(path) as part:
@@ -202,7 +202,7 @@ def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, ov
     return OnDisk(path, sha256(text).hexdigest(), _stamp(path) or (-1, 0))
 
 
-def state_of(before: OnDisk) -> State:
+def check_file(before: OnDisk) -> FileState:
     """Return whether a file is still as it was, quickly; one that was merely touched is the same."""
     stamp = _stamp(before.path)
     if stamp in (None, before.stamp):
@@ -223,7 +223,7 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     return None
 
 
-FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
+DEFAULT_BOUNDARY = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
 SUFFIX = ".json"
 _LOOKED_AGAIN = 1.0  # seconds between two looks at the file
 
@@ -244,20 +244,20 @@ class Document:
     ) -> None:
         self.history = History(sketch, saved=saved)
         self.path, self.disk, self.stem = path, disk, stem  # stem: of a map without a file
-        self.state: State = "same"
+        self.file_state: FileState = "same"
         self._looked, self._over = 0.0, False
         self.autosaver = autosave.Autosaver(drafts, KIND, path, resumed)
         self.flush, self.close = self.autosaver.flush, self.autosaver.close
         self._kept: Sketch | None = sketch if saved else None
-        self.keep()
+        self.keep_aside()
 
     @classmethod
     def new(cls, drafts: Path | None, path: Path | None = None) -> Self:
         """Return an empty map with the boundary that is offered; `path` is not there yet."""
-        return cls(Sketch(boundary=FIRST_SHEET), drafts, path)
+        return cls(Sketch(boundary=DEFAULT_BOUNDARY), drafts, path)
 
     @classmethod
-    def opened(cls, path: Path, drafts: Path | None) -> Self:
+    def open_file(cls, path: Path, drafts: Path | None) -> Self:
         """Return the map in a file; one that comes with robocov as a copy, which has no file yet."""
         sketch, disk = read_sketch(path)
         if is_bundled(path):
@@ -265,14 +265,14 @@ class Document:
         return cls(sketch, drafts, path.resolve(), disk)
 
     @classmethod
-    def recovered(cls, kept: Autosave, drafts: Path | None) -> Self:
-        return cls(kept.sketch(), drafts, kept.path, kept.disk, resumed=kept.folder, saved=False)
+    def recover(cls, kept: Autosave, drafts: Path | None) -> Self:
+        return cls(kept.read_sketch(), drafts, kept.path, kept.disk, resumed=kept.folder, saved=False)
 
     @property
     def title(self) -> str:
         return self.path.name if self.path is not None else self.stem or self.history.sketch.name
 
-    def suggested(self, folder: Path) -> Path:
+    def suggest_path(self, folder: Path) -> Path:
         if self.path is not None:
             return self.path
         stem = self.stem or "-".join(self.history.sketch.name.lower().split()) or "map"
@@ -280,11 +280,11 @@ class Document:
         names = chain([stem], (f"{stem}-{k}" for k in count(1)))
         return next(path for name in names if not (path := folder / f"{name}{SUFFIX}").exists())
 
-    def spoils(self, path: Path) -> bool:
+    def would_spoil(self, path: Path) -> bool:
         with suppress(MapError):
             load_map(_with_suffix(path))
             try:
-                self.history.sketch.environment()
+                self.history.sketch.build_environment()
             except MapError:
                 return True
         return False
@@ -294,50 +294,50 @@ class Document:
         path = _with_suffix(path)
         if is_bundled(path):
             raise MapError(f"{path.name} comes with robocov and stays as it is: expected another name")
-        named = self.history.sketch.named(path.stem)
+        named = self.history.sketch.with_default_name(path.stem)
         before = self.disk if path == self.path else None
         self.disk = write_sketch(named, path, before, over=over or (self._over and path == self.path))
         if named is not self.history.sketch:
-            self.history.replace_all(lambda sketch: sketch.named(path.stem))
+            self.history.rewrite_all(lambda sketch: sketch.with_default_name(path.stem))
         self.path = path
         self._settle()
         return f"saved: {path}"
 
-    def keep(self) -> None:
+    def keep_aside(self) -> None:
         before, self._kept = self._kept, self.history.sketch
-        if before is not self._kept and self.history.unsaved:
-            self.autosaver.save_draft(partial(content, self._kept, self.disk))
+        if before is not self._kept and self.history.has_unsaved_changes:
+            self.autosaver.save_draft(partial(build_record, self._kept, self.disk))
         elif before is not self._kept:
             self.autosaver.mark_saved(self.path)
 
     def keep_draft(self, sketch: Sketch) -> None:
         """Keep a draft of a sketch that is no part of the history yet, until the next `keep`."""
         self._kept = sketch
-        self.autosaver.save_draft(partial(content, sketch, self.disk))
+        self.autosaver.save_draft(partial(build_record, sketch, self.disk))
 
-    def look(self, now: float) -> State:
+    def check_disk(self, now: float) -> FileState:
         """Return whether the file has changed on the disk, news only once; `now` is any clock, s."""
         if self.disk is None or now - self._looked < _LOOKED_AGAIN:
             return "same"
         self._looked = now
-        before, self.state = self.state, state_of(self.disk)
-        if self.state in ("same", before):
+        before, self.file_state = self.file_state, check_file(self.disk)
+        if self.file_state in ("same", before):
             return "same"
         self.history.saved = None
-        return self.state
+        return self.file_state
 
     def reload(self) -> None:
         """Take the document as its file is now; that is an edit, which can be undone."""
         assert self.path is not None
         sketch, self.disk = read_sketch(self.path)
-        self.history.do(Change(sketch, Selection(), "read again from the file"))
+        self.history.apply(Change(sketch, Selection(), "read again from the file"))
         self._settle()
 
-    def keep_mine(self) -> None:
+    def ignore_disk_change(self) -> None:
         self._over = True
 
     def _settle(self) -> None:
-        self.state, self._over = "same", False
+        self.file_state, self._over = "same", False
         self.history.mark_saved()
         self._kept = self.history.sketch
         self.autosaver.mark_saved(self.path)

@@ -15,28 +15,28 @@ from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
-ANGLE = 15.0  # degrees: with Shift, lines are drawn at multiples of this
+SHIFT_ANGLE_DEG = 15.0  # degrees: with Shift, lines are drawn at multiples of this
 DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimetre
 distance = math.dist
 
 
-def tenths(length: float) -> float:
+def round_length(length: float) -> float:
     """Return a length to the tenth of a millimetre, never minus zero."""
     return round(float(length), DECIMALS) + 0.0
 
 
-def rounded(point: Iterable[float]) -> Point:
+def round_point(point: Iterable[float]) -> Point:
     x, y = point
-    return tenths(x), tenths(y)
+    return round_length(x), round_length(y)
 
 
-def as_array(points: Sequence[Point] | Array) -> Array:
+def to_array(points: Sequence[Point] | Array) -> Array:
     return np.asarray(points, dtype=float).reshape(-1, 2)
 
 
-def ring_near(points: Sequence[Point] | Array) -> Ring:
+def round_ring(points: Sequence[Point] | Array) -> Ring:
     """Return points to the tenth of a millimetre; MapError where one is farther than maps reach."""
-    found = as_array(points)
+    found = to_array(points)
     limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
     require(
         np.all(np.abs(found) <= MAX_COORDINATE_M), f"that is too far away: {limit}"
@@ -44,11 +44,11 @@ def ring_near(points: Sequence[Point] | Array) -> Ring:
     return tuple([(x, y) for x, y in (np.round(found, DECIMALS) + 0.0).tolist()])
 
 
-def point_near(point: Point) -> Point:
-    return ring_near([point])[0]
+def check_point(point: Point) -> Point:
+    return round_ring([point])[0]
 
 
-def distinct(ring: Iterable[Point], *, closed: bool = True) -> Ring:
+def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
     """Return points without those that repeat the one before; in a closed ring the first follows the last."""
     kept = [point for point, _ in groupby(ring)]
     if closed and len(kept) > 1 and kept[0] == kept[-1]:
@@ -56,7 +56,7 @@ def distinct(ring: Iterable[Point], *, closed: bool = True) -> Ring:
     return tuple(kept)
 
 
-def nearest_on(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
+def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
     """Return for k edges the (k, 2) places that are nearest to a point, and their (k,) distances from it."""
     along = ends - starts
     squared = np.einsum("kd,kd->k", along, along)
@@ -65,7 +65,7 @@ def nearest_on(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
     return feet, np.hypot(*(feet - point).T)
 
 
-def cos_sin(degrees: float) -> tuple[float, float]:
+def compute_cos_sin(degrees: float) -> tuple[float, float]:
     """Return cosine and sine of an angle, exact at quarters of a turn."""
     quarters, rest = divmod(degrees, 90.0)
     if rest == 0.0:
@@ -73,37 +73,37 @@ def cos_sin(degrees: float) -> tuple[float, float]:
     return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
 
-def bearing(a: Point, b: Point) -> float:
+def compute_bearing(a: Point, b: Point) -> float:
     """Return the direction from one point to another, degrees counter-clockwise from the x axis."""
     return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
 
 
-def angle_to_level(a: Point, b: Point) -> float:
+def compute_levelling_angle(a: Point, b: Point) -> float:
     """Return by how many degrees a line has to be turned to be level or upright, whichever is nearer."""
-    return 90.0 * round(bearing(a, b) / 90.0) - bearing(a, b)
+    return 90.0 * round(compute_bearing(a, b) / 90.0) - compute_bearing(a, b)
 
 
-def at_round_angle(origin: Point, point: Point) -> Point:
+def constrain_angle(origin: Point, point: Point) -> Point:
     """Return the point on the nearest line at a multiple of `ANGLE` degrees through another."""
-    cos, sin = cos_sin(ANGLE * round(bearing(origin, point) / ANGLE))
+    cos, sin = compute_cos_sin(SHIFT_ANGLE_DEG * round(compute_bearing(origin, point) / SHIFT_ANGLE_DEG))
     along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
     return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0
 
 
-def rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
+def build_rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
     return a, (b[0], a[1]), b, (a[0], b[1])
 
 
-def middle_of(box: Box) -> Point:
+def compute_centre(box: Box) -> Point:
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
 
 
-def box_around(boxes: Iterable[Box]) -> Box:
+def enclose_boxes(boxes: Iterable[Box]) -> Box:
     low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
     return min(low_x), min(low_y), max(high_x), max(high_y)
 
 
-def outlines(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
+def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
     """Return the polygons of a geometry, to tenths of a millimetre, the largest first, without crumbs."""
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
@@ -111,7 +111,7 @@ def outlines(geometry: shapely.Geometry, name: str | None = None) -> tuple[Polyg
     found = []
     for part in map(shapely.orient_polygons, parts):
         rings = [part.exterior, *(hole for hole in part.interiors if not _is_crumb(hole))]
-        outline, *holes = [tuple(map(rounded, ring.coords[:-1])) for ring in rings]
+        outline, *holes = [tuple(map(round_point, ring.coords[:-1])) for ring in rings]
         found.append(PolygonObstacle(outline, tuple(holes), name))
     return tuple(found)
 
@@ -121,20 +121,20 @@ def _is_crumb(part: shapely.Geometry) -> bool:
     return not min(high_x - low_x, high_y - low_y) >= MIN_SIZE_M  # of what is empty these are no numbers
 
 
-def bearing_words(a: Point, b: Point) -> str:
+def format_bearing(a: Point, b: Point) -> str:
     """Return length and direction from one point to another: "2.40 m  ∠ 90°"."""
-    angle = bearing(a, b)
+    angle = compute_bearing(a, b)
     shown = 0.0 if abs(angle) < 0.05 else angle
-    return f"{length_words(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
+    return f"{format_length(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
 
 
-def length_words(metres: float) -> str:
+def format_length(metres: float) -> str:
     """Return a length as it stands beside the cursor: "2.3 cm", "12.35 m", "1234.5 m"."""
     if metres < 0.1:
         return f"{100 * metres:.1f} cm"
     return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"
 
 
-def point_words(point: Point) -> str:
+def format_point(point: Point) -> str:
     x, y = (round(value, 2) + 0.0 for value in point)  # never minus zero
     return f"({x:.2f}, {y:.2f}) m"

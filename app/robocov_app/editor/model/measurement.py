@@ -10,9 +10,9 @@ from shapely import LineString, MultiPolygon, Polygon
 from robocov.arrays import Array, IntArray
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, find_narrowest_gap
-from robocov_app.editor.model.geometry import middle_of
+from robocov_app.editor.model.geometry import compute_centre
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.editor.model.validation import Problem, examined, place_words
+from robocov_app.editor.model.validation import Problem, find_problems, format_position
 from robocov_app.jobs.messages import Line, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 
@@ -39,9 +39,9 @@ class Measurement:
 
 def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
     """Measure a sketch for robots of a radius, m; a broken one as far as its free space can be made out."""
-    found, free = examined(sketch, radius)
+    found, free = find_problems(sketch, radius)
     narrow = find_narrow_gaps(free, 2.0 * radius - _EXACTLY)
-    reached, untouched = reach_of(free, radius)
+    reached, untouched = compute_reach(free, radius)
     discs = [shapely.Point(_middle(gap)).buffer(gap.width / 2) for gap in narrow]
     marks = _polygons(shapely.union_all([*discs, untouched]) & free)
     sealed = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
@@ -59,13 +59,13 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
         gap=narrow[0] if narrow else find_narrowest_gap(free),
         impassable=MultiPolygon(marks),
         sealed=sealed,
-        vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in sketch.rings_of(owner)),
+        vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in sketch.list_rings(owner)),
         problems=tuple(problems),
         radius=radius,
     )
 
 
-def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry, ...], MultiPolygon]:
+def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry, ...], MultiPolygon]:
     """Return what a robot sweeps from anywhere in each part that it can drive in, and what it never touches.
 
     Swept parts, the largest first, are the connected pieces of the free space's opening by the robot's disc.
@@ -110,7 +110,7 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
 
 
 def _middle(gap: Gap) -> Point:
-    return middle_of((*gap.between[0], *gap.between[1]))
+    return compute_centre((*gap.between[0], *gap.between[1]))
 
 
 def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
@@ -118,12 +118,12 @@ def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) ->
     found: dict[int, Problem] = {}
     tree, narrows = shapely.STRtree(marks), f"too narrow for robots of radius {radius:g} m"
     for gap in narrow:
-        words = f"the gap at {place_words(*_middle(gap))} is {gap.width:.3g} m wide: {narrows}"
+        words = f"the gap at {format_position(*_middle(gap))} is {gap.width:.3g} m wide: {narrows}"
         mark = int(tree.nearest(shapely.Point(_middle(gap))))
         found.setdefault(mark, Problem(words, LineString(gap.between), None, False, "narrow"))
     problems = list(found.values())
     if more := problems[_MOST_GAPS:]:
-        where = shapely.union_all([problem.where for problem in more])
+        where = shapely.union_all([problem.geometry for problem in more])
         problems[_MOST_GAPS:] = [Problem(f"{len(more)} more gaps are {narrows}", where, None, False)]
     return problems
 
@@ -149,7 +149,7 @@ class MeasurementWire(Wire):
         return replace(sketch, obstacles=changed), tuple(self._known), radius
 
 
-class Measuring:
+class SketchMeasurer:
     """Measures sketches of which it is told what is new."""
 
     failing = "the map could not be measured"
@@ -164,8 +164,8 @@ class Measuring:
         return measure(replace(sketch, obstacles=tuple(self._known.values())), questions[-1][2])
 
 
-def measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
+def create_measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
     """Return what measures sketches, asked by (sketch, radius), in another process or at once in this one."""
     if direct:
-        return DirectWorker(Measuring(), MeasurementWire())
-    return LatestWorker(f"{__name__}:{Measuring.__name__}", "measures the map", MeasurementWire)
+        return DirectWorker(SketchMeasurer(), MeasurementWire())
+    return LatestWorker(f"{__name__}:{SketchMeasurer.__name__}", "measures the map", MeasurementWire)

@@ -21,7 +21,7 @@ from robocov.files.documents import check_header
 from robocov.files.strictjson import locate_mistakes, parse_json, require_json
 from robocov.mapfile import parse_density
 from robocov.mapfile.models import FORMAT, VERSION, MapModel
-from robocov_app.editor.model.background import taken_apart
+from robocov_app.editor.model.background import read_marks
 from robocov_app.editor.model.sketch import KINDS, Item, Sketch
 
 _MAP = [field.alias or name for name, field in MapModel.model_fields.items()]
@@ -40,12 +40,12 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
     """Return the sketch in the text of a file; messages call it `where`, and `folder` holds its pictures."""
     document = parse_json(text, where)
     try:
-        return sketch_of(document, where, folder)
+        return build_sketch(document, where, folder)
     except MapError as error:
         raise locate_mistakes(error, text, where) from None
 
 
-def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
+def build_sketch(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
     """Return the sketch in a parsed document, whatever rule it breaks; MapError where it is no map at all."""
     where = to_one_line(where)
     require_json(document, where)
@@ -56,7 +56,7 @@ def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> 
     shapes = [reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)]
     starts = reader.typed(dict, members.get("starts", {}), ("starts",), "an object")
     extra = reader.typed(dict, members.get("extra", {}), ("extra",), "an object")
-    marks, background, others = taken_apart(extra, [shape.name for shape in shapes])
+    marks, background, others = read_marks(extra, [shape.name for shape in shapes])
     boundary, schema, density = (members.get(key) for key in ("boundary", "$schema", "density"))
     boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
     return Sketch(

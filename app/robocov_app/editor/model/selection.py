@@ -16,7 +16,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 class Vertex:
     """A point of something that can be dragged."""
 
-    of: Owner  # key of an obstacle, `BOUNDARY`, or name of a start
+    owner: Owner  # key of an obstacle, `BOUNDARY`, or name of a start
     ring: int  # 0 for the outline, or a wall's line; 1, 2, ... for the holes of a polygon
     index: int  # in the ring; of a disc: 0 the centre, 1 to 4 its rim in the east, north, west, south
 
@@ -47,32 +47,32 @@ class Selection:
         return cls(items, starts=starts, boundary=BOUNDARY in owners)
 
     @classmethod
-    def all(cls, sketch: Sketch) -> Selection:
+    def select_all(cls, sketch: Sketch) -> Selection:
         """Return the selection of every obstacle that is not locked or hidden, every start, the boundary."""
-        shut = frozenset(item.key for item in sketch.obstacles if not item.takeable)
-        return cls.of(*(owner for owner in sketch.owners if owner not in shut)).within(sketch)
+        shut = frozenset(item.key for item in sketch.obstacles if not item.is_selectable)
+        return cls.of(*(owner for owner in sketch.owners if owner not in shut)).restrict_to(sketch)
 
     @property
     def owners(self) -> frozenset[Owner]:
         return self.items | self.starts | ({BOUNDARY} if self.boundary else frozenset())
 
-    def items_in(self, sketch: Sketch) -> list[Item]:
+    def list_items(self, sketch: Sketch) -> list[Item]:
         """Return the selected obstacles, the lowest first."""
         return [item for item in sketch.obstacles if item.key in self.items]
 
-    def plus(self, other: Selection) -> Selection:
+    def union(self, other: Selection) -> Selection:
         items, starts = self.items | other.items, self.starts | other.starts
         return Selection(items, self.vertices | other.vertices, starts, self.boundary or other.boundary)
 
-    def toggled(self, other: Selection) -> Selection:
+    def toggle(self, other: Selection) -> Selection:
         """Return the selection after a click with Shift: what is in both goes, the rest of `other` comes."""
         items, starts = self.items ^ other.items, self.starts ^ other.starts
         return Selection(items, self.vertices ^ other.vertices, starts, self.boundary != other.boundary)
 
-    def within(self, sketch: Sketch) -> Selection:
+    def restrict_to(self, sketch: Sketch) -> Selection:
         """Return what of the selection there is in a sketch, as after undoing."""
-        items, starts = self.items & sketch.places.keys(), self.starts & dict(sketch.starts).keys()
-        vertices = frozenset(vertex for vertex in self.vertices if exists(sketch, vertex))
+        items, starts = self.items & sketch.index_by_key.keys(), self.starts & dict(sketch.starts).keys()
+        vertices = frozenset(vertex for vertex in self.vertices if has_vertex(sketch, vertex))
         return Selection(items, vertices, starts, self.boundary and sketch.boundary is not None)
 
     def without_vertices(self) -> Selection:
@@ -80,11 +80,11 @@ class Selection:
 
     def with_groups(self, sketch: Sketch) -> Selection:
         """Return the selection with the members of all its groups, but for the locked and the hidden."""
-        groups = {sketch.item(key).group for key in self.items} - {""}
-        members = {item.key for item in sketch.obstacles if item.group in groups and item.takeable}
+        groups = {sketch.get_item(key).group for key in self.items} - {""}
+        members = {item.key for item in sketch.obstacles if item.group in groups and item.is_selectable}
         return replace(self, items=self.items | members)
 
-    def words(self, sketch: Sketch) -> str:
+    def describe(self, sketch: Sketch) -> str:
         """Return what people call it: "wall “west”", "3 obstacles", "2 vertices"."""
         owners, vertices = self.owners, len(self.vertices)
         if sum(map(bool, (self.items, self.starts, self.boundary, vertices))) > 1:
@@ -102,20 +102,20 @@ class Change:
 
     sketch: Sketch
     selection: Selection
-    words: str
+    description: str
 
 
-def numbered_name(sketch: Sketch, owner: Owner) -> str:
+def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
     """Return a name that tells things apart: obstacles without a name by their number, "wall 17"."""
     name = sketch.display_name(owner)
-    if isinstance(owner, str) or owner == BOUNDARY or sketch.item(owner).shape.name:
+    if isinstance(owner, str) or owner == BOUNDARY or sketch.get_item(owner).shape.name:
         return name
-    return f"{name} {sketch.places[owner] + 1}"
+    return f"{name} {sketch.index_by_key[owner] + 1}"
 
 
 def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], words: str) -> Change:
     """Return the change that puts shapes, none or several, in the place of some obstacles."""
-    fresh = sketch.fresh_key
+    fresh = sketch.next_key
     items: list[Item] = []
     keys: list[int] = []
     for item in sketch.obstacles:
@@ -129,17 +129,17 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], 
     return Change(replace(sketch, obstacles=tuple(items)), Selection.of(*keys), words)
 
 
-def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
-    rings = enumerate(sketch.ring_points(owner))
+def list_vertices(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
+    rings = enumerate(sketch.list_vertex_rings(owner))
     return tuple((Vertex(owner, ring, k), at) for ring, points in rings for k, at in enumerate(points))
 
 
-def exists(sketch: Sketch, vertex: Vertex) -> bool:
-    rings = sketch.ring_points(vertex.of)
+def has_vertex(sketch: Sketch, vertex: Vertex) -> bool:
+    rings = sketch.list_vertex_rings(vertex.owner)
     return 0 <= vertex.ring < len(rings) and 0 <= vertex.index < len(rings[vertex.ring])
 
 
-def place_of(sketch: Sketch, vertex: Vertex) -> Point:
+def find_position(sketch: Sketch, vertex: Vertex) -> Point:
     """Return where a vertex is, m; MapError when there is none."""
-    require(exists(sketch, vertex), "there is no such vertex any more")
-    return sketch.ring_points(vertex.of)[vertex.ring][vertex.index]
+    require(has_vertex(sketch, vertex), "there is no such vertex any more")
+    return sketch.list_vertex_rings(vertex.owner)[vertex.ring][vertex.index]

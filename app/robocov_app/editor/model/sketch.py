@@ -14,8 +14,8 @@ from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import to_one_line
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
-from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
-from robocov_app.editor.model.geometry import Box, as_array
+from robocov_app.editor.model.background import MARKS, Background, read_marks, write_marks
+from robocov_app.editor.model.geometry import Box, to_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
 _LINES = {env.WallObstacle: "points", env.PointsStart: "positions"}
@@ -38,10 +38,10 @@ class Item:
     @cached_property
     def geometry(self) -> shapely.Geometry:
         """Covered area as a valid shapely geometry, m: a line or a point where it covers nothing."""
-        return geometry_of(self.shape)
+        return build_geometry(self.shape)
 
     @property
-    def takeable(self) -> bool:
+    def is_selectable(self) -> bool:
         return not (self.locked or self.hidden)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -70,7 +70,7 @@ class Sketch:
     def from_environment(cls, environment: env.Environment) -> Self:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
         shapes, free_keys = environment.obstacles, dict(environment.extra)
-        marks, background, extra = taken_apart(free_keys, [shape.name for shape in shapes])
+        marks, background, extra = read_marks(free_keys, [shape.name for shape in shapes])
         return cls(
             boundary=environment.boundary,
             obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
@@ -80,11 +80,11 @@ class Sketch:
             **{name: getattr(environment, name) for name in _SHARED},
         )
 
-    def environment(self, where: str = "map") -> env.Environment:
+    def build_environment(self, where: str = "map") -> env.Environment:
         """Return the map that can be simulated; MapError when it breaks a rule, as of the saved file."""
-        return from_json(draft_document(self), where)
+        return from_json(to_document(self), where)
 
-    def unchecked(self) -> env.Environment:
+    def build_unchecked_environment(self) -> env.Environment:
         """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
         shapes, marks = [item.shape for item in self.obstacles], dict[int, dict[str, Any]]()
         for k, item in enumerate(self.obstacles):
@@ -93,39 +93,39 @@ class Sketch:
             boundary=self.boundary or (),
             obstacles=tuple(shapes),
             starts=dict(self.starts),
-            extra=annotated(self.extra, marks, [shape.name for shape in shapes], self.background),
+            extra=write_marks(self.extra, marks, [shape.name for shape in shapes], self.background),
             **{name: getattr(self, name) for name in _SHARED},
         )
 
-    def item(self, key: int) -> Item:
-        return self.obstacles[self.places[key]]
+    def get_item(self, key: int) -> Item:
+        return self.obstacles[self.index_by_key[key]]
 
-    def start(self, name: str) -> StartSpec:
+    def get_start(self, name: str) -> StartSpec:
         return dict(self.starts)[name]
 
-    def thing(self, owner: Owner) -> Obstacle | StartSpec | None:
+    def find_object(self, owner: Owner) -> Obstacle | StartSpec | None:
         """Return an obstacle or a start; None of the boundary, and where there is no such thing."""
         if isinstance(owner, str):
             return dict(self.starts).get(owner)
-        return self.item(owner).shape if owner in self.places else None
+        return self.get_item(owner).shape if owner in self.index_by_key else None
 
     @property
     def owners(self) -> tuple[Owner, ...]:
-        return BOUNDARY, *self.places, *dict(self.starts)
+        return BOUNDARY, *self.index_by_key, *dict(self.starts)
 
     def display_name(self, owner: Owner) -> str:
         """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
         if isinstance(owner, str):
             return to_one_line(f"start “{owner}”")
-        shape = None if owner == BOUNDARY else self.item(owner).shape
+        shape = None if owner == BOUNDARY else self.get_item(owner).shape
         kind = "boundary" if shape is None else KINDS[type(shape)]
         return to_one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
 
-    def ring_points(self, owner: Owner) -> tuple[Ring, ...]:
+    def list_vertex_rings(self, owner: Owner) -> tuple[Ring, ...]:
         """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
         if owner == BOUNDARY:
             return () if self.boundary is None else (self.boundary,)
-        thing: Any = self.thing(owner)
+        thing: Any = self.find_object(owner)
         if isinstance(thing, env.PolygonObstacle):
             return (thing.vertices, *thing.holes)
         if isinstance(thing, env.CircleObstacle | env.DiscStart):
@@ -133,26 +133,26 @@ class Sketch:
             return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
         return (getattr(thing, _LINES[type(thing)]),) if type(thing) in _LINES else ()
 
-    def rings_of(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
+    def list_rings(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
         """Return the rings of something: number, points, whether it is closed; none of circles and starts."""
-        thing = self.thing(owner)
+        thing = self.find_object(owner)
         if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
             return ()
         closed = not isinstance(thing, env.WallObstacle)
-        return tuple((k, points, closed) for k, points in enumerate(self.ring_points(owner)))
+        return tuple((k, points, closed) for k, points in enumerate(self.list_vertex_rings(owner)))
 
     def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Self:
         """Return the sketch with other vertices for something that `ring_points` has, but circles."""
         line, *holes = map(tuple, rings)
         if owner == BOUNDARY:
             return replace(self, boundary=line)
-        thing: Any = self.thing(owner)
+        thing: Any = self.find_object(owner)
         if isinstance(thing, env.PolygonObstacle):
-            return self.with_things({owner: replace(thing, vertices=line, holes=tuple(holes))})
-        return self.with_things({owner: replace(thing, **{_LINES[type(thing)]: line})})
+            return self.with_objects({owner: replace(thing, vertices=line, holes=tuple(holes))})
+        return self.with_objects({owner: replace(thing, **{_LINES[type(thing)]: line})})
 
     @cached_property
-    def places(self) -> Mapping[int, int]:
+    def index_by_key(self) -> Mapping[int, int]:
         return {item.key: place for place, item in enumerate(self.obstacles)}
 
     @cached_property
@@ -164,18 +164,22 @@ class Sketch:
         return shapely.STRtree(self.geometries)
 
     @property
-    def fresh_key(self) -> int:
-        return max(self.places, default=-1) + 1
+    def next_key(self) -> int:
+        return max(self.index_by_key, default=-1) + 1
 
-    def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Self, tuple[int, ...]]:
+    def with_obstacles(
+        self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]
+    ) -> tuple[Self, tuple[int, ...]]:
         """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
         pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
-        items = [Item(k, *pair) for k, pair in enumerate(pairs, self.fresh_key)]
+        items = [Item(k, *pair) for k, pair in enumerate(pairs, self.next_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
-    def with_things(self, things: Mapping[Any, Any]) -> Self:
+    def with_objects(self, things: Mapping[Any, Any]) -> Self:
         """Return the sketch with other obstacles by their keys, and other or more starts by their names."""
-        changed = {k: new for k, new in things.items() if isinstance(k, int) and new != self.item(k).shape}
+        changed = {
+            k: new for k, new in things.items() if isinstance(k, int) and new != self.get_item(k).shape
+        }
         items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
         starts = dict(self.starts) | {name: spec for name, spec in things.items() if isinstance(name, str)}
         return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))
@@ -185,7 +189,7 @@ class Sketch:
         obstacles = tuple(item for item in self.obstacles if item.key not in gone)
         return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
 
-    def named(self, name: str) -> Self:
+    def with_default_name(self, name: str) -> Self:
         """Return the sketch with a name if nobody has given it one."""
         name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
         return replace(self, name=name) if self.name == Sketch.name and name else self
@@ -196,8 +200,10 @@ class Sketch:
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
-        points += [point for name, _ in self.starts for ring in self.ring_points(name) for point in ring]
-        corners = np.concatenate([as_array(points), shapely.bounds(self.geometries).reshape(-1, 2)])
+        points += [
+            point for name, _ in self.starts for ring in self.list_vertex_rings(name) for point in ring
+        ]
+        corners = np.concatenate([to_array(points), shapely.bounds(self.geometries).reshape(-1, 2)])
         corners = corners[np.isfinite(corners).all(axis=1)]
         if not len(corners):
             return None
@@ -205,19 +211,19 @@ class Sketch:
         return low_x, low_y, high_x, high_y
 
 
-def draft_document(sketch: Sketch) -> dict[str, Any]:
+def to_document(sketch: Sketch) -> dict[str, Any]:
     """Return the map document of a sketch, valid or not; `parser.sketch_of` reads it back, keys aside."""
-    document = to_json(sketch.unchecked())
+    document = to_json(sketch.build_unchecked_environment())
     if sketch.boundary is None:
         del document["boundary"]
     return document
 
 
-def sketch_text(sketch: Sketch) -> str:
-    return dump_document(draft_document(sketch))
+def dump_sketch(sketch: Sketch) -> str:
+    return dump_document(to_document(sketch))
 
 
-def geometry_of(shape: Obstacle) -> shapely.Geometry:
+def build_geometry(shape: Obstacle) -> shapely.Geometry:
     """Return what any obstacle covers as a valid geometry: nothing where it is too large or too far away."""
     if isinstance(shape, env.CircleObstacle):
         if not _is_near([shape.center]):

@@ -19,9 +19,9 @@ from robocov.errors import MapError, StartError, format_count, summarize_names
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import validate_document
-from robocov_app.editor.model.geometry import as_array
-from robocov_app.editor.model.selection import numbered_name
-from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document
+from robocov_app.editor.model.geometry import to_array
+from robocov_app.editor.model.selection import format_numbered_name
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, to_document
 
 Kind: TypeAlias = Literal[
     "other", "no boundary", "crossing", "spot", "no room", "outside", "twice", "double", "sealed", "narrow",
@@ -42,35 +42,39 @@ _NOUNS = {"vertices": "corner", "points": "point", "positions": "place", "holes"
 class Problem:
     """Something that is wrong, or may be."""
 
-    words: str  # a sentence for people; below, one that begins with a colon or a blank goes on after its name
-    where: shapely.Geometry | None  # a point, an edge, an area; None where it is nowhere
-    of: Owner | None = None  # None of the map as a whole
-    grave: bool = True  # the map cannot run so; else it is a warning
+    message: (
+        str  # a sentence for people; below, one that begins with a colon or a blank goes on after its name
+    )
+    geometry: shapely.Geometry | None  # a point, an edge, an area; None where it is nowhere
+    owner: Owner | None = None  # None of the map as a whole
+    is_error: bool = True  # the map cannot run so; else it is a warning
     kind: Kind = "other"
 
 
-def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
+def find_problems(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
     """Return all that is wrong for robots of a radius, m, the grave first, and the free space."""
     found = list(_faults(sketch))
     if found:
         free = _rough_free(sketch)
-        found += _space_faults(sketch, free, {problem.of for problem in found})
+        found += _space_faults(sketch, free, {problem.owner for problem in found})
     else:
-        environment = sketch.unchecked()
+        environment = sketch.build_unchecked_environment()
         free = environment.free
         try:
-            validate_document(draft_document(sketch), "map")  # whatever the rules are, these are they
+            validate_document(to_document(sketch), "map")  # whatever the rules are, these are they
             check_rules(environment, "map")
         except MapError as error:
-            found = list(_space_faults(sketch, free, set())) or [Problem(in_words(str(error), sketch), None)]
-    found += _warnings(sketch, free, radius, {problem.of for problem in found})
+            found = list(_space_faults(sketch, free, set())) or [
+                Problem(translate_message(str(error), sketch), None)
+            ]
+    found += _warnings(sketch, free, radius, {problem.owner for problem in found})
     for k, problem in enumerate(found):
-        if problem.of is not None and problem.words[0] in ": ":
-            found[k] = replace(problem, words=numbered_name(sketch, problem.of) + problem.words)
+        if problem.owner is not None and problem.message[0] in ": ":
+            found[k] = replace(problem, message=format_numbered_name(sketch, problem.owner) + problem.message)
     return tuple(found), free
 
 
-def in_words(message: str, sketch: Sketch) -> str:
+def translate_message(message: str, sketch: Sketch) -> str:
     """Return a message of the map's rules with the names of things instead of places in a file."""
 
     def named(match: re.Match[str]) -> str:
@@ -79,7 +83,7 @@ def in_words(message: str, sketch: Sketch) -> str:
         if match[1] == "obstacles":
             if not steps[0][0] or int(steps[0][0]) >= len(sketch.obstacles):
                 return match[0]
-            words = [numbered_name(sketch, sketch.obstacles[int(steps.pop(0)[0])].key)]
+            words = [format_numbered_name(sketch, sketch.obstacles[int(steps.pop(0)[0])].key)]
         elif match[1] == "starts":
             words = [f"start “{''.join(steps.pop(0))}”"]
         for number, name, key in steps:
@@ -95,7 +99,7 @@ def in_words(message: str, sketch: Sketch) -> str:
     return _MAP_PLACE.sub(named, message.removeprefix("map: "))
 
 
-def place_words(x: float, y: float) -> str:
+def format_position(x: float, y: float) -> str:
     return f"({x:.5g}, {y:.5g})"
 
 
@@ -110,8 +114,8 @@ def _faults(sketch: Sketch) -> Iterator[Problem]:
     for owner in sketch.owners:
         for words in _label_faults(owner) if isinstance(owner, str) else ():
             yield Problem(f"a start {words}", None, owner)
-        for fault in _thing_faults(sketch.thing(owner), sketch.boundary if owner == BOUNDARY else None):
-            yield replace(fault, of=owner, words=f": {fault.words}")
+        for fault in _thing_faults(sketch.find_object(owner), sketch.boundary if owner == BOUNDARY else None):
+            yield replace(fault, owner=owner, message=f": {fault.message}")
 
 
 def _label_faults(name: str) -> Iterator[str]:
@@ -137,7 +141,7 @@ def _thing_faults(thing: Obstacle | StartSpec | None, boundary: Ring | None) -> 
         yield from _size_faults("width", thing.width, thing.points[0] if thing.points else None)
         far = list(_far_faults(thing.points))
         yield from far
-        points = as_array(thing.points)
+        points = to_array(thing.points)
         extent = np.ptp(points, axis=0).max() if len(points) else 0.0
         if not far and (len(points) < 2 or extent < MIN_SIZE_M):
             yield Problem("it has no length: it needs two points that are apart", _drawn(points))
@@ -151,13 +155,13 @@ def _thing_faults(thing: Obstacle | StartSpec | None, boundary: Ring | None) -> 
         seen: set[Point] = set()
         for place in thing.positions:
             if place in seen:
-                words = f"the place {place_words(*place)} is given twice: every robot needs its own"
+                words = f"the place {format_position(*place)} is given twice: every robot needs its own"
                 yield Problem(words, shapely.Point(place), kind="spot")
             seen.add(place)
 
 
 def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
-    points, far, count = as_array(ring), list(_far_faults(ring)), len(set(ring))
+    points, far, count = to_array(ring), list(_far_faults(ring)), len(set(ring))
     if far or count < 3:
         corners = ("no corners", "one corner", "two corners", "")[min(count, 3)]
         yield from far or [Problem(f"{what} has {corners}: it needs three", _drawn(points))]
@@ -174,7 +178,7 @@ def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
         places = _meetings(points, polygon)
         more = len(places) - 1
         others = f" and at {more} more places" if more > 1 else " and at one more place" if more else ""
-        words = f"{what} crosses or touches itself at {place_words(*places[0])}{others}"
+        words = f"{what} crosses or touches itself at {format_position(*places[0])}{others}"
         yield Problem(words, MultiPoint(places[:_MOST_PLACES]), kind="crossing")
 
 
@@ -210,7 +214,7 @@ def _far_faults(points: Ring) -> Iterator[Problem]:
     for x, y in points:
         if not max(abs(x), abs(y)) <= MAX_COORDINATE_M:
             limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
-            yield Problem(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
+            yield Problem(f"{format_position(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
 
 
@@ -260,17 +264,17 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
             if name not in faulty:
                 yield from _no_room(name, spec, free, DEFAULT_RADIUS_M, grave=True)
             continue
-        points = shapely.points(as_array(spec.positions))
+        points = shapely.points(to_array(spec.positions))
         for k in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
             near = sketch.tree.query(points[k], predicate="intersects")
             what = "outside the boundary"
             if len(near):
-                what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
+                what = f"inside {format_numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
             yield Problem(f"{_spot(spec, k)} is {what}", points[k], name, kind="spot")
 
 
 def _spot(spec: env.PointsStart, k: int) -> str:
-    return f": place {k + 1} at {place_words(*spec.positions[k])}"
+    return f": place {k + 1} at {format_position(*spec.positions[k])}"
 
 
 def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grave: bool) -> Iterator[Problem]:
@@ -286,7 +290,7 @@ def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grav
 
 
 def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    points = shapely.points(as_array(spec.positions))
+    points = shapely.points(to_array(spec.positions))
     away = shapely.distance(points, free.boundary)
     for k in np.flatnonzero(away < radius).tolist():
         words = f"{_spot(spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
@@ -316,11 +320,11 @@ def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner 
             yield Problem(words, item.geometry, item.key, False, "twice")
         below.add(form)
     for owner in sketch.owners:
-        for _, ring, closed in sketch.rings_of(owner):
+        for _, ring, closed in sketch.list_rings(owner):
             if 3 <= len(set(ring)) < len(ring):
                 steps = pairwise((*ring, ring[0]) if closed else ring)
                 if twice := [at for at, after in steps if at == after]:
-                    words = f": two vertices lie in the same place, {place_words(*twice[0])}"
+                    words = f": two vertices lie in the same place, {format_position(*twice[0])}"
                     yield Problem(words, MultiPoint(twice), owner, False, "double")
     yield from _paths(sketch, bad)
     if free.is_empty:
@@ -343,7 +347,9 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
         met, beyond = env.find_overlaps(
             env.compute_swept_area(item.shape.polygon, item.shape.path), standing, inside
         )
-        names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
+        names = [format_numbered_name(sketch, key) for key in met] + (
+            [] if beyond is None else ["the boundary"]
+        )
         if names:
             where = shapely.union_all([*met.values(), beyond])
             yield Problem(f" moves through {summarize_names(names)}", where, item.key, False)
@@ -353,7 +359,7 @@ def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
     rest = list(free.geoms)[1:]
     slivers = [part for part in rest if part.area < math.pi * radius * radius]
     for part in rest[: len(rest) - len(slivers)]:  # the largest first
-        at = place_words(*part.representative_point().coords[0])
+        at = format_position(*part.representative_point().coords[0])
         words = f"the room of {part.area:.3g} m² round {at} is sealed: no way leads in"
         yield Problem(words, part, None, False, "sealed")
     if slivers:

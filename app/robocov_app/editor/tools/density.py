@@ -1,6 +1,7 @@
-"""The tool for the density: hot spots and areas by dragging, their weights by typing."""
+"""The tool for the density: hot spots and areas are dragged, their weights are typed."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -8,139 +9,199 @@ import shapely
 from robocov.density import Gaussian, WeightedArea, WeightedPolygons
 from robocov.environment import Point, Ring
 from robocov_app.editor.edits import density
-from robocov_app.editor.model.geometry import distance, length_words, rectangle
+from robocov_app.editor.model.geometry import build_rectangle, distance, format_length
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
+from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
 
-FIRST_WEIGHT = 4.0  # weight of a new feature, until another weight is typed
-_CORNERS = 64
+DEFAULT_WEIGHT = 4.0  # of a new feature, until another weight is typed
+MIN_SIGMA_M = 0.02
+RIM_REACH_FRACTION = 0.6  # of the pointer's reach, within which a rim or a corner is taken
+_OUTLINE_POINTS = 64
+
+
+class _Hit(NamedTuple):
+    """What is under the pointer: a feature, and its corner or rim unless it is the feature as a whole."""
+
+    feature: int | None = None
+    corner: int | None = None  # of an area; 0 for the rim of a hot spot
 
 
 class DensityTool(Tool):
-    """Adds hot spots, moves, sizes and weighs them, and takes them away; areas where a map has those."""
+    """Adds, moves, resizes, weights and removes hot spots, and areas where a map has areas.
+
+    Attributes
+    ----------
+    weight : float
+        Weight of the next feature.
+    chosen : int or None
+        Index of the chosen feature.
+    """
 
     name = "density"
+    key = "d"
     hint = "drag from a hot spot's middle outwards; drag middles and rims; click a middle, type its weight"
 
     def __init__(self) -> None:
         super().__init__()
-        self.weight = FIRST_WEIGHT
+        self.weight = DEFAULT_WEIGHT
         self.chosen: int | None = None
-        self._taken: int | None = None
-        self._corner: int | None = None  # of an area; 0 of a hot spot whose rim was taken
+        self._hit = _Hit()
 
     @property
-    def busy(self) -> bool:
-        return self.begun is not None or self.chosen is not None
+    def is_busy(self) -> bool:
+        """Whether something is dragged or chosen."""
+        return self.pressed is not None or self.chosen is not None
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
+        """Choose what is under the pointer."""
         super().press(context, event)
-        self._taken, self._corner = _under(density.features_of(context.sketch), event)
-        if self._taken is not None and self._corner is None:
-            self.chosen = self._taken
+        self._hit = _find_feature(density.list_features(context.sketch), event)
+        if self._hit.feature is not None and self._hit.corner is None:
+            self.chosen = self._hit.feature
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        if self.begun is not None and event.is_apart_from(self.begun.point):
-            self.change = self._wanted(context, self.begun.point, event.point)
+        """Drag a feature, its rim or corner, or draw a new feature."""
+        if self.pressed is not None and event.has_moved_from(self.pressed.point):
+            self.change = self._build_change(context, self.pressed.point, event.point)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        begun, change, self.begun, self.change = self.begun, self.change, None, None
-        if begun is not None and change is not None and not clicked:
-            context.change(change)
-            self.chosen = len(density.features_of(context.sketch)) - 1 if self._taken is None else self._taken
-        elif begun is not None:
-            self.chosen = self._taken if self._corner is None else None
-            if self.chosen is not None:
-                context.say("type what it weighs, then Enter; Backspace takes it away")
+        """Apply what was dragged; a click chooses a feature."""
+        pressed = self.pressed
+        change = self.change
+        self.pressed = None
+        self.change = None
+        if pressed is None:
+            return
+        if change is not None and not clicked:
+            context.apply(change)
+            self.chosen = self._hit.feature
+            if self.chosen is None:
+                self.chosen = len(density.list_features(context.sketch)) - 1
+            return
+        self.chosen = self._hit.feature if self._hit.corner is None else None
+        if self.chosen is not None:
+            context.show_message("type what it weighs, then Enter; Backspace takes it away")
 
     def finish(self, context: Workspace) -> bool:
-        had, self.chosen = self.chosen is not None, None
-        return had
+        """Choose nothing."""
+        had_chosen = self.chosen is not None
+        self.chosen = None
+        return had_chosen
 
-    def back(self, context: Workspace) -> bool:
-        chosen, self.chosen = self.chosen, None
-        if chosen is None or chosen >= len(density.features_of(context.sketch)):
+    def remove_last(self, context: Workspace) -> bool:
+        """Remove the chosen feature."""
+        chosen = self.chosen
+        self.chosen = None
+        if chosen is None or chosen >= len(density.list_features(context.sketch)):
             return False
-        context.change(density.removed(context.sketch, chosen))
+        context.apply(density.remove_feature(context.sketch, chosen))
         return True
 
     def cancel(self, context: Workspace) -> bool:
-        had, self.chosen = super().cancel(context), None
-        return had
+        """Drop what is dragged, and choose nothing."""
+        was_busy = super().cancel(context)
+        self.chosen = None
+        return was_busy
 
-    def enter(self, context: Workspace, text: str) -> None:
-        weight = density.weight_of(text)
+    def enter_text(self, context: Workspace, text: str) -> None:
+        """Set the weight of the chosen and of new features."""
+        weight = density.parse_weight(text)
         if self.chosen is not None:
-            context.change(density.weighed(context.sketch, self.chosen, weight))
+            context.apply(density.set_weight(context.sketch, self.chosen, weight))
         self.weight = weight
 
-    def preview(self, context: Workspace) -> Preview | None:
-        features = density.features_of(self.change.sketch if self.change is not None else context.sketch)
-        dots = [_middle(feature) for feature in features]
-        dots += [point for area in features if isinstance(area, WeightedArea) for point in area.vertices]
-        shown, words = self.chosen, ""
-        if self.begun is not None and self.change is not None:
-            shown = self._taken if self._taken is not None else len(features) - 1
-        if shown is not None and 0 <= shown < len(features):
-            feature = features[shown]
-            words = f"weight {feature.weight:g}"
-            if isinstance(feature, Gaussian) and self.change is not None:
-                words = f"σ {length_words(density.spread_of(feature))}, {words}"
-        if not features and not words:
-            return None
-        rings = tuple(map(_outline, features))
-        return Preview(words=words, rings=rings, dots=tuple(dots), chosen=self.chosen)
+    def build_draw_state(self, context: Workspace) -> DrawState:
+        """Return outlines, centres and corners of all features, and the weight of the chosen one."""
+        sketch = context.sketch if self.change is None else self.change.sketch
+        pending = None if self.change is None else sketch
+        features = density.list_features(sketch)
+        label = self._build_label(features)
+        if not features and not label:
+            return DrawState(pending=pending)
+        dots = [_find_centre(feature) for feature in features]
+        for feature in features:
+            if isinstance(feature, WeightedArea):
+                dots += feature.vertices
+        rings = tuple(_build_outline(feature) for feature in features)
+        return DrawState(pending=pending, label=label, rings=rings, dots=tuple(dots), chosen=self.chosen)
 
-    def shape_of_cursor(self, context: Workspace) -> str:
-        return "move" if self._taken is not None and self.begun is not None else "cross"
+    def _build_label(self, features: tuple[density.Feature, ...]) -> str:
+        number = self.chosen
+        if self.pressed is not None and self.change is not None:
+            number = self._hit.feature
+            if number is None:
+                number = len(features) - 1
+        if number is None or not 0 <= number < len(features):
+            return ""
+        feature = features[number]
+        label = f"weight {feature.weight:g}"
+        if isinstance(feature, Gaussian) and self.change is not None:
+            label = f"σ {format_length(density.compute_spread(feature))}, {label}"
+        return label
 
-    def _wanted(self, context: Workspace, begun: Point, to: Point) -> Change | None:
-        sketch, number = context.sketch, self._taken
-        if number is None and isinstance(sketch.density, WeightedPolygons):
-            return density.area_added(sketch, WeightedArea(rectangle(begun, to), self.weight))
+    def choose_cursor(self, context: Workspace) -> str:
+        """Return the shape of the cursor."""
+        return "move" if self._hit.feature is not None and self.pressed is not None else "cross"
+
+    def _build_change(self, context: Workspace, start: Point, end: Point) -> Change | None:
+        """Return the change of a drag between two points, m."""
+        sketch = context.sketch
+        number, corner = self._hit
         if number is None:
-            return density.peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
-        if number >= len(features := density.features_of(sketch)):
+            if isinstance(sketch.density, WeightedPolygons):
+                area = WeightedArea(build_rectangle(start, end), self.weight)
+                return density.add_area(sketch, area)
+            return density.add_peak(sketch, start, max(distance(start, end), MIN_SIGMA_M), self.weight)
+        features = density.list_features(sketch)
+        if number >= len(features):
             return None
         feature = features[number]
         if isinstance(feature, Gaussian):
-            if self._corner is not None:
-                return density.peak_sized(sketch, number, distance(feature.center, to))
-            begun = feature.center
-        elif self._corner is not None:
-            return density.corner_moved(sketch, number, self._corner, to)
-        return density.moved(sketch, number, to[0] - begun[0], to[1] - begun[1])
+            if corner is not None:
+                return density.resize_peak(sketch, number, distance(feature.center, end))
+            start = feature.center
+        elif corner is not None:
+            return density.move_corner(sketch, number, corner, end)
+        return density.move_feature(sketch, number, end[0] - start[0], end[1] - start[1])
 
 
-def _under(features: tuple[density.Feature, ...], event: PointerEvent) -> tuple[int | None, int | None]:
-    """Return the feature under the cursor, and its rim or corner if that is; middles come first."""
-    middles = [(distance(_middle(each), event.raw), k) for k, each in enumerate(features)]
-    if middles and min(middles)[0] < event.reach:
-        return min(middles)[1], None
-    rims: list[tuple[float, int, int]] = []
-    for k, each in enumerate(features):
-        if isinstance(each, WeightedArea):
-            rims += [(distance(point, event.raw), k, c) for c, point in enumerate(each.vertices)]
-        elif each.sigma is not None:
-            rims.append((abs(distance(each.center, event.raw) - each.sigma), k, 0))
-    if rims and min(rims)[0] < 0.6 * event.reach:
-        return min(rims)[1:]
-    areas = [(k, each.polygon) for k, each in enumerate(features) if isinstance(each, WeightedArea)]
-    inside = [k for k, polygon in areas if polygon.contains(shapely.Point(event.raw))]
-    return (inside[-1] if inside else None), None
+def _find_feature(features: tuple[density.Feature, ...], event: PointerEvent) -> _Hit:
+    """Return what is under the pointer: centres before rims and corners, then the inside of areas."""
+    centres = [(distance(_find_centre(feature), event.raw), k) for k, feature in enumerate(features)]
+    if centres and min(centres)[0] < event.reach:
+        return _Hit(min(centres)[1])
+    edges: list[tuple[float, int, int]] = []  # distance in m, feature, corner
+    for number, feature in enumerate(features):
+        if isinstance(feature, WeightedArea):
+            for corner, point in enumerate(feature.vertices):
+                edges.append((distance(point, event.raw), number, corner))
+        elif feature.sigma is not None:
+            edges.append((abs(distance(feature.center, event.raw) - feature.sigma), number, 0))
+    if edges:
+        gap, number, corner = min(edges)
+        if gap < RIM_REACH_FRACTION * event.reach:
+            return _Hit(number, corner)
+    pointer = shapely.Point(event.raw)
+    for number in reversed(range(len(features))):
+        feature = features[number]
+        if isinstance(feature, WeightedArea) and feature.polygon.contains(pointer):
+            return _Hit(number)
+    return _Hit()
 
 
-def _middle(feature: density.Feature) -> Point:
+def _find_centre(feature: density.Feature) -> Point:
+    """Return the centre of a hot spot, or a point inside an area."""
     if isinstance(feature, Gaussian):
         return feature.center
     ((x, y),) = feature.polygon.representative_point().coords
     return x, y
 
 
-def _outline(feature: density.Feature) -> Ring:
-    """Return the outline of an area, or that of a hot spot one standard deviation from its centre."""
+def _build_outline(feature: density.Feature) -> Ring:
+    """Return the outline of an area, or of a hot spot at one standard deviation from its centre."""
     if isinstance(feature, WeightedArea):
         return feature.vertices
-    turn = np.linspace(0.0, math.tau, _CORNERS, endpoint=False)
-    points = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(feature.matrix).T
-    return tuple((x, y) for x, y in (points + feature.center).tolist())
+    angles = np.linspace(0.0, math.tau, _OUTLINE_POINTS, endpoint=False)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    points = circle @ np.linalg.cholesky(feature.matrix).T + feature.center
+    return tuple((x, y) for x, y in points.tolist())

@@ -1,6 +1,6 @@
-"""Tools that draw: obstacles, the boundary, starts, doors in walls; and the tape measure."""
+"""Tools that draw obstacles, the boundary and starts, and the measuring tape."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from math import copysign
 
@@ -9,254 +9,347 @@ import shapely
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, format_count
 from robocov_app.editor.edits import create
-from robocov_app.editor.model import require
-from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
-from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle
+from robocov_app.editor.model.coordinates import parse_length, parse_next_point, parse_size
+from robocov_app.editor.model.geometry import build_rectangle, distance, format_bearing, format_length
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
+from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
 from robocov_app.toolkit.draw_tools import SAME, Outline
+
+CLOSING_FRACTION = 0.7  # of the pointer's reach, within which a click on the first point closes the outline
 
 
 class DrawTool(Tool):
-    """Draws point by point, or with a single drag; the tools below say what the points make."""
+    """Draws point by point, or with a single drag; subclasses build something from the points.
 
-    begins_typed = True
-    least, most = 2, 1_000_000  # points that are needed, and that are taken
-    closes = False  # whether a click on the first point ends it
-    drags = False  # whether it can be drawn by a single drag, too
-    make: Callable[[Sketch, Sequence[Point]], Change]
+    Attributes
+    ----------
+    min_points, max_points : int
+        Number of points that are needed, and that complete the drawing.
+    closes : bool
+        Whether a click on the first point completes the drawing.
+    drags : bool
+        Whether it can be drawn with a single drag, too.
+    outline : Outline
+        The points drawn so far.
+    """
+
+    starts_with_text = True
+    min_points = 2
+    max_points = 1_000_000
+    closes = False
+    drags = False
 
     def __init__(self) -> None:
         super().__init__()
-        self.outline = Outline(self.least, self.most, self.closes, self.drags)
+        self.outline = Outline(self.min_points, self.max_points, self.closes, self.drags)
 
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return self.make(context.sketch, points)
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds what was drawn with these points, m."""
+        raise NotImplementedError
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
-        """Return what to show of the points, the last of which is the cursor."""
-        closed = self.closes and len(points) > 2
-        area = f"   {shapely.Polygon(points).area:.2f} m²" if closed else ""
-        return Preview(points, closed, True, words=bearing_words(points[-2], points[-1]) + area)
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return what is shown while drawing; the last of the points, m, is the cursor."""
+        is_closed = self.closes and len(points) > 2
+        label = format_bearing(points[-2], points[-1])
+        if is_closed:
+            label += f"   {shapely.Polygon(points).area:.2f} m²"
+        return DrawState(line=points, is_closed=is_closed, shows_lengths=True, label=label)
 
-    def placed(self, event: PointerEvent) -> Point:
-        return event.constrained(self.origin)
+    def choose_point(self, event: PointerEvent) -> Point:
+        """Return the position of the next point, m."""
+        return event.constrain(self.origin)
 
-    def end_for(self, text: str) -> Point | None:
-        """Return where a drag from the first point ends for a typed size; None where that is no size."""
+    def find_drag_end(self, text: str) -> Point | None:
+        """Return the end of a drag that has a typed size; None where sizes cannot be typed."""
         return None
 
     @property
     def points(self) -> list[Point]:
+        """Points drawn so far, m."""
         return self.outline.points
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
+        """Whether any point has been drawn."""
         return bool(self.points)
 
     @property
     def origin(self) -> Point | None:
-        return self.points[-1] if self.points and self.most > 2 else None
+        """Last point of a line that is being drawn, m; None for shapes given by two points."""
+        return self.points[-1] if self.points and self.max_points > 2 else None
 
     @property
-    def drawn(self) -> tuple[Point, ...]:
-        return tuple(self.points if self.most == 2 else self.points[:-1])
+    def snap_points(self) -> tuple[Point, ...]:
+        """Points drawn so far to which the pointer snaps, m."""
+        return tuple(self.points if self.max_points == 2 else self.points[:-1])
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        if self.outline.press(self.placed(event), event.raw, 0.7 * event.reach):
+        """Add a point."""
+        if self.outline.press(self.choose_point(event), event.raw, CLOSING_FRACTION * event.reach):
             self.finish(context)
 
-    def twice(self, context: Workspace, event: PointerEvent) -> None:
-        if self.most == 2:
+    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+        """Complete the drawing."""
+        if self.max_points == 2:
             self.press(context, event)
-        else:  # the first click of the two has put its point
+        else:
+            # The first of the two clicks has added its point already.
             self.finish(context)
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self.outline.at = self.placed(event)
+        """Move the end of the drawing to the pointer."""
+        self.outline.at = self.choose_point(event)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        if self.outline.release(self.placed(event), event.raw, event.reach, clicked=clicked):
+        """Complete a drag."""
+        if self.outline.release(self.choose_point(event), event.raw, event.reach, clicked=clicked):
             self._finish_drag(context, self.outline.at)
 
     def finish(self, context: Workspace) -> bool:
+        """Add what was drawn to the map."""
         points = self.outline.take()
         if not points:
             return False
-        if len(points) < self.least:
-            raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
-        context.change(self.made(context, points))
+        if len(points) < self.min_points:
+            name = self.title.lower()
+            raise MapError(f"{name}: {len(points)} of at least {self.min_points} points were drawn")
+        context.apply(self.build_change(context, points))
         return True
 
-    def back(self, context: Workspace) -> bool:
-        return bool(self.points and self.points.pop())
+    def remove_last(self, context: Workspace) -> bool:
+        """Remove the last point."""
+        if not self.points:
+            return False
+        self.points.pop()
+        return True
 
     def cancel(self, context: Workspace) -> bool:
+        """Remove all points."""
         return self.outline.cancel()
 
-    def enter(self, context: Workspace, text: str) -> None:
-        outline = self.outline
-        if len(self.points) == 1 and (end := self.end_for(text)) is not None:
-            self._finish_drag(context, end)
-            return
-        outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
-        outline.points.append(outline.at)
-        outline.dragging = False
+    def enter_text(self, context: Workspace, text: str) -> None:
+        """Add a point by typed coordinates or a length, or complete a drag by a typed size."""
+        if len(self.points) == 1:
+            end = self.find_drag_end(text)
+            if end is not None:
+                self._finish_drag(context, end)
+                return
+        cursor = self.outline.at if self.points else None
+        self.outline.at = parse_next_point(text, self.origin, cursor)
+        self.outline.points.append(self.outline.at)
+        self.outline.dragging = False
 
-    def preview(self, context: Workspace) -> Preview | None:
-        return self.shown(context, (*self.points, self.outline.at)) if self.points else None
+    def build_draw_state(self, context: Workspace) -> DrawState:
+        """Return what is shown while drawing."""
+        if not self.points:
+            return DrawState()
+        return self.build_preview(context, (*self.points, self.outline.at))
 
     def _finish_drag(self, context: Workspace, end: Point) -> None:
-        self.outline.points = list(rectangle(self.points[0], end)) if self.closes else [self.points[0], end]
+        start = self.points[0]
+        self.outline.points = list(build_rectangle(start, end)) if self.closes else [start, end]
         self.finish(context)
 
-    def _far_corner(self, text: str) -> Point:
-        """Return the corner of a rectangle of a typed size, on the cursor's side of the first."""
-        (x, y), (to_x, to_y), (width, height) = self.points[0], self.outline.at, size_of(text)
-        return x + (width if to_x >= x else -width), y + (height if to_y >= y else -height)
+    def _find_far_corner(self, text: str) -> Point:
+        """Return the corner opposite to the first of a rectangle with a typed size, towards the cursor."""
+        x, y = self.points[0]
+        cursor_x, cursor_y = self.outline.at
+        width, height = parse_size(text)
+        far_x = x + width if cursor_x >= x else x - width
+        far_y = y + height if cursor_y >= y else y - height
+        return far_x, far_y
 
 
 class PolygonTool(DrawTool):
-    """Draws an obstacle with corners."""
+    """Draws a polygon corner by corner."""
 
     name = "polygon"
+    key = "p"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
-    least, closes = 3, True
-    make = staticmethod(create.polygon_drawn)
+    min_points = 3
+    closes = True
+
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds the polygon."""
+        return create.add_polygon(context.sketch, points)
 
 
 class WallTool(DrawTool):
-    """Draws a poly-line that is some width thick."""
+    """Draws a wall along a line."""
 
     name = "wall"
+    key = "w"
     hint = "click its points, Enter or a double click ends it; or drag; [ and ] change its width"
     drags = True
 
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.wall_drawn(context.sketch, points, context.wall_width)
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds the wall."""
+        return create.add_wall(context.sketch, points, context.wall_width)
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return the line, with the wall as thick as it will be."""
         line = points if distance(points[-2], points[-1]) > SAME else points[:-1]
         shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
-        words = f"{bearing_words(points[-2], points[-1])}   {length_words(context.wall_width)} wide"
-        return Preview(points, False, True, shapes, words=words)
+        label = f"{format_bearing(points[-2], points[-1])}   {format_length(context.wall_width)} wide"
+        return DrawState(line=points, shows_lengths=True, shapes=shapes, label=label)
 
 
 class MeasureTool(DrawTool):
-    """Measures along a line; what was measured stays until something else is."""
+    """Measures along a line; the measured line stays until another is drawn."""
 
     name = "measure"
+    key = "m"
     hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
     drags = True
 
     @property
     def measured(self) -> tuple[Point, ...]:
+        """Points of the line that is being measured or was measured last, m."""
         return tuple(self.points or self.clicked)
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
+        """Add a point."""
         self.clicked = []
         super().press(context, event)
 
     def finish(self, context: Workspace) -> bool:
+        """Keep the line."""
         points = self.outline.take()
-        self.clicked = points or self.clicked
+        if points:
+            self.clicked = points
         return bool(points)
 
     def cancel(self, context: Workspace) -> bool:
-        had, self.clicked = bool(self.clicked), []
-        return super().cancel(context) or had
+        """Remove the line."""
+        had_line = bool(self.clicked)
+        self.clicked = []
+        return super().cancel(context) or had_line
 
-    def preview(self, context: Workspace) -> Preview | None:
+    def build_draw_state(self, context: Workspace) -> DrawState:
+        """Return the line with its length, and the area that it encloses."""
         points = [*self.points, self.outline.at] if self.points else self.clicked
         if len(points) < 2:
-            return None
-        (ax, ay), (bx, by) = points[-2], points[-1]
-        words = f"{bearing_words(points[-2], points[-1])}   Δx {bx - ax:.2f}  Δy {by - ay:.2f}"
+            return DrawState()
+        start, end = points[-2], points[-1]
+        dx = end[0] - start[0]
+        dy = end[1] - start[1]
+        label = f"{format_bearing(start, end)}   Δx {dx:.2f}  Δy {dy:.2f}"
         if len(points) > 2:
-            whole = sum(distance(a, b) for a, b in pairwise(points))
-            words += f"   {length_words(whole)} in all, {shapely.Polygon(points).area:.2f} m²"
-        return Preview(tuple(points), False, True, words=words)
+            total = sum(distance(a, b) for a, b in pairwise(points))
+            label += f"   {format_length(total)} in all, {shapely.Polygon(points).area:.2f} m²"
+        return DrawState(line=tuple(points), shows_lengths=True, label=label)
 
 
 class PlacesTool(DrawTool):
-    """Draws a start of given places, one for each robot."""
+    """Draws a start with one position for each robot."""
 
     name = "places"
     title = "Start spots"
+    key = "shift+s"
     hint = "click a place for each robot; Enter ends it"
-    least = 1
-    make = staticmethod(create.points_start_drawn)
+    min_points = 1
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
-        words = f"{format_count(len(points) - 1, 'robot')}; Enter ends it"
-        return Preview(start=PointsStart(points[:-1]), words=words)
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds the start."""
+        return create.add_points_start(context.sketch, points)
+
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return the start with the positions clicked so far."""
+        label = f"{format_count(len(points) - 1, 'robot')}; Enter ends it"
+        return DrawState(start=PointsStart(points[:-1]), label=label)
 
 
 class BoundaryTool(DrawTool):
-    """Draws the outer boundary: a rectangle by dragging, anything else corner by corner."""
+    """Draws the boundary: a rectangle by dragging, other outlines corner by corner."""
 
     name = "boundary"
+    key = "b"
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
-    least, closes, drags = 3, True, True
-    make = staticmethod(create.boundary_drawn)
+    min_points = 3
+    closes = True
+    drags = True
 
-    def placed(self, event: PointerEvent) -> Point:
-        return event.point if self.outline.dragging else super().placed(event)
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that replaces the boundary."""
+        return create.set_boundary(context.sketch, points)
 
-    def end_for(self, text: str) -> Point | None:
-        return self._far_corner(text) if any(sign in text for sign in "x×*") else None
+    def choose_point(self, event: PointerEvent) -> Point:
+        """Return the position of the next point, m; angles count only between clicked corners."""
+        return event.point if self.outline.dragging else super().choose_point(event)
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
+    def find_drag_end(self, text: str) -> Point | None:
+        """Return the corner opposite to the first, if a size such as 10 x 8 was typed."""
+        is_size = any(sign in text for sign in "x×*")
+        return self._find_far_corner(text) if is_size else None
+
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return the outline; in a drag, the rectangle."""
         if not self.outline.dragging:
-            return super().shown(context, points)
+            return super().build_preview(context, points)
         (ax, ay), (bx, by) = points
-        words = f"{length_words(abs(bx - ax))} x {length_words(abs(by - ay))}"
-        return Preview(rectangle(*points), True, words=words)
+        label = f"{format_length(abs(bx - ax))} x {format_length(abs(by - ay))}"
+        return DrawState(line=build_rectangle(*points), is_closed=True, label=label)
 
 
 class RectangleTool(DrawTool):
-    """Draws a rectangle from corner to corner; with Shift a square."""
+    """Draws a rectangle from corner to corner, with Shift a square."""
 
     name = "rectangle"
+    key = "r"
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
-    most, drags = 2, True
-    make = staticmethod(create.rectangle_drawn)
-    end_for = DrawTool._far_corner
+    max_points = 2
+    drags = True
 
-    def placed(self, event: PointerEvent) -> Point:
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds the rectangle."""
+        return create.add_rectangle(context.sketch, points)
+
+    def find_drag_end(self, text: str) -> Point | None:
+        """Return the corner opposite to the first for a typed size."""
+        return self._find_far_corner(text)
+
+    def choose_point(self, event: PointerEvent) -> Point:
+        """Return the corner at the pointer, with Shift that of a square."""
         if not event.shift or not self.points:
             return event.point
-        (x, y), (to_x, to_y) = self.points[0], event.point
+        x, y = self.points[0]
+        to_x, to_y = event.point
         side = max(abs(to_x - x), abs(to_y - y))
         return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return the rectangle with its size and area."""
         (ax, ay), (bx, by) = points
-        wide, high, ring = abs(bx - ax), abs(by - ay), rectangle(*points)
-        shapes = (PolygonObstacle(ring),) if min(wide, high) > SAME else ()
-        words = f"{length_words(wide)} x {length_words(high)}   {wide * high:.2f} m²"
-        return Preview(ring, True, shapes=shapes, words=words)
+        width = abs(bx - ax)
+        height = abs(by - ay)
+        ring = build_rectangle(*points)
+        shapes = (PolygonObstacle(ring),) if min(width, height) > SAME else ()
+        label = f"{format_length(width)} x {format_length(height)}   {width * height:.2f} m²"
+        return DrawState(line=ring, is_closed=True, shapes=shapes, label=label)
 
 
 class CircleTool(DrawTool):
-    """Draws a round pillar from its middle."""
+    """Draws a circle from its centre."""
 
     name = "circle"
+    key = "c"
     hint = "drag from the middle to the rim, or click both; type the radius for metres"
-    most, drags = 2, True
-    make_round = staticmethod(create.circle_drawn)
+    max_points = 2
+    drags = True
 
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return self.make_round(context.sketch, points[0], distance(*points))
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds the circle."""
+        return create.add_circle(context.sketch, points[0], distance(*points))
 
-    def end_for(self, text: str) -> Point:
-        return self.points[0][0] + length_of(text), self.points[0][1]
+    def find_drag_end(self, text: str) -> Point:
+        """Return the point on the rim to the right of the centre for a typed radius."""
+        return self.points[0][0] + parse_length(text), self.points[0][1]
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return the circle with its radius."""
         radius = distance(*points)
         shapes = (CircleObstacle(points[0], radius),) if radius > SAME else ()
-        return Preview(points, shapes=shapes, words=f"radius {length_words(radius)}")
+        return DrawState(line=points, shapes=shapes, label=f"radius {format_length(radius)}")
 
 
 class DiscTool(CircleTool):
@@ -264,54 +357,15 @@ class DiscTool(CircleTool):
 
     name = "disc"
     title = "Start disc"
+    key = "s"
     hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for metres"
-    make_round = staticmethod(create.disc_start_drawn)
 
-    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
+    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+        """Return the change that adds the start."""
+        return create.add_disc_start(context.sketch, points[0], distance(*points))
+
+    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+        """Return the disc with its radius."""
         radius = distance(*points)
         start = DiscStart(points[0], radius) if radius > SAME else None
-        return Preview(points, start=start, words=f"radius {length_words(radius)}")
-
-
-class DoorTool(Tool):
-    """Opens a door in a wall; the pieces stay walls."""
-
-    name = "door"
-    hint = "click a wall where its door is to be, or drag along it; type the door's width in metres"
-    begins_typed = True
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.width = 0.9
-        self._wall: int | None = None  # over which the cursor is, or that was pressed
-
-    def press(self, context: Workspace, event: PointerEvent) -> None:
-        self.begun, self.at = event, event.point
-        self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
-        require(self._wall is not None, "click a wall: doors are opened in walls")
-
-    def move(self, context: Workspace, event: PointerEvent) -> None:
-        self.at = event.point
-        if self.begun is None:
-            self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
-
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        begun, self.begun, wall, self._wall = self.begun, None, self._wall, None
-        if begun is None or wall is None:
-            return
-        if clicked:
-            context.change(create.door_opened(context.sketch, wall, event.point, self.width))
-        else:
-            context.change(create.wall_opened(context.sketch, wall, begun.point, event.point))
-
-    def enter(self, context: Workspace, text: str) -> None:
-        self.width = create.door_width(length_of(text))
-        context.say(f"doors are {length_words(self.width)} wide")
-
-    def preview(self, context: Workspace) -> Preview | None:
-        if self._wall is None or self._wall not in context.sketch.places:
-            return None
-        a, b = create.door_at(context.sketch, self._wall, self.at, self.width)
-        if self.begun is not None and distance(self.begun.point, self.at) > 0.1 * self.width:
-            a, b = (create.on_wall(context.sketch, self._wall, at) for at in (self.begun.point, self.at))
-        return Preview((a, b), words=f"door, {length_words(distance(a, b))}")
+        return DrawState(line=points, start=start, label=f"radius {format_length(radius)}")

@@ -1,131 +1,191 @@
-"""The tool for the paths of obstacles that move: way points by clicking and dragging, speeds by typing."""
+"""The tool for paths of moving obstacles: waypoints are clicked and dragged, speeds are typed."""
+
+from typing import NamedTuple
 
 from robocov.environment import ObstaclePath, Point
 from robocov_app.editor.edits import paths
-from robocov_app.editor.model.geometry import bearing_words
-from robocov_app.editor.model.hit_test import obstacles_at
+from robocov_app.editor.model.geometry import format_bearing
+from robocov_app.editor.model.hit_test import find_obstacles
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
+from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
 
-NEAR = 0.75  # part of a finger's width within which a way point is taken hold of
+WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach, within which a waypoint is taken
+LEG_REACH_FRACTION = 0.5  # of the pointer's reach, within which a click inserts into a leg
+HOVER_REACH_PX = 8.0  # at scale 1, within which the cursor shows that a waypoint can be dragged
+
+
+class _Subject(NamedTuple):
+    """The selected obstacle and its path."""
+
+    key: int | None = None
+    path: ObstaclePath | None = None
 
 
 class MotionPathTool(Tool):
-    """Gives the selected obstacle a path, and changes it."""
+    """Gives the selected obstacle a path, and edits it.
+
+    Attributes
+    ----------
+    speed : float
+        Speed along new paths, m/s.
+    chosen : int or None
+        Index of the chosen waypoint.
+    """
 
     name = "path"
+    key = "o"
     hint = "click an obstacle, then where it goes; drag way points, Backspace takes one; type its speed"
 
     def __init__(self) -> None:
         super().__init__()
-        self.speed = paths.FIRST_SPEED
+        self.speed = paths.DEFAULT_SPEED_M_S
         self.chosen: int | None = None
-        self._held: int | None = None
-        self._led: tuple[int | None, ObstaclePath | None] = None, None  # at the last event, see `_led_of`
+        self._dragged: int | None = None  # index of a waypoint
+        self._subject = _Subject()  # at the latest event
 
     @property
-    def busy(self) -> bool:
-        return self._led[0] is not None
+    def is_busy(self) -> bool:
+        """Whether an obstacle is selected."""
+        return self._subject.key is not None
 
     @property
     def origin(self) -> Point | None:
-        return self._led[1].points[-1] if self._led[1] is not None else None
+        """Last waypoint, m."""
+        path = self._subject.path
+        return path.points[-1] if path is not None else None
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        subject, path = _led_of(context)
+        """Take a waypoint, select an obstacle, or add a waypoint."""
+        subject, path = _find_subject(context)
         self.change = None
-        self._held = None if path is None else paths.way_point_at(path, event.raw, NEAR * event.reach)
-        if self._held is not None:
-            self.chosen = self._held
+        self._dragged = None
+        if path is not None:
+            self._dragged = paths.find_waypoint(path, event.raw, WAYPOINT_REACH_FRACTION * event.reach)
+        if self._dragged is not None:
+            self.chosen = self._dragged
             return
-        over = obstacles_at(context.sketch, event.raw, 0.0)
-        if over and subject not in over:
+        obstacles = find_obstacles(context.sketch, event.raw, 0.0)
+        if obstacles and subject not in obstacles:
             self.chosen = None
-            context.select(Selection.of(over[0]))
+            context.select(Selection.of(obstacles[0]))
         elif subject is None:
             self.chosen = None
-            context.say("click the obstacle that is to move first")
-        elif path is None and subject in over:
-            context.say("now click where it goes")
+            context.show_message("click the obstacle that is to move first")
+        elif path is None and subject in obstacles:
+            context.show_message("now click where it goes")
         else:
-            at = None if path is None else paths.leg_at(path, event.raw, 0.5 * event.reach)
-            point = event.point if at is not None else event.constrained(self.origin)
-            context.change(paths.way_point_added(context.sketch, subject, point, at, self.speed))
-            last = len(path.points) if path is not None else 1
-            self.chosen = self._held = last if at is None else at
-        self._led = _led_of(context)
+            self._add_waypoint(context, event, subject, path)
+        self._subject = _find_subject(context)
 
-    def twice(self, context: Workspace, event: PointerEvent) -> None:
+    def _add_waypoint(
+        self, context: Workspace, event: PointerEvent, subject: int, path: ObstaclePath | None
+    ) -> None:
+        """Insert a waypoint into the leg under the pointer, or append it."""
+        index = None
+        if path is not None:
+            index = paths.find_leg(path, event.raw, LEG_REACH_FRACTION * event.reach)
+        point = event.point if index is not None else event.constrain(self.origin)
+        context.apply(paths.add_waypoint(context.sketch, subject, point, index, self.speed))
+        if index is None:
+            index = len(path.points) if path is not None else 1
+        self.chosen = index
+        self._dragged = index
+
+    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+        """Finish the path."""
         self.finish(context)
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self.at, self._led = event.point, _led_of(context)
-        subject, path = self._led
-        if subject is None or self._held is None:
+        """Drag a waypoint."""
+        self.cursor = event.point
+        self._subject = _find_subject(context)
+        subject, path = self._subject
+        dragged = self._dragged
+        if subject is None or dragged is None:
             return
-        if path is None or self._held >= len(path.points):
-            self._held = None
-        elif self.change is not None or event.is_apart_from(path.points[self._held]):
-            to = event.constrained(path.points[self._held - 1] if self._held else None)
-            self.change = paths.way_point_moved(context.sketch, subject, self._held, to)
+        if path is None or dragged >= len(path.points):
+            self._dragged = None
+        elif self.change is not None or event.has_moved_from(path.points[dragged]):
+            origin = path.points[dragged - 1] if dragged else None
+            position = event.constrain(origin)
+            self.change = paths.move_waypoint(context.sketch, subject, dragged, position)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        change, self._held, self.change = self.change, None, None
+        """Apply the drag of a waypoint."""
+        change = self.change
+        self._dragged = None
+        self.change = None
         if change is not None and not clicked:
-            context.change(change)
-        self._led = _led_of(context)
+            context.apply(change)
+        self._subject = _find_subject(context)
 
     def finish(self, context: Workspace) -> bool:
-        if had := _led_of(context)[0] is not None:
+        """Select nothing."""
+        had_subject = _find_subject(context).key is not None
+        if had_subject:
             context.select(Selection())
         self.cancel(context)
-        return had
+        return had_subject
 
-    def back(self, context: Workspace) -> bool:
-        subject, path = _led_of(context)
+    def remove_last(self, context: Workspace) -> bool:
+        """Remove the chosen waypoint, or the last one."""
+        subject, path = _find_subject(context)
         if subject is None or path is None:
             return False
         last = len(path.points) - 1
         chosen = last if self.chosen is None else min(self.chosen, last)
-        context.change(paths.way_point_removed(context.sketch, subject, chosen))
+        context.apply(paths.remove_waypoint(context.sketch, subject, chosen))
         self.chosen = max(chosen - 1, 0) if len(path.points) > 2 else None
-        self._led = _led_of(context)
+        self._subject = _find_subject(context)
         return True
 
     def cancel(self, context: Workspace) -> bool:
-        had, self._led = self._held is not None, (None, None)
-        self._held = self.change = self.chosen = None
-        return had
+        """Drop what is dragged."""
+        was_dragging = self._dragged is not None
+        self._subject = _Subject()
+        self._dragged = None
+        self.change = None
+        self.chosen = None
+        return was_dragging
 
-    def enter(self, context: Workspace, text: str) -> None:
-        speed = paths.speed_of(text)
-        subject, path = _led_of(context)
+    def enter_text(self, context: Workspace, text: str) -> None:
+        """Set the speed of the path and of new paths."""
+        speed = paths.parse_speed(text)
+        subject, path = _find_subject(context)
         if subject is not None and path is not None:
-            context.change(paths.path_paced(context.sketch, Selection.of(subject), speed))
+            context.apply(paths.set_speed(context.sketch, Selection.of(subject), speed))
         self.speed = speed
 
-    def preview(self, context: Workspace) -> Preview | None:
-        subject, path = _led_of(context)
+    def build_draw_state(self, context: Workspace) -> DrawState:
+        """Return the waypoints with the speed and length of the path."""
+        pending = None if self.change is None else self.change.sketch
+        subject, path = _find_subject(context)
         if subject is None:
-            return None
-        if self.change is not None:
-            path = self.change.sketch.item(subject).shape.path
+            return DrawState(pending=pending)
+        if pending is not None:
+            path = pending.get_item(subject).shape.path
         if path is None:
-            return Preview(words=f"where it goes, {self.speed:g} m/s")
-        words = paths.path_words(path)
-        if self._held:
-            words = f"{bearing_words(path.points[self._held - 1], path.points[self._held])}; {words}"
-        return Preview(words=words, dots=path.points, chosen=self.chosen)
+            return DrawState(pending=pending, label=f"where it goes, {self.speed:g} m/s")
+        label = paths.describe_path(path)
+        if self._dragged:
+            leg = format_bearing(path.points[self._dragged - 1], path.points[self._dragged])
+            label = f"{leg}; {label}"
+        return DrawState(pending=pending, label=label, dots=path.points, chosen=self.chosen)
 
-    def shape_of_cursor(self, context: Workspace) -> str:
-        path = _led_of(context)[1]
-        over = path is not None and paths.way_point_at(path, self.at, 8.0 * context.pixel) is not None
-        return "move" if over or self._held is not None else "cross"
+    def choose_cursor(self, context: Workspace) -> str:
+        """Return the shape of the cursor."""
+        path = _find_subject(context).path
+        is_over_waypoint = False
+        if path is not None:
+            waypoint = paths.find_waypoint(path, self.cursor, HOVER_REACH_PX * context.pixel)
+            is_over_waypoint = waypoint is not None
+        return "move" if is_over_waypoint or self._dragged is not None else "cross"
 
 
-def _led_of(context: Workspace) -> tuple[int | None, ObstaclePath | None]:
-    chosen = context.selection.within(context.sketch)
-    if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
-        return None, None
-    (key,) = chosen.items
-    return key, context.sketch.item(key).shape.path
+def _find_subject(context: Workspace) -> _Subject:
+    """Return the single selected obstacle with its path."""
+    selection = context.selection.restrict_to(context.sketch)
+    if len(selection.items) != 1 or selection.starts or selection.boundary:
+        return _Subject()
+    (key,) = selection.items
+    return _Subject(key, context.sketch.get_item(key).shape.path)

@@ -1,74 +1,104 @@
-"""The tool for the picture under the map: two points give its scale or make it level, dragging moves it."""
+"""The tool for the picture under the map: two points scale or level it, dragging moves it."""
 
 from dataclasses import replace
 
 from robocov.errors import MapError
-from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model import require
-from robocov_app.editor.model.background import Background, levelled, to_scale
-from robocov_app.editor.model.coordinates import length_of
-from robocov_app.editor.model.geometry import distance, length_words
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
+from robocov_app.editor.model.background import Background, level_background, scale_to_length
+from robocov_app.editor.model.coordinates import parse_length
+from robocov_app.editor.model.geometry import distance, format_length
+from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
+
+CORNER_DECIMALS = 4  # of the position of a picture, m
 
 
 class ReferenceImageTool(Tool):
-    """Scales, levels and moves the picture."""
+    """Scales, levels and moves the reference image.
+
+    Attributes
+    ----------
+    moved : Background or None
+        The image at the position to which it is dragged.
+    """
 
     name = "picture"
+    key = "i"
     hint = "click two points; type how far apart they are, or Enter to make their line level; drag moves it"
     snaps = False
 
     def __init__(self) -> None:
         super().__init__()
-        self.moved: Background | None = None  # the picture where it is being dragged to
+        self.moved: Background | None = None
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
+        """Start a click or a drag."""
         require(context.sketch.background is not None, "there is no picture under the map: Ctrl B takes one")
-        self.begun = event
+        self.pressed = event
 
-    def twice(self, context: Workspace, event: PointerEvent) -> None:
-        """Take no notice: two points in one place mean nothing."""
+    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+        """Ignore a double click: two points in one place have no distance."""
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self.at, laid = event.raw, context.sketch.background
-        if self.begun is not None and laid is not None and event.is_apart_from(self.begun.raw):
-            dx, dy = event.raw[0] - self.begun.raw[0], event.raw[1] - self.begun.raw[1]
-            self.moved = replace(laid, corner=(laid.corner[0] + dx, laid.corner[1] + dy))
+        """Drag the image."""
+        self.cursor = event.raw
+        background = context.sketch.background
+        if self.pressed is None or background is None or not event.has_moved_from(self.pressed.raw):
+            return
+        dx = event.raw[0] - self.pressed.raw[0]
+        dy = event.raw[1] - self.pressed.raw[1]
+        corner = (background.corner[0] + dx, background.corner[1] + dy)
+        self.moved = replace(background, corner=corner)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        begun, moved, self.begun, self.moved = self.begun, self.moved, None, None
-        if begun is not None and moved is not None and not clicked:
-            corner = round(moved.corner[0], 4), round(moved.corner[1], 4)
-            context.change(underlaid(context.sketch, replace(moved, corner=corner)))
-        elif begun is not None:
-            self.clicked = [*self.clicked[-1:], event.raw]
-            if len(self.clicked) == 2:
-                context.say("type how many metres apart the points are; Enter alone makes their line level")
+        """Apply the drag, or add a point."""
+        pressed = self.pressed
+        moved = self.moved
+        self.pressed = None
+        self.moved = None
+        if pressed is None:
+            return
+        if moved is not None and not clicked:
+            x, y = moved.corner
+            corner = (round(x, CORNER_DECIMALS), round(y, CORNER_DECIMALS))
+            context.apply(set_background(context.sketch, replace(moved, corner=corner)))
+            return
+        self.clicked = [*self.clicked[-1:], event.raw]
+        if len(self.clicked) == 2:
+            context.show_message(
+                "type how many metres apart the points are; Enter alone makes their line level"
+            )
 
     def finish(self, context: Workspace) -> bool:
+        """Turn the image so that the line between the two points is level or upright."""
         if len(self.clicked) != 2 or context.sketch.background is None:
             return False
-        (a, b), self.clicked = self.clicked, []
-        context.change(underlaid(context.sketch, levelled(context.sketch.background, a, b)))
+        start, end = self.clicked
+        self.clicked = []
+        background = level_background(context.sketch.background, start, end)
+        context.apply(set_background(context.sketch, background))
         return True
 
-    def enter(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: Workspace, text: str) -> None:
+        """Scale the image so that the two points have a typed distance."""
         if len(self.clicked) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
-        a, b = self.clicked
-        laid = to_scale(context.sketch.background, a, b, length_of(text))
+        start, end = self.clicked
+        background = scale_to_length(context.sketch.background, start, end, parse_length(text))
         self.clicked = []
-        context.change(underlaid(context.sketch, laid))
+        context.apply(set_background(context.sketch, background))
 
     def cancel(self, context: Workspace) -> bool:
+        """Drop what is dragged, and the points."""
         self.moved = None
         return super().cancel(context)
 
-    def preview(self, context: Workspace) -> Preview | None:
+    def build_draw_state(self, context: Workspace) -> DrawState:
+        """Return the dragged image, and the line between the points."""
         if not self.clicked:
-            return None
-        line = (*self.clicked, self.at)[:2]
-        words = f"now {length_words(distance(*line))}"
+            return DrawState(background=self.moved)
+        line = (*self.clicked, self.cursor)[:2]
+        label = f"now {format_length(distance(*line))}"
         if len(self.clicked) == 2:
-            words += "; type how far apart they are, or Enter makes them level"
-        return Preview(line, words=words)
+            label += "; type how far apart they are, or Enter makes them level"
+        return DrawState(background=self.moved, line=line, label=label)

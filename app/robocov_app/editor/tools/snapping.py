@@ -1,339 +1,382 @@
-"""Snapping of the cursor: grid, vertices, edges, angles, alignment; never beyond its reach."""
+"""Snapping of the pointer to grid, vertices, edges, angles and alignment, never beyond its reach."""
 
 import math
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, combinations, islice
-from typing import Any, Literal, Self, TypeAlias, get_args
+from itertools import combinations, islice
+from typing import Literal, NamedTuple, Self, TypeAlias, get_args
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 
-from robocov.arrays import Array
-from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
-from robocov_app.editor.model.geometry import as_array, bearing, cos_sin, nearest_on
-from robocov_app.editor.model.selection import Vertex
-from robocov_app.editor.model.sketch import Owner, Sketch, geometry_of
-from robocov_app.render.surface_cache import Latest
+from robocov.environment import Point
+from robocov_app.editor.model.geometry import compute_bearing, compute_cos_sin
+from robocov_app.editor.tools.snap_targets import Dragged, PointKind, Snapper, SnapTargets, count_vertices
 
-Dragged: TypeAlias = Iterable[Owner | Vertex]
-PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
-MANY = 1500  # vertices of a map from which on the window does not wait for its targets
-_MOST_EDGES = 8  # edges near a point that are looked at: more can only be where nothing can be told apart
+__all__ = [
+    "KINDS",
+    "SNAPS",
+    "Dragged",
+    "Guide",
+    "Snap",
+    "SnapMode",
+    "SnapSettings",
+    "SnapTargets",
+    "Snapper",
+    "count_vertices",
+    "snap_angle",
+    "snap_move",
+    "snap_point",
+]
 
-
-class Targets:
-    """Snap targets, with `more` points, without what is dragged; outlines of walls and circles too."""
-
-    def __init__(self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> None:
-        dragged: dict[tuple[Owner, int], set[int]] = defaultdict(set)
-        owners: set[Owner] = {item.key for item in sketch.obstacles if item.hidden}
-        for each in without:
-            if isinstance(each, Vertex):
-                dragged[each.of, each.ring].add(each.index)
-            else:
-                owners.add(each)
-        points, rims, centres = list[Point](), list(more), list[Point]()
-        edges, walls, circles = list[tuple[Point, Point]](), list[Any](), list[Any]()
-        for owner in sketch.owners:
-            if owner in owners:
-                continue
-            thing = sketch.thing(owner)
-            if isinstance(thing, CircleObstacle | DiscStart):
-                centres.append(thing.center)
-                rims += sketch.ring_points(owner)[0][1:]
-            if isinstance(thing, CircleObstacle):
-                circles.append(geometry_of(thing))
-            elif isinstance(thing, WallObstacle):
-                walls.append(geometry_of(thing))
-            elif isinstance(thing, PointsStart):
-                centres += [at for k, at in enumerate(thing.positions) if k not in dragged[owner, 0]]
-            for ring, line, closed in sketch.rings_of(owner):
-                gone, count = dragged[owner, ring], len(line)
-                points += [point for k, point in enumerate(line) if k not in gone] if gone else line
-                pairs = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
-                edges += [(line[a], line[b]) for a, b in pairs if a not in gone and b not in gone]
-        lows, highs = np.array(edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
-        marks = np.concatenate([as_array([*points, *rims]), _outline(walls)[0]])
-        kinds = {"vertex": marks, "centre": as_array(centres), "middle": (lows + highs) / 2}
-        self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
-        around = _outline([*walls, *circles])  # walls and circles are found by what they look like, too
-        self.starts, self.ends = np.concatenate([lows, around[0]]), np.concatenate([highs, around[1]])
-        low, high = np.minimum(self.starts, self.ends), np.maximum(self.starts, self.ends)
-        self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
-        # what is in line counts of vertices and centres, sorted along each axis
-        marks = np.concatenate([marks, kinds["centre"]])
-        self._sorted = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
-
-    def nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
-        if kind not in self._places:
-            return None
-        tree, places = self._places[kind]
-        away, k = tree.query(point, distance_upper_bound=np.nextafter(reach, np.inf))
-        return _point(places[k]) if away <= reach else None
-
-    def edges_near(self, point: Point, reach: float) -> list[tuple[Point, Point]]:
-        """Return the ends of the edges within `reach` m, the nearest first."""
-        x, y = point
-        found = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
-        starts, ends = self.starts[found], self.ends[found]
-        _, away = nearest_on(starts, ends, point)
-        order = np.argsort(away, kind="stable")
-        order = order[away[order] <= reach][:_MOST_EDGES]
-        return [(_point(starts[k]), _point(ends[k])) for k in order]
-
-    def in_line(self, point: Point, axis: int, reach: float, horizon: float) -> Point | None:
-        """Return the mark within the horizon that is nearest along an axis, within `reach` m, then at all."""
-        marks = self._sorted[axis]
-        first, last = np.searchsorted(marks[:, axis], (point[axis] - reach, point[axis] + reach))
-        some = marks[first:last]
-        some = some[np.hypot(*(some - point).T) <= horizon]
-        if not len(some):
-            return None
-        off = np.round(np.abs(some[:, axis] - point[axis]), 9)
-        return _point(some[np.lexsort((np.hypot(*(some - point).T), off))[0]])
+SnapKind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
+KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
 
-class Snapper:
-    """The targets that were asked for last; of large maps worked out beside the window."""
+class SnapMode(NamedTuple):
+    """A snap mode that can be switched on and off.
 
-    def __init__(self) -> None:
-        self.patient = False  # to wait for the targets of large maps too
-        self._latest: Latest[Future[Targets]] = Latest()
-        self._pool = ThreadPoolExecutor(1, "targets")
+    Attributes
+    ----------
+    title : str
+        Its label.
+    kinds : frozenset of str
+        Kinds of `SnapSettings.kinds` that it stands for.
+    """
 
-    def targets(self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> Targets | None:
-        """Return what to snap to; None as long as that is being worked out."""
-        look = frozenset(without), tuple(more)
-        coming = self._latest.of(sketch, look, lambda: self._pool.submit(Targets, sketch, *look))
-        return coming.result() if coming.done() or self.patient or vertex_count(sketch) < MANY else None
-
-    def close(self) -> None:
-        self._pool.shutdown(cancel_futures=True)
+    title: str
+    kinds: frozenset[SnapKind]
 
 
-def vertex_count(sketch: Sketch) -> int:
-    shapes = (item.shape for item in sketch.obstacles)
-    return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
-
-
-def _outline(geometries: list[shapely.Geometry]) -> tuple[Array, Array]:
-    rings = shapely.get_rings(np.array(geometries, dtype=object))
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    is_edge = ring[1:] == ring[:-1]
-    return points[:-1][is_edge], points[1:][is_edge]
-
-
-def _point(at: Array) -> Point:
-    x, y = at.tolist()
-    return x, y
-
-
-Kind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
-KINDS: frozenset[Kind] = frozenset(get_args(Kind))
-SNAPS: dict[str, tuple[str, frozenset[Kind]]] = {
-    "grid": ("Grid", frozenset({"grid"})),
-    "vertices": ("Vertices", frozenset({"vertex", "middle", "centre", "crossing"})),
-    "edges": ("Edges", frozenset({"edge"})),
-    "angles": ("Angles", frozenset({"angle"})),
-    "alignment": ("Alignment", frozenset({"aligned"})),
+SNAPS: dict[str, SnapMode] = {
+    "grid": SnapMode("Grid", frozenset({"grid"})),
+    "vertices": SnapMode("Vertices", frozenset({"vertex", "middle", "centre", "crossing"})),
+    "edges": SnapMode("Edges", frozenset({"edge"})),
+    "angles": SnapMode("Angles", frozenset({"angle"})),
+    "alignment": SnapMode("Alignment", frozenset({"aligned"})),
 }
-"""Snap modes as people choose them: title, and the kinds of `Snapping`."""
+"""The snap modes by their names."""
 
-_HORIZON = 60.0  # so many reaches away something still counts as in line: about what a window shows
-_MOST_POINTS = 16  # points of what is moved that are looked at
+MAX_ALIGNMENT_REACHES = 60.0  # reaches within which marks align: about the width of a window
+MAX_MOVED_POINTS = 16  # points of dragged objects that may snap
+MAX_EDGE_LINES = 4  # edges near a point that are combined with other lines
 _PARALLEL = 1e-9
+_EDGE_TOLERANCE_M = 1e-9
 
 
 @dataclass(frozen=True)
 class Guide:
-    """Why a point snapped: what a window shows of it."""
+    """A line or mark that explains why a point has snapped.
 
-    kind: Kind
-    line: tuple[Point, ...]  # m; from where it comes to the point; a single point where a mark is enough
-    words: str  # such as "vertex", "45°", "in line"
+    Attributes
+    ----------
+    kind : str
+        Kind of the snap.
+    line : tuple of Point
+        Line to the snapped point, m; a single point where a mark is enough.
+    label : str
+        Short text such as "vertex", "45°" or "in line".
+    """
+
+    kind: SnapKind
+    line: tuple[Point, ...]
+    label: str
 
 
 @dataclass(frozen=True)
 class Snap:
-    """Snapped point and the guides that explain it; no guides where it stayed."""
+    """A snapped point and the guides that explain it; without guides it has not snapped."""
 
     point: Point
     guides: tuple[Guide, ...] = ()
 
 
 @dataclass(frozen=True)
-class Snapping:
-    """Snap settings."""
+class SnapSettings:
+    """Snap settings.
 
-    reach: float  # m; nothing moves farther; a window gives what some pixels are
-    grid: float = 0.1  # m; spacing of the grid
-    angle: float = 15.0  # degrees; directions from the point before, counted from the x axis
-    to: frozenset[Kind] = KINDS  # kinds of what is snapped to; empty for nothing
+    Attributes
+    ----------
+    reach : float
+        Maximum distance between a point and where it snaps, m.
+    grid : float
+        Spacing of the grid, m.
+    angle : float
+        Step of the directions from the previous point, degrees from the x axis.
+    kinds : frozenset of str
+        Kinds of snaps that are on; empty for none.
+    """
+
+    reach: float
+    grid: float = 0.1
+    angle: float = 15.0
+    kinds: frozenset[SnapKind] = KINDS
+
+
+def snap_point(
+    point: Point, targets: SnapTargets, settings: SnapSettings, origin: Point | None = None
+) -> Snap:
+    """Snap a point to marks, crossings of lines, lines, or the grid, in this order.
+
+    Parameters
+    ----------
+    point : Point
+        Position of the pointer, m.
+    targets : SnapTargets
+        What it can snap to.
+    settings : SnapSettings
+        What is switched on.
+    origin : Point, optional
+        Point from which angles count, m.
+
+    Returns
+    -------
+    Snap
+        The snapped point, or the same point without guides.
+    """
+    return _SnapSearch(point, targets, settings, origin).find_best().snap
+
+
+def snap_move(
+    points: Sequence[Point], dx: float, dy: float, targets: SnapTargets, settings: SnapSettings
+) -> Snap:
+    """Snap a move of several points: the one that snaps best decides.
+
+    Parameters
+    ----------
+    points : sequence of Point
+        Points that move together, m. Only the first snaps to grid, angles, middles and crossings.
+    dx, dy : float
+        Displacement, m.
+    targets : SnapTargets
+        What they can snap to.
+    settings : SnapSettings
+        What is switched on.
+
+    Returns
+    -------
+    Snap
+        The snapped displacement as `Snap.point`, m.
+    """
+    best_rank = (math.inf, math.inf)
+    best = Snap((dx, dy))
+    # Some of many points always happen to lie near the grid, so this says little about any one of them.
+    kinds_of_others = settings.kinds - {"grid", "angle", "middle", "crossing"}
+    settings_of_others = replace(settings, kinds=kinds_of_others)
+    for number, (x, y) in enumerate(_choose_moved_points(points)):
+        moved = (x + dx, y + dy)
+        ranked = _SnapSearch(moved, targets, settings if number == 0 else settings_of_others).find_best()
+        snapped_x, snapped_y = ranked.snap.point
+        shift = (dx + snapped_x - moved[0], dy + snapped_y - moved[1])
+        # The distance is that of the shift, so that rounding does not extend the reach.
+        gap = math.hypot(shift[0] - dx, shift[1] - dy)
+        if ranked.snap.guides and gap <= settings.reach and (ranked.rank, gap) < best_rank:
+            best_rank = (ranked.rank, gap)
+            best = Snap(shift, ranked.snap.guides)
+    return best
+
+
+def _choose_moved_points(points: Sequence[Point]) -> Sequence[Point]:
+    """Return the points that may snap: all, or the first one and some on the convex hull."""
+    if len(points) <= MAX_MOVED_POINTS:
+        return points
+    hull = shapely.convex_hull(shapely.multipoints(np.array(points)))
+    corners = shapely.get_coordinates(hull).tolist()
+    step = math.ceil(len(corners) / (MAX_MOVED_POINTS - 1))
+    return [points[0], *corners[::step]]
+
+
+def snap_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
+    """Return the nearest multiple of `step` if it is within `reach`, all in degrees."""
+    nearest = step * round(degrees / step)
+    if abs(nearest - degrees) <= reach:
+        return nearest + 0.0
+    return degrees
 
 
 @dataclass(frozen=True)
-class _Line:
-    """A line that a point can come to lie on; an edge ends, the others do not."""
+class _SnapLine:
+    """A line to which points can snap; edges end, other lines do not."""
 
-    kind: Kind
-    through: Point
+    kind: SnapKind
+    origin: Point
     direction: Point
     guide: tuple[Point, ...]
-    words: str
+    label: str
     length: float = math.inf
 
-    def along(self, point: Point) -> float:
-        dx, dy = point[0] - self.through[0], point[1] - self.through[1]
+    def project(self, point: Point) -> float:
+        """Return how far along the line the foot of a point is, m."""
+        dx = point[0] - self.origin[0]
+        dy = point[1] - self.origin[1]
         return dx * self.direction[0] + dy * self.direction[1]
 
-    def foot(self, point: Point) -> Point:
-        along = self.along(point)
-        return self.at(min(max(along, 0.0), self.length) if self.kind == "edge" else along)
+    def find_foot(self, point: Point) -> Point:
+        """Return the nearest point on the line."""
+        along = self.project(point)
+        if self.kind == "edge":
+            along = min(max(along, 0.0), self.length)
+        return self.locate(along)
 
-    def at(self, along: float) -> Point:
-        return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
+    def locate(self, along: float) -> Point:
+        """Return the point at a distance along the line, m."""
+        return self.origin[0] + along * self.direction[0], self.origin[1] + along * self.direction[1]
 
-    def crossing(self, other: Self) -> Point | None:
-        (ux, uy), (vx, vy) = self.direction, other.direction
-        across = ux * vy - uy * vx
-        if abs(across) < _PARALLEL:
+    def find_crossing(self, other: Self) -> Point | None:
+        """Return where two lines cross, None if they do not."""
+        ux, uy = self.direction
+        vx, vy = other.direction
+        cross = ux * vy - uy * vx
+        if abs(cross) < _PARALLEL:
             return None
-        dx, dy = other.through[0] - self.through[0], other.through[1] - self.through[1]
-        along, beyond = (dx * vy - dy * vx) / across, (dx * uy - dy * ux) / across
-        for line, part in ((self, along), (other, beyond)):
-            if line.kind == "edge" and not -1e-9 <= part <= line.length + 1e-9:
-                return None
-        return self.at(along)
+        dx = other.origin[0] - self.origin[0]
+        dy = other.origin[1] - self.origin[1]
+        along = (dx * vy - dy * vx) / cross
+        along_other = (dx * uy - dy * ux) / cross
+        if not self._covers(along) or not other._covers(along_other):
+            return None
+        return self.locate(along)
 
-    def grid_place(self, foot: Point, grid: float) -> Point | None:
-        """Return the place on it, near a foot, where the grid is; a ray has it in steps from its origin."""
+    def _covers(self, along: float) -> bool:
+        if self.kind != "edge":
+            return True
+        return -_EDGE_TOLERANCE_M <= along <= self.length + _EDGE_TOLERANCE_M
+
+    def find_grid_point(self, foot: Point, grid: float) -> Point | None:
+        """Return the grid point on the line near a foot; rays have grid points in steps from their origin."""
         if grid <= 0.0:
             return None
         if self.kind == "angle":
-            return self.at(_multiple(self.along(foot), grid))
+            return self.locate(_round_to_multiple(self.project(foot), grid))
         if min(map(abs, self.direction)) >= _PARALLEL:
             return None
-        axis = 0 if abs(self.direction[1]) < _PARALLEL else 1
-        there = _multiple(foot[axis], grid)
-        place = (there, foot[1]) if axis == 0 else (foot[0], there)
-        beyond = self.kind == "edge" and math.dist(self.foot(place), place) > _PARALLEL
-        return None if beyond else place
+        if abs(self.direction[1]) < _PARALLEL:
+            point = (_round_to_multiple(foot[0], grid), foot[1])
+        else:
+            point = (foot[0], _round_to_multiple(foot[1], grid))
+        is_beyond_end = self.kind == "edge" and math.dist(self.find_foot(point), point) > _PARALLEL
+        return None if is_beyond_end else point
 
-    def shown(self, at: Point) -> Guide:
-        return Guide(self.kind, self.guide if self.kind == "edge" else (*self.guide, at), self.words)
-
-
-def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:
-    """Return where a point snaps: to points, crossing lines, lines, the grid; angles count from `origin`."""
-    return _Candidates(point, targets, snapping, origin).best()[1]
+    def build_guide(self, point: Point) -> Guide:
+        """Return the guide for a point that has snapped to the line."""
+        line = self.guide if self.kind == "edge" else (*self.guide, point)
+        return Guide(self.kind, line, self.label)
 
 
-def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets, snapping: Snapping) -> Snap:
-    """Return as `point` the move near (dx, dy) m that snaps the nearest of some points."""
-    best: tuple[tuple[int, float], Snap] | None = None
-    # what many points meet somewhere means little of one of them
-    of_others = replace(snapping, to=snapping.to - {"grid", "angle", "middle", "crossing"})
-    if len(points) > _MOST_POINTS:  # the first one, and those on their hull
-        hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(np.array(points)))).tolist()
-        points = [points[0], *hull[:: math.ceil(len(hull) / (_MOST_POINTS - 1))]]
-    for k, (x, y) in enumerate(points):
-        at = x + dx, y + dy
-        rank, snap = _Candidates(at, targets, snapping if k == 0 else of_others).best()
-        by = dx + snap.point[0] - at[0], dy + snap.point[1] - at[1]
-        away = math.hypot(by[0] - dx, by[1] - dy)  # what rounding adds is not to add to the reach
-        if snap.guides and away <= snapping.reach and (best is None or (rank, away) < best[0]):
-            best = (rank, away), Snap(by, snap.guides)
-    return best[1] if best else Snap((dx, dy))
-
-
-def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
-    nearest = step * round(degrees / step)
-    return nearest + 0.0 if abs(nearest - degrees) <= reach else degrees
+class _RankedSnap(NamedTuple):
+    rank: int  # the lower the better
+    snap: Snap
 
 
 @dataclass(frozen=True)
-class _Candidates:
-    """Snap candidates of a point; angles count from `origin`."""
+class _SnapSearch:
+    """Search for where a point snaps; angles count from `origin`."""
 
     point: Point
-    targets: Targets
-    how: Snapping
+    targets: SnapTargets
+    settings: SnapSettings
     origin: Point | None = None
 
-    def best(self) -> tuple[int, Snap]:
-        """Return how well the point snapped, the lower the better, and where to."""
-        found = chain(self.marks("centre", "middle"), self.crossings())
-        ways = (self.marks("vertex"), found, self.on_lines(), self.on_grid())
-        for rank, way in enumerate(ways):
-            near = [snap for snap in way if math.dist(self.point, snap.point) <= self.how.reach]
+    def find_best(self) -> _RankedSnap:
+        """Return the best snap within reach: marks rank before crossings, lines and the grid."""
+        groups = (
+            self.list_marks("vertex"),
+            self.list_marks_and_crossings(),
+            self.list_line_snaps(),
+            self.list_grid_snaps(),
+        )
+        rank = 0
+        for group in groups:
+            near = [snap for snap in group if self._is_near(snap.point)]
             if near:
-                return rank, min(near, key=self.telling)
-        return len(ways), Snap(self.point)
+                return _RankedSnap(rank, min(near, key=self._sort_key))
+            rank += 1
+        return _RankedSnap(rank, Snap(self.point))
 
-    def telling(self, snap: Snap) -> tuple[int, int, float]:
-        # two lines say more than one, and the grid little
+    def _is_near(self, point: Point) -> bool:
+        return math.dist(self.point, point) <= self.settings.reach
+
+    def _sort_key(self, snap: Snap) -> tuple[int, int, float]:
+        # Two lines determine a point better than one, and the grid says little.
         lines = sum(guide.kind != "grid" for guide in snap.guides)
         return -lines, -len(snap.guides), math.dist(self.point, snap.point)
 
-    def marks(self, *kinds: PointKind) -> Iterator[Snap]:
+    def list_marks(self, *kinds: PointKind) -> Iterator[Snap]:
         for kind in kinds:
-            place = self.targets.nearest(self.point, kind, self.how.reach) if kind in self.how.to else None
-            if place is not None:
-                yield _mark(kind, place)
-
-    def crossings(self) -> Iterator[Snap]:
-        for edge, other in combinations(self.edges(), 2) if "crossing" in self.how.to else ():
-            place = other.crossing(edge)
-            if place is not None:
-                yield _mark("crossing", place)
-
-    def on_lines(self) -> Iterator[Snap]:
-        lines, reach, origin = list[_Line](), self.how.reach, self.origin
-        if "angle" in self.how.to and origin is not None and math.dist(self.point, origin) > reach:
-            degrees = self.how.angle * round(bearing(origin, self.point) / self.how.angle)
-            words = f"{math.remainder(degrees, 360.0) % 360.0:g}°"
-            lines.append(_Line("angle", origin, cos_sin(degrees), (origin,), words))
-        for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))) if "aligned" in self.how.to else ():
-            mark = self.targets.in_line(self.point, axis, reach, _HORIZON * reach)
+            if kind not in self.settings.kinds:
+                continue
+            mark = self.targets.find_nearest(self.point, kind, self.settings.reach)
             if mark is not None:
-                lines.append(_Line("aligned", mark, direction, (mark,), "in line"))
-        lines += islice(self.edges(), 4) if "edge" in self.how.to else ()
-        for k, line in enumerate(lines):
-            for other in lines[:k]:
-                both_edges = line.kind == other.kind == "edge"  # where two edges cross is a matter of its own
-                place = None if both_edges else line.crossing(other)
-                if place is not None:
-                    yield Snap(place, (other.shown(place), line.shown(place)))
-            foot = line.foot(self.point)
-            place = line.grid_place(foot, self.how.grid) if "grid" in self.how.to else None
-            if place is not None:
-                yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
-            yield Snap(foot, (line.shown(foot),))
+                yield _snap_to_mark(kind, mark)
 
-    def on_grid(self) -> Iterator[Snap]:
-        if "grid" in self.how.to and self.how.grid > 0.0:
-            x, y = (_multiple(value, self.how.grid) for value in self.point)
-            for place in ((x, y), (x, self.point[1]), (self.point[0], y)):
-                yield _mark("grid", place)
-                if math.dist(place, self.point) <= self.how.reach:
-                    return
+    def list_marks_and_crossings(self) -> Iterator[Snap]:
+        yield from self.list_marks("centre", "middle")
+        if "crossing" in self.settings.kinds:
+            for edge, other in combinations(self.list_edges(), 2):
+                crossing = other.find_crossing(edge)
+                if crossing is not None:
+                    yield _snap_to_mark("crossing", crossing)
 
-    def edges(self) -> Iterator[_Line]:
-        for a, b in self.targets.edges_near(self.point, self.how.reach):
-            length = math.dist(a, b)
+    def list_line_snaps(self) -> Iterator[Snap]:
+        lines: list[_SnapLine] = []
+        for line in self.list_lines():
+            for other in lines:
+                # Crossings of two edges have a snap kind of their own.
+                are_edges = line.kind == other.kind == "edge"
+                crossing = None if are_edges else line.find_crossing(other)
+                if crossing is not None:
+                    yield Snap(crossing, (other.build_guide(crossing), line.build_guide(crossing)))
+            lines.append(line)
+            foot = line.find_foot(self.point)
+            if "grid" in self.settings.kinds:
+                grid_point = line.find_grid_point(foot, self.settings.grid)
+                if grid_point is not None:
+                    grid_guide = Guide("grid", (grid_point,), "grid")
+                    yield Snap(grid_point, (line.build_guide(grid_point), grid_guide))
+            yield Snap(foot, (line.build_guide(foot),))
+
+    def list_lines(self) -> Iterator[_SnapLine]:
+        """Yield the lines near the point: a ray at a round angle, aligned marks, edges."""
+        reach = self.settings.reach
+        origin = self.origin
+        if "angle" in self.settings.kinds and origin is not None and not self._is_near(origin):
+            step = self.settings.angle
+            degrees = step * round(compute_bearing(origin, self.point) / step)
+            label = f"{math.remainder(degrees, 360.0) % 360.0:g}°"
+            yield _SnapLine("angle", origin, compute_cos_sin(degrees), (origin,), label)
+        if "aligned" in self.settings.kinds:
+            for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))):
+                mark = self.targets.find_aligned(self.point, axis, reach, MAX_ALIGNMENT_REACHES * reach)
+                if mark is not None:
+                    yield _SnapLine("aligned", mark, direction, (mark,), "in line")
+        if "edge" in self.settings.kinds:
+            yield from islice(self.list_edges(), MAX_EDGE_LINES)
+
+    def list_grid_snaps(self) -> Iterator[Snap]:
+        grid = self.settings.grid
+        if "grid" not in self.settings.kinds or grid <= 0.0:
+            return
+        x, y = self.point
+        grid_x = _round_to_multiple(x, grid)
+        grid_y = _round_to_multiple(y, grid)
+        for point in ((grid_x, grid_y), (grid_x, y), (x, grid_y)):
+            yield _snap_to_mark("grid", point)
+            if self._is_near(point):
+                return
+
+    def list_edges(self) -> Iterator[_SnapLine]:
+        for start, end in self.targets.list_edges_near(self.point, self.settings.reach):
+            length = math.dist(start, end)
             if length > 0.0:
-                direction = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-                yield _Line("edge", a, direction, (a, b), "edge", length)
+                direction = ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
+                yield _SnapLine("edge", start, direction, (start, end), "edge", length)
 
 
-def _mark(kind: Kind, place: Point) -> Snap:
-    return Snap(place, (Guide(kind, (place,), "middle of an edge" if kind == "middle" else kind),))
+def _snap_to_mark(kind: SnapKind, mark: Point) -> Snap:
+    label = "middle of an edge" if kind == "middle" else kind
+    return Snap(mark, (Guide(kind, (mark,), label),))
 
 
-def _multiple(value: float, step: float) -> float:
-    """Return the nearest multiple of a step, as the decimal that it is: 3 steps of 0.1 are 0.3."""
+def _round_to_multiple(value: float, step: float) -> float:
+    """Return the nearest multiple of a step as a decimal: 3 steps of 0.1 are 0.3."""
     return round(step * round(value / step), 9) + 0.0

@@ -1,8 +1,7 @@
-"""Documents opened, saved and left, with the questions that have to be asked."""
+"""Commands on files: open, save, import, export, recover, with the questions that have to be asked."""
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -12,254 +11,377 @@ from PIL import Image, UnidentifiedImageError
 from robocov.errors import MapError
 from robocov.mapfile import find_map_file, list_bundled_maps
 from robocov.text import remove_controls
-from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model import require
-from robocov_app.editor.model.background import picture_laid
-from robocov_app.editor.model.document import SUFFIX, Autosave, ChangedError, Document, opened_elsewhere
+from robocov_app.editor.model.background import create_background
+from robocov_app.editor.model.document import SUFFIX, Autosave, ChangedError, Document, is_open_elsewhere
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.editor import MOST_RECENT, Editor
+from robocov_app.editor.settings import MAX_RECENT
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.importing import Imported, Importing
+from robocov_app.editor.ui.importing import Imported, ImportJob
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect_format, export_map
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
 
-Act: TypeAlias = Callable[[], object]
-_PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
+Action: TypeAlias = Callable[[], object]
+IMPORT_PATIENCE_S = 2.0  # after which an import whose settings have changed is abandoned
+MIN_BACKGROUND_WIDTH_M = 1.0
+MAX_PARENT_FOLDERS = 1  # in the path of a picture relative to its map
+HEADER_BYTES = 4096  # of a file, in which the format of a map stands
+OPEN_SUFFIXES = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 _CANCEL = ("Cancel", "c", lambda: None)
-OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
+_PICTURE_ERRORS = (
+    OSError,
+    UnidentifiedImageError,
+    Image.DecompressionBombError,
+    ValueError,
+    SyntaxError,
+)
 
 
 class FileCommands:
-    """Commands on whole documents."""
+    """Commands on files.
 
-    def __init__(self, editor: Editor, drafts: Path | None, fit: Act, *, patient: bool = False) -> None:
-        self.editor, self.drafts, self._fit, self._patient = editor, drafts, fit, patient
+    Parameters
+    ----------
+    editor : Editor
+        The editor.
+    drafts : Path or None
+        Folder of drafts; None to keep none.
+    fit : callable
+        Shows the whole map.
+    patient : bool
+        Whether to wait for imports.
+
+    Attributes
+    ----------
+    leaving : bool
+        Whether the editor may be closed.
+    """
+
+    def __init__(self, editor: Editor, drafts: Path | None, fit: Action, *, patient: bool = False) -> None:
+        self.editor = editor
+        self.drafts = drafts
         self.leaving = False
-        self._pending: Document | None = None  # opened, until the present document may be left for it
+        self._fit = fit
+        self._patient = patient
+        self._pending: Document | None = None  # opened, until the present document may be closed
 
-    def leave(self, then: Act) -> None:
+    def leave(self, then: Action) -> None:
+        """Close the document, after asking about unsaved changes, and go on with an action."""
         document = self.editor.document
 
         def discard() -> None:
             then()
             document.close(discard=True)
 
-        if not document.history.unsaved:
+        if not document.history.has_unsaved_changes:
             discard()
             return
         save = partial(self.save, then=lambda: self.leave(then))
-        words = f"“{document.title}” has changes that are in no file."
+        text = f"“{document.title}” has changes that are in no file."
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
-        self.editor.ask("Save the changes?", words, *answers)
+        self.editor.ask_question("Save the changes?", text, *answers)
 
-    def _leave_for(self, document: Document, words: str) -> None:
-        """Show another document, as soon as the present one may be left."""
+    def _leave_for(self, document: Document, message: str) -> None:
+        """Show another document as soon as the present one may be closed."""
         self._pending = document
-        self.leave(lambda: self._put(document, words))
+        self.leave(lambda: self._show(document, message))
 
     def _close_pending(self) -> None:
-        """Close a document that was opened, but for which the present one was not left."""
+        """Close a document that was opened but not shown, because the present one stayed open."""
         if self._pending is not None:
             self._pending.close(discard=True)
             self._pending = None
 
-    def _put(self, document: Document, words: str) -> None:
+    def _show(self, document: Document, message: str) -> None:
         if document is self._pending:
             self._pending = None
-        self.editor.put(document)
+        self.editor.open_document(document)
         self._fit()
         if document.path is not None:
             self.remember(document.path)
-        self.editor.say(words)
+        self.editor.show_message(message)
 
     def quit(self) -> None:
-        self.leave(lambda: setattr(self, "leaving", True))
+        """Close the editor."""
+
+        def set_leaving() -> None:
+            self.leaving = True
+
+        self.leave(set_leaving)
 
     def new(self) -> None:
-        words = "a new map: 10 x 10 m; B draws another boundary"
-        self.leave(lambda: self._put(Document.new(self.drafts), words))
+        """Open a new map."""
+        message = "a new map: 10 x 10 m; B draws another boundary"
+        self.leave(lambda: self._show(Document.new(self.drafts), message))
 
     def ask_path(
-        self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
+        self, title: str, action: Callable[[Path], object], suffixes: Sequence[str], text: str = ""
     ) -> None:
-        def chosen(path: Path) -> None:
-            self.editor.carry_out(lambda: call(path))
+        """Ask for a path, and call an action with it.
 
-        self.editor.dialogs.ask(file_choice(title, self.editor.folder, chosen, endings=endings, text=text))
+        Parameters
+        ----------
+        title : str
+            Title of the dialog.
+        action : callable
+            Gets the path.
+        suffixes : sequence of str
+            Suffixes of the files that are offered.
+        text : str
+            The path that is suggested.
+        """
+
+        def choose(path: Path) -> None:
+            self.editor.carry_out(lambda: action(path))
+
+        dialog = file_choice(title, self.editor.folder, choose, endings=suffixes, text=text)
+        self.editor.dialogs.ask(dialog)
 
     def ask_recent(self) -> None:
-        names = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
-        names += [Option(name, "comes with robocov; opens as a copy") for name in list_bundled_maps()]
+        """Ask for a recent or bundled map, and open it."""
+        options = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
+        options += [Option(name, "comes with robocov; opens as a copy") for name in list_bundled_maps()]
 
-        def chosen(option: Option) -> None:
+        def choose(option: Option) -> None:
             self.editor.carry_out(lambda: self.open(find_map_file(option.text)))
 
-        self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
+        self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: options, choose))
 
     def open(self, path: Path) -> None:
+        """Open a map, or import a foreign file; the open map itself is reloaded.
+
+        Raises
+        ------
+        MapError
+            If the file cannot be read, or another editor has it open.
+        """
         require_regular_file(path)
-        own = self.editor.document.path
-        if own is not None and own.exists() and path.exists() and path.samefile(own):
+        present = self.editor.document.path
+        if present is not None and present.exists() and path.exists() and path.samefile(present):
             self.reload()
             return
         self._close_pending()
-        if opened_elsewhere(self.drafts, path=path):
+        if is_open_elsewhere(self.drafts, path=path):
             raise MapError(f"{path.name}: another editor has it open")
-        found = opened(path, self.drafts)
-        if isinstance(found, Document):
-            self._leave_for(found, heading(found))
+        result = open_or_detect(path, self.drafts)
+        if isinstance(result, Document):
+            self._leave_for(result, describe_opening(result))
         else:
-            self.ask_import(path, found)
+            self.ask_import(path, result)
 
     def ask_import(self, path: Path, importer: Importer) -> None:
-        def put(imported: Imported) -> None:
+        """Ask how a foreign file is to be imported, and open the result."""
+
+        def accept(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
             self._close_pending()
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
             self._leave_for(document, f"imported: {path.name}, not saved yet")
 
-        worker: Worker[Imported] = DirectWorker(Importing())
+        worker: Worker[Imported] = DirectWorker(ImportJob())
         if not self._patient:
-            worker = LatestWorker(f"{Importing.__module__}:Importing", "imports", patience=_PATIENCE)
-        self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
+            job = f"{ImportJob.__module__}:{ImportJob.__name__}"
+            worker = LatestWorker(job, "imports", patience=IMPORT_PATIENCE_S)
+        self.editor.dialogs.ask(ImportDialog(path, importer, worker, accept))
 
     def recover(self, draft: Autosave) -> None:
-        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), f"recovered: {draft.words()}"))
+        """Open a map that an editor left unsaved."""
+        message = f"recovered: {draft.describe()}"
+        self.leave(lambda: self._show(Document.recover(draft, self.drafts), message))
 
     def remember(self, path: Path) -> None:
-        name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
-        self.editor.recent = [name, *(each for each in self.editor.recent if each != name)][:MOST_RECENT]
+        """Put a path at the top of the recent maps."""
+        # Links are not resolved, so that people recognise the path.
+        name = os.path.abspath(path)  # noqa: PTH100
+        others = [recent for recent in self.editor.recent if recent != name]
+        self.editor.recent = [name, *others][:MAX_RECENT]
 
-    def save(self, then: Act | None = None) -> str | None:
+    def save(self, then: Action | None = None) -> str | None:
+        """Save the map, and go on with an action; return the status message."""
         if self.editor.document.path is None:
             self.ask_name(then)
             return None
         return self._save(self.editor.document.path, then)
 
-    def ask_name(self, then: Act | None = None) -> None:
+    def ask_name(self, then: Action | None = None) -> None:
+        """Ask for a path, save the map there, and go on with an action."""
         folder = self.editor.folder
-        suggested = self.editor.document.suggested(folder)
+        suggested = self.editor.document.suggest_path(folder)
         text = suggested.name if suggested.parent == folder else str(suggested)
         self.ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
 
-    def _save(self, path: Path, then: Act | None, *, over: bool = False, spoil: bool = False) -> str | None:
-        editor = self.editor
-        if not (over or spoil) and editor.document.spoils(path):
-            words = f"{path.name} holds a valid map; this one cannot run yet."
-            self._ask_over("Save a draft over it?", words, then, lambda: self._save(path, then, spoil=True))
+    def _save(
+        self, path: Path, then: Action | None, *, overwrites: bool = False, spoils: bool = False
+    ) -> str | None:
+        """Save the map, after asking before a file is replaced that has changed or holds a valid map."""
+        document = self.editor.document
+        if not overwrites and not spoils and document.would_spoil(path):
+            text = f"{path.name} holds a valid map; this one cannot run yet."
+            save_draft = partial(self._save, path, then, spoils=True)
+            self._ask_overwrite("Save a draft over it?", text, then, save_draft)
             return None
         try:
-            words = editor.document.save(path, over=over)
+            message = document.save(path, over=overwrites)
         except ChangedError as error:
-            self._ask_over("Replace the file?", str(error), then, partial(self._save, path, then, over=True))
+            overwrite = partial(self._save, path, then, overwrites=True)
+            self._ask_overwrite("Replace the file?", str(error), then, overwrite)
             return None
-        assert editor.document.path is not None
-        self.remember(editor.document.path)
-        if grave := [problem for problem in editor.problems if problem.grave]:
-            words += f", as a draft: {grave[0].words}"
+        assert document.path is not None
+        self.remember(document.path)
+        errors = [problem for problem in self.editor.problems if problem.is_error]
+        if errors:
+            message += f", as a draft: {errors[0].message}"
         if then is not None:
             then()
-        return words
+        return message
 
-    def _ask_over(self, title: str, words: str, then: Act | None, go_on: Act) -> None:
-        answers = (("Save as…", "a", lambda: self.ask_name(then)), ("Replace it", "r", go_on), _CANCEL)
-        self.editor.ask(title, words, *answers)
+    def _ask_overwrite(self, title: str, text: str, then: Action | None, overwrite: Action) -> None:
+        save_as = ("Save as…", "a", lambda: self.ask_name(then))
+        self.editor.ask_question(title, text, save_as, ("Replace it", "r", overwrite), _CANCEL)
 
     def ask_export(self) -> None:
-        self.editor.sketch.environment()
+        """Ask for a path, and export the map there."""
+        # Raises before a path is chosen if the map cannot be exported.
+        self.editor.sketch.build_environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
-        suggested = self.editor.document.suggested(self.editor.folder)
+        suggested = self.editor.document.suggest_path(self.editor.folder)
         self.ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
 
-    def _export(self, path: Path, *, over: bool = False) -> str | None:
-        if path.exists() and not over:
-            over_it = ("Replace it", "r", lambda: self._export(path, over=True))
-            answers = (("Another name…", "a", self.ask_export), over_it, _CANCEL)
-            self.editor.ask("Replace the file?", f"{path} is there already.", *answers)
+    def _export(self, path: Path, *, overwrites: bool = False) -> str | None:
+        if path.exists() and not overwrites:
+            another_name = ("Another name…", "a", self.ask_export)
+            replace_it = ("Replace it", "r", lambda: self._export(path, overwrites=True))
+            text = f"{path} is there already."
+            self.editor.ask_question("Replace the file?", text, another_name, replace_it, _CANCEL)
             return None
-        report = export_map(self.editor.sketch.environment(), path)
+        report = export_map(self.editor.sketch.build_environment(), path)
         files = ", ".join(map(str, report.files))
         return "; ".join([f"exported: {files}", *report.warnings, *report.dropped])
 
-    def look(self) -> None:
+    def poll(self) -> None:
+        """Accept an import that is ready, and look for changes of the file."""
         editor = self.editor
-        if isinstance(asked := editor.dialogs.asked, ImportDialog) and (imported := asked.poll()) is not None:
-            editor.dialogs.close()
-            editor.attempt(lambda: asked.call(imported))
+        dialog = editor.dialogs.asked
+        if isinstance(dialog, ImportDialog):
+            imported = dialog.poll()
+            if imported is not None:
+                editor.dialogs.close()
+                editor.attempt(lambda: dialog.call(imported))
         if editor.dialogs.asked is not None:
             return
-        state = editor.document.look(editor.now)
+        state = editor.document.check_disk(editor.now)
+        title = editor.document.title
         if state == "gone":
-            editor.say(f"{editor.document.title} is no longer there; Ctrl S writes it again", trouble=True)
+            editor.show_message(f"{title} is no longer there; Ctrl S writes it again", is_error=True)
         elif state == "changed":
-            words = f"Something else has changed {editor.document.title}. Reloading can be undone."
-            answers = (("Reload", "r", self.reload), ("Keep mine", "k", editor.document.keep_mine))
-            editor.ask("The file has changed", words, *answers)
+            text = f"Something else has changed {title}. Reloading can be undone."
+            reload = ("Reload", "r", self.reload)
+            keep = ("Keep mine", "k", editor.document.ignore_disk_change)
+            editor.ask_question("The file has changed", text, reload, keep)
 
     def reload(self) -> str:
+        """Read the file again, which can be undone; return the status message."""
         require(self.editor.document.path, "the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
         return f"read again: {self.editor.document.title}"
 
-    def underlay(self, path: Path) -> None:
-        lay_under(self.editor, path)
-        self.editor.choose("picture")
+    def open_background(self, path: Path) -> None:
+        """Put a picture under the map, and choose its tool."""
+        set_reference_image(self.editor, path)
+        self.editor.choose_tool("picture")
         self._fit()
 
 
-def lay_under(editor: Editor, path: Path) -> None:
-    """Put a picture under the map, as wide as the map is, or 20 m."""
+def set_reference_image(editor: Editor, path: Path) -> None:
+    """Put a picture under the map, as wide as the map, or 20 m wide.
+
+    Raises
+    ------
+    MapError
+        If the file is not a picture, or its path cannot be written to a map.
+    """
     require_regular_file(path)
     try:
         with Image.open(path) as picture:
             pixels = picture.size
-    except (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
+    except _PICTURE_ERRORS:
         raise MapError(f"{path}: not a picture that can be read") from None
-    bounds = editor.sketch.bounds
-    name = _from_map(path, editor.document.path)
+    name = _describe_picture_path(path, editor.document.path)
     if remove_controls(name) != name:
         raise MapError(
             f"{path}: expected a picture whose path is text, got control characters or other bytes"
         )
-    laid = picture_laid(name, pixels)
+    background = create_background(name, pixels)
+    bounds = editor.sketch.bounds
     if bounds is not None and editor.sketch.background is None:
-        laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
+        low_x, _, high_x, _ = bounds
+        background = create_background(name, pixels, max(high_x - low_x, MIN_BACKGROUND_WIDTH_M))
     editor.shown.add("picture")
-    editor.change(underlaid(editor.sketch, laid))
+    editor.apply(set_background(editor.sketch, background))
 
 
-def _from_map(path: Path, of: Path | None) -> str:
-    """Return how a map names a picture: from its own folder where that is near, else from the root."""
+def _describe_picture_path(path: Path, map_path: Path | None) -> str:
+    """Return the path of a picture as in a map: relative to the map if it is near, else absolute."""
     path = path.resolve()
-    with suppress(ValueError):  # on another drive
-        if of is not None and (near := os.path.relpath(path, of.resolve().parent)).count("..") < 2:
-            return Path(near).as_posix()
+    if map_path is not None:
+        try:
+            relative = os.path.relpath(path, map_path.resolve().parent)
+        except ValueError:
+            # The picture is on another drive.
+            return path.as_posix()
+        if relative.count("..") <= MAX_PARENT_FOLDERS:
+            return Path(relative).as_posix()
     return path.as_posix()
 
 
-def opened(path: Path, drafts: Path | None) -> Document | Importer:
-    """Return the document of a file; or the format of one that has to be imported."""
+def open_or_detect(path: Path, drafts: Path | None) -> Document | Importer:
+    """Open a map, or detect the format of a foreign file.
+
+    Parameters
+    ----------
+    path : Path
+        A map, a foreign file, or the path of a new map.
+    drafts : Path or None
+        Folder of drafts; None to keep none.
+
+    Returns
+    -------
+    Document or Importer
+        The opened map, or the importer of a foreign file.
+
+    Raises
+    ------
+    MapError
+        If the file is neither a map nor of a known format.
+    """
     require_regular_file(path)
-    if path.suffix.lower() == SUFFIX and not path.exists():
+    has_map_suffix = path.suffix.lower() == SUFFIX
+    if has_map_suffix and not path.exists():
         return Document.new(drafts, path)
     try:
-        return Document.opened(path, drafts)
+        return Document.open_file(path, drafts)
     except MapError as error:
-        if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
-            try:
-                return detect_format(path)
-            except MapError:  # which names it for what it is
-                if path.suffix.lower() != SUFFIX and not _is_map(path):
-                    raise
-        raise error from None
+        map_error = error
+    if not path.is_file() or (has_map_suffix and _is_map(path)):
+        raise map_error
+    try:
+        return detect_format(path)
+    except MapError:
+        # The error of a foreign file says what it is; that of a broken map, what is wrong with it.
+        if has_map_suffix or _is_map(path):
+            raise map_error from None
+        raise
 
 
-def heading(document: Document) -> str:
+def describe_opening(document: Document) -> str:
+    """Return the status message for a document that was opened."""
     if document.path is None:
         return f"{document.title}: opened as a copy"
     if not document.path.exists():
@@ -268,8 +390,9 @@ def heading(document: Document) -> str:
 
 
 def _is_map(path: Path) -> bool:
+    """Return whether a file claims to be a map, or cannot be read."""
     try:
         with path.open("rb") as file:
-            return b"robocov-map" in file.read(4096)
+            return b"robocov-map" in file.read(HEADER_BYTES)
     except OSError:
         return True

@@ -1,356 +1,371 @@
-"""The import dialog: options at the left, the map before and after at the right, the report below."""
+"""The import dialog: options on the left, the map before and after on the right, the report below."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygame
-import shapely
 from pygame import Rect, Surface
 
+from robocov.environment import Point
 from robocov.errors import RobocovError
-from robocov_app.editor.ui.import_sheet import declared_colours, find_role, give_role, next_role
-from robocov_app.editor.ui.importing import Imported, options_of
+from robocov_app.editor.ui.import_preview import ImportPreview
+from robocov_app.editor.ui.import_sheet import (
+    ColourSheet,
+    choose_next_role,
+    find_role,
+    list_declared_colours,
+    set_role,
+)
+from robocov_app.editor.ui.importing import Imported, ImportOption, list_options
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.colours import Colour, name_colour
-from robocov_app.formats.reports import format_area
 from robocov_app.jobs.workers import Worker
-from robocov_app.render import layout, surface_cache
-from robocov_app.render.camera import Camera
-from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.theme import Theme
+from robocov_app.render.fonts import label
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import SMALL, Ui
 
-# pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map
-_COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
-_FEWEST_LINES = 7  # of the report; more below maps that are wide
-_HINTS = {
-    "part": "click into the map: keep that part · Tab option · Enter imports · Esc leaves",
-    "colour": "click into the left map, or Space on a colour: free, solid, ignored · Enter imports",
+# Lengths in pixels at scale 1.
+OPTIONS_WIDTH_PX = 300
+OPTION_LABEL_WIDTH_PX = 126
+OPTIONS_GAP_PX = 32  # between options and maps
+REPORT_LINE_PX = 17
+MAX_ROW_PX = 28.0  # of an option
+HELP_MARGIN_PX = 40  # below the options, for the buttons
+BUTTONS_HEIGHT_PX = 30
+CHIP_WIDTH_PX = 78  # of a colour with its role
+CHIP_GAP_PX = 6
+SWATCH_PX = 12
+MAPS_GAP_PX = 14  # between maps and report
+
+MIN_REPORT_LINES = 7
+MAX_ENTRY_CHARACTERS = 200
+DEFAULT_TEXT = "default"
+KEEP_PART = "part"
+SET_COLOUR = "colour"
+HINTS = {
+    KEEP_PART: "click into the map: keep that part · Tab option · Enter imports · Esc leaves",
+    SET_COLOUR: "click into the left map, or Space on a colour: free, solid, ignored · Enter imports",
 }
-_CHIP, _SWATCH = 78, 12  # pixels at scale 1: of a colour with its role, and of its square
-_ROLE_NAMES = {None: "default", "free": "free", "solid": "solid", "ignore": "ignore"}
-_DEFAULT = "default"
+_ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ignore"}
 
 
 class ImportDialog(Dialog):
-    """Asks how a file is to be imported, with a live preview; `call` gets what is accepted."""
+    """Asks how a file is to be imported, with a live preview.
 
-    width = 10_000.0  # all that the window has
+    Parameters
+    ----------
+    path : Path
+        The file.
+    importer : Importer
+        Its format.
+    worker : Worker of Imported
+        Imports it.
+    call : callable
+        Gets the imported map that the user accepts.
+
+    Attributes
+    ----------
+    options : tuple of ImportOption
+        The options of the import.
+    entries : dict of str to str
+        Typed and chosen texts by the names of options.
+    imported : Imported or None
+        The map with the newest settings that could be imported.
+    accepted : bool
+        Whether the user has accepted the map, as soon as it is ready.
+    click_action : str
+        What a click into a map does: keep a part, or set the role of a colour.
+    """
+
+    width = 10_000.0  # as wide as the window
 
     def __init__(
         self, path: Path, importer: Importer, worker: Worker[Imported], call: Callable[[Imported], object]
     ) -> None:
-        self.path, self.importer, self.call = path, importer, call
-        self.options = options_of(importer)
-        self.given: dict[str, str] = {}  # what was typed or chosen, by the names of options
-        self.imported: Imported | None = None  # of the newest settings that could be imported
-        self.accepted = False  # whether it is wanted as it is set, as soon as it is there
-        self.cameras: list[Camera] = []
-        self.clicks = "part"  # what a click into the map chooses: a part to keep, or the role of a colour
-        self._seen: Ui | None = None
+        self.path = path
+        self.importer = importer
+        self.call = call
+        self.options = list_options(importer)
+        self.entries: dict[str, str] = {}
+        self.imported: Imported | None = None
+        self.accepted = False
+        self.click_action = KEEP_PART
+        self.preview = ImportPreview()
         self._worker = worker
-        self._picture: surface_cache.Latest[Surface] = surface_cache.Latest()
-        self._ask()
+        self._mistake = ""  # in the options
+        self._focused_ui: Ui | None = None  # in which the first field has got the text cursor
+        self._request()
 
     def set(self, name: str, text: str) -> None:
-        option = next(each for each in self.options if each.name == name)
-        if not text or text in (option.default, _DEFAULT):
-            self.given.pop(name, None)
+        """Set an option to a typed or chosen text; an empty one sets the default."""
+        option = self._find_option(name)
+        if not text or text in (option.default, DEFAULT_TEXT):
+            self.entries.pop(name, None)
         else:
-            self.given[name] = text[:200]
-        self._ask()
+            self.entries[name] = text[:MAX_ENTRY_CHARACTERS]
+        self._request()
 
-    def keep_inside(self, place: tuple[float, float]) -> None:
-        self.given.pop("keep", None)
-        self.set("inside", f"{place[0]:.10g} {place[1]:.10g}")
+    def _find_option(self, name: str) -> ImportOption:
+        return next(option for option in self.options if option.name == name)
+
+    def keep_inside(self, position: Point) -> None:
+        """Keep the part of the free space around a position, m."""
+        self.entries.pop("keep", None)
+        self.set("inside", f"{position[0]:.10g} {position[1]:.10g}")
 
     @property
-    def has_colours(self) -> bool:
-        """Whether the colours of the file can be given a role."""
-        takes = "free_colour" in self.importer.options
-        return takes and self.imported is not None and self.imported.sheet is not None
+    def sheet(self) -> ColourSheet | None:
+        """The file in its own colours, if these can be given roles."""
+        if self.imported is None or "free_colour" not in self.importer.options:
+            return None
+        return self.imported.sheet
+
+    @property
+    def _shown_sheet(self) -> ColourSheet | None:
+        """The file in its own colours, if a click sets the role of a colour."""
+        return self.sheet if self.click_action == SET_COLOUR else None
 
     def cycle_colour(self, colour: Colour) -> None:
         """Give a colour the next role: free, solid, ignored, and none."""
-        give_role(self.given, colour, next_role(find_role(self.given, colour)))
-        self._ask()
+        set_role(self.entries, colour, choose_next_role(find_role(self.entries, colour)))
+        self._request()
 
-    def settings(self) -> tuple[ReadOptions, Shaping]:
-        named = {each.name: each for each in self.options}
-        values = {name: named[name].value(text) for name, text in self.given.items()}
-        of_reading = {field.name for field in fields(ReadOptions)}
-        read = {name: values.pop(name) for name in values.keys() & of_reading}
-        return ReadOptions(**read), Shaping(**values)
+    def build_settings(self) -> tuple[ReadOptions, Shaping]:
+        """Return the settings that were typed and chosen; raise RobocovError if any means nothing."""
+        reading_names = {field.name for field in fields(ReadOptions)}
+        reading: dict[str, Any] = {}
+        shaping: dict[str, Any] = {}
+        for name, text in self.entries.items():
+            values = reading if name in reading_names else shaping
+            values[name] = self._find_option(name).parse(text)
+        return ReadOptions(**reading), Shaping(**shaping)
 
-    def _ask(self) -> None:
-        self.accepted, self._mistake = False, ""
+    def _request(self) -> None:
+        """Request an import with the present settings."""
+        self.accepted = False
+        self._mistake = ""
         try:
-            self._worker.put((self.path, self.importer.name, *self.settings()))
+            reading, shaping = self.build_settings()
+            self._worker.put((self.path, self.importer.name, reading, shaping))
         except RobocovError as error:
             self._mistake = str(error)
 
     def poll(self) -> Imported | None:
-        if (answer := self._worker.poll()) is not None and not self._worker.busy:
-            self.imported = answer
+        """Return the imported map once the user has accepted it and it is ready."""
+        imported = self._worker.poll()
+        if imported is not None and not self._worker.busy:
+            self.imported = imported
         if self.trouble:
             self.accepted = False
         return self.imported if self.accepted and self.ready else None
 
     @property
     def busy(self) -> bool:
+        """Whether an import is running."""
         return not self._mistake and self._worker.busy
 
     @property
     def trouble(self) -> str:
-        return self._mistake or ("" if self._worker.busy else self._worker.trouble)
+        """Why the file cannot be imported with the present settings; empty while that is not known."""
+        if self._mistake:
+            return self._mistake
+        return "" if self._worker.busy else self._worker.trouble
 
     @property
     def ready(self) -> bool:
+        """Whether the map has been imported with the present settings."""
         return self.imported is not None and not self.busy and not self.trouble
 
     def key(self, name: str, ui: Ui) -> bool:
-        accepts = name in ("return", "enter") and ui.open_list is None
-        self.accepted |= accepts
-        return accepts
+        """Accept the map with Enter; return whether the key was used."""
+        is_accepting = name in ("return", "enter") and ui.open_list is None
+        if is_accepting:
+            self.accepted = True
+        return is_accepting
 
     def cancelled(self) -> None:
+        """End the import."""
         self._worker.close()
 
     def page(self, ui: Ui) -> None:
-        left, top, wide = ui.x, ui.y, ui.wide
-        high = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
-        ui.wide = _COLUMN
-        self._options(ui, top + high)
-        ui.x, ui.y, ui.wide = left + _COLUMN + _GAP, top, wide - _COLUMN - _GAP
-        room = high - (_LINE * (_FEWEST_LINES + 1) + 14)
-        if self.has_colours:
-            before = ui.y
-            self._colours(ui)
-            room -= ui.y - before
-        maps_top = ui.y
-        ui.row(height=room, below=0)
-        rect, clicked = ui.area("maps")
-        if self.imported is not None:
-            maps = self._place(rect, self.imported, ui.scale)
-            if ui.surface is not None:
-                self._draw_maps(ui.surface, self.imported, ui.scale, ui.theme)
-            if clicked:
-                self._click(ui.at)
-            ui.end_row()
-            ui.y = maps_top + maps / ui.scale + 14
-        else:
-            ui.space(14)
-            if ui.surface is not None:
-                words = label("nothing to show" if self.trouble else "reading…", ui.px(13), ui.theme.faint)
-                ui.surface.blit(words, words.get_rect(center=rect.center))
-        self._report(ui, top + high)
-        ui.x, ui.y, ui.wide = left, top + high, wide
+        """Draw the dialog."""
+        left = ui.x
+        top = ui.y
+        width = ui.wide
+        height = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
+        ui.wide = OPTIONS_WIDTH_PX
+        self._draw_options(ui, top + height)
+        ui.x = left + OPTIONS_WIDTH_PX + OPTIONS_GAP_PX
+        ui.y = top
+        ui.wide = width - OPTIONS_WIDTH_PX - OPTIONS_GAP_PX
+        if self.sheet is not None:
+            self._draw_click_actions(ui)
+        report_height = REPORT_LINE_PX * (MIN_REPORT_LINES + 1) + MAPS_GAP_PX
+        self._draw_maps(ui, top + height - ui.y - report_height)
+        self._draw_report(ui, top + height)
+        ui.x = left
+        ui.y = top + height
+        ui.wide = width
 
-    def _click(self, at: tuple[int, int]) -> None:
-        """Take a click into one of the maps."""
-        for k, camera in enumerate(self.cameras):
-            if not Rect(camera.view).collidepoint(at):
+    def _draw_maps(self, ui: Ui, height: float) -> None:
+        """Draw the two maps, or a text while there is none."""
+        top = ui.y
+        ui.row(height=height, below=0)
+        box, is_clicked = ui.area("maps")
+        if self.imported is None:
+            ui.space(MAPS_GAP_PX)
+            if ui.surface is not None:
+                text = "nothing to show" if self.trouble else "reading…"
+                words = label(text, ui.px(13), ui.theme.faint)
+                ui.surface.blit(words, words.get_rect(center=box.center))
+            return
+        maps_height = self.preview.arrange(box, self.imported, ui.scale)
+        if ui.surface is not None:
+            self._draw_preview(ui.surface, ui, self.imported)
+        if is_clicked:
+            self._click(ui.at)
+        ui.end_row()
+        ui.y = top + maps_height / ui.scale + MAPS_GAP_PX
+
+    def _draw_preview(self, surface: Surface, ui: Ui, imported: Imported) -> None:
+        self.preview.draw(surface, imported, ui.scale, ui.theme, self._shown_sheet)
+        if self.trouble:
+            # The maps are those of earlier settings.
+            self.preview.veil(surface, ui.theme)
+        elif "inside" in self.entries:
+            position = self._find_option("inside").parse(self.entries["inside"])
+            self.preview.mark(surface, position, ui.scale, ui.theme)
+
+    def _click(self, pixel: tuple[int, int]) -> None:
+        """Keep the part under a pixel, or change the role of its colour."""
+        for number, camera in enumerate(self.preview.cameras):
+            if not Rect(camera.view).collidepoint(pixel):
                 continue
-            x, y = camera.to_world(np.array(at, dtype=float)).tolist()
-            if self._shows_colours and k == 0:
-                assert self.imported is not None and self.imported.sheet is not None
-                colour = self.imported.sheet.find_colour(x, y)
+            x, y = camera.to_world(np.array(pixel, dtype=float)).tolist()
+            sheet = self._shown_sheet
+            if sheet is not None and number == 0:
+                colour = sheet.find_colour(x, y)
                 if colour is not None:
                     self.cycle_colour(colour)
             else:
-                digits = max(0, math.ceil(math.log10(camera.zoom)))  # no finer than a pixel
+                # No finer than a pixel.
+                digits = max(0, math.ceil(math.log10(camera.zoom)))
                 self.keep_inside((round(x, digits), round(y, digits)))
 
-    @property
-    def _shows_colours(self) -> bool:
-        return self.has_colours and self.clicks == "colour"
-
-    def _colours(self, ui: Ui) -> None:
-        """Show what a click chooses and, for colours, each with its role."""
+    def _draw_click_actions(self, ui: Ui) -> None:
+        """Draw what a click does, and the colours with their roles."""
         ui.row(56, 84, 84, 0, height=24, below=6)
         ui.label("A click", style="unit")
-        for name, text, tip in (
-            ("part", "keeps a part", "A click into a map keeps that part of the free space"),
-            ("colour", "sets a colour", "A click into the left map makes its colour free, solid or ignored"),
-        ):
-            if ui.button(text, key=f"clicks:{name}", chosen=self.clicks == name, small=True, tip=tip):
-                self.clicks = name
+        part_tip = "A click into a map keeps that part of the free space"
+        colour_tip = "A click into the left map makes its colour free, solid or ignored"
+        self._draw_click_action(ui, KEEP_PART, "keeps a part", part_tip)
+        self._draw_click_action(ui, SET_COLOUR, "sets a colour", colour_tip)
         ui.end_row()
-        if self._shows_colours:
-            self._chips(ui)
+        if self._shown_sheet is not None:
+            self._draw_chips(ui, self._shown_sheet)
 
-    def _chips(self, ui: Ui) -> None:
-        assert self.imported is not None and self.imported.sheet is not None
-        colours = list(dict.fromkeys([*declared_colours(self.given), *self.imported.sheet.colours]))
-        colours = colours[: max(int((ui.wide + 6) // (_CHIP + 6)), 1)]
-        ui.row(*[_CHIP] * len(colours), 0, height=24, below=8)
+    def _draw_click_action(self, ui: Ui, action: str, text: str, tip: str) -> None:
+        is_chosen = self.click_action == action
+        if ui.button(text, key=f"clicks:{action}", chosen=is_chosen, small=True, tip=tip):
+            self.click_action = action
+
+    def _draw_chips(self, ui: Ui, sheet: ColourSheet) -> None:
+        colours = list(dict.fromkeys([*list_declared_colours(self.entries), *sheet.colours]))
+        columns = int((ui.wide + CHIP_GAP_PX) // (CHIP_WIDTH_PX + CHIP_GAP_PX))
+        colours = colours[: max(columns, 1)]
+        ui.row(*[CHIP_WIDTH_PX] * len(colours), 0, height=24, below=8)
         for colour in colours:
-            role = find_role(self.given, colour)
-            name = name_colour(colour)
-            key = f"colour:{name}"
-            text = f"     {_ROLE_NAMES[role]}"
-            if ui.button(
-                text, key=key, chosen=role is not None, small=True, tip=f"{name}: a click changes it"
-            ):
-                self.cycle_colour(colour)
-            shown = ui.find("button", key)
-            if ui.surface is not None and shown is not None:
-                side = ui.px(_SWATCH)
-                square = Rect(shown.rect.left + ui.px(7), shown.rect.centery - side // 2, side, side)
-                pygame.draw.rect(ui.surface, colour, square)
-                pygame.draw.rect(ui.surface, ui.theme.faint, square, 1)
+            self._draw_chip(ui, colour)
         ui.end_row()
 
-    def _options(self, ui: Ui, foot: float) -> None:
+    def _draw_chip(self, ui: Ui, colour: Colour) -> None:
+        role = find_role(self.entries, colour)
+        name = name_colour(colour)
+        key = f"colour:{name}"
+        text = f"     {_ROLE_LABELS[role]}"
+        tip = f"{name}: a click changes it"
+        if ui.button(text, key=key, chosen=role is not None, small=True, tip=tip):
+            self.cycle_colour(colour)
+        button = ui.find("button", key)
+        if ui.surface is not None and button is not None:
+            side = ui.px(SWATCH_PX)
+            swatch = Rect(button.rect.left + ui.px(7), button.rect.centery - side // 2, side, side)
+            pygame.draw.rect(ui.surface, colour, swatch)
+            pygame.draw.rect(ui.surface, ui.theme.faint, swatch, 1)
+
+    def _draw_options(self, ui: Ui, foot: float) -> None:
+        """Draw the options, the help of the focused one, and the buttons; `foot` is the lower edge."""
         ui.words(f"Import {self.path.name}", size=16, bold=True)
         ui.label(self.importer.title, style="unit")
         ui.end_row()
-        if ui is not self._seen:  # letters go into the first field
-            self._seen = ui
-            first = next(option.name for option in self.options if not option.choices)
-            ui.focus, ui.edit = first, TextEdit.of(self.given.get(first, ""))
-        ui.row(_NAME, 0, height=min((foot - 44 - ui.y) / len(self.options), 28.0) - 4, below=4)
+        if ui is not self._focused_ui:
+            self._focused_ui = ui
+            self._focus_first_field(ui)
+        row_height = min((foot - 44 - ui.y) / len(self.options), MAX_ROW_PX) - 4
+        ui.row(OPTION_LABEL_WIDTH_PX, 0, height=row_height, below=4)
         for option in self.options:
-            name, tip = option.name, option.help
-            now = self.given.get(name, option.default)
-            ui.label(name.replace("_", " "), tip=tip, style="bold" if name in self.given else "")
-            if option.choices:
-                choices = option.choices if option.default else (_DEFAULT, *option.choices)
-                text = ui.dropdown(name, choices, now or _DEFAULT, tip=tip)
-            else:
-                text = ui.text_entry(name, now, ghost=_DEFAULT, tip=tip, live=True)
-            if text is not None and text != now:
-                self.set(name, text)
+            self._draw_option(ui, option)
         ui.end_row()
-        said = next((option.help for option in self.options if option.name == ui.focus), "")
-        lines = wrapped(said, ui.px(SMALL), ui.px(ui.wide))[: max(int((foot - 40 - ui.y) / (SMALL + 5)), 0)]
-        ui.words(" ".join(lines), size=SMALL, colour=ui.theme.faint)
-        ui.y = foot - 30
-        ui.row(92, 92, height=30, below=0)
-        self.accepted |= ui.button("Import", chosen=self.ready, key="import", tip=self.trouble)
+        self._draw_option_help(ui, foot)
+        ui.y = foot - BUTTONS_HEIGHT_PX
+        ui.row(92, 92, height=BUTTONS_HEIGHT_PX, below=0)
+        if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
+            self.accepted = True
         if ui.button("Cancel", key="cancel"):
             self.done = True
             self.cancelled()
         ui.end_row()
 
-    def _report(self, ui: Ui, foot: float) -> None:
-        said: list[str] = []
+    def _focus_first_field(self, ui: Ui) -> None:
+        first = next(option.name for option in self.options if not option.choices)
+        ui.focus = first
+        ui.edit = TextEdit.of(self.entries.get(first, ""))
+
+    def _draw_option(self, ui: Ui, option: ImportOption) -> None:
+        name = option.name
+        present = self.entries.get(name, option.default)
+        style = "bold" if name in self.entries else ""
+        ui.label(name.replace("_", " "), tip=option.help, style=style)
+        if option.choices:
+            choices = option.choices if option.default else (DEFAULT_TEXT, *option.choices)
+            text = ui.dropdown(name, choices, present or DEFAULT_TEXT, tip=option.help)
+        else:
+            text = ui.text_entry(name, present, ghost=DEFAULT_TEXT, tip=option.help, live=True)
+        if text is not None and text != present:
+            self.set(name, text)
+
+    def _draw_option_help(self, ui: Ui, foot: float) -> None:
+        text = next((option.help for option in self.options if option.name == ui.focus), "")
+        max_lines = max(int((foot - HELP_MARGIN_PX - ui.y) / (SMALL + 5)), 0)
+        lines = wrapped(text, ui.px(SMALL), ui.px(ui.wide))[:max_lines]
+        ui.words(" ".join(lines), size=SMALL, colour=ui.theme.faint)
+
+    def _list_report_lines(self) -> list[str]:
         if self.trouble:
-            said = [self.trouble]
-        elif self.imported:
-            said = self.imported.report.format_lines()
-        lines = [line for each in said for line in wrapped(each, ui.px(SMALL), ui.px(ui.wide))]
-        most = int((foot - ui.y) / _LINE) - 1
-        if len(lines) > most:
-            lines = [*lines[: most - 1], f"and {len(lines) - most + 1} lines more"]
-        ui.row(height=_LINE, below=0)
+            return [self.trouble]
+        return self.imported.report.format_lines() if self.imported is not None else []
+
+    def _draw_report(self, ui: Ui, foot: float) -> None:
+        lines: list[str] = []
+        for text in self._list_report_lines():
+            lines += wrapped(text, ui.px(SMALL), ui.px(ui.wide))
+        max_lines = int((foot - ui.y) / REPORT_LINE_PX) - 1
+        if len(lines) > max_lines:
+            lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
+        ui.row(height=REPORT_LINE_PX, below=0)
         if ui.surface is not None:
+            colour = ui.theme.trajectory if self.trouble else ui.theme.ink
             for line in lines:
-                colour = ui.theme.trajectory if self.trouble else ui.theme.ink
                 ui.surface.blit(label(line, ui.px(SMALL), colour), ui.cell())
         ui.end_row()
-        ui.y = foot - _LINE
-        hint = _HINTS["colour" if self._shows_colours else "part"]
-        ui.label("importing…" if self.busy and self.imported is not None else hint, style="unit")
+        ui.y = foot - REPORT_LINE_PX
+        hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOUR]
+        is_importing_again = self.busy and self.imported is not None
+        ui.label("importing…" if is_importing_again else hint, style="unit")
         ui.end_row()
-
-    def _place(self, box: Rect, imported: Imported, scale: float) -> float:
-        """Place the two maps at the top of a box; return the height that they take, px."""
-        low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
-        aspect, above, gap = (high_x - low_x) / (high_y - low_y), round(_ABOVE * scale), round(20 * scale)
-        columns = layout.columns_for(2, aspect, box.size, above)
-        wide = (box.width - (columns - 1) * gap) // columns
-        most = (box.height if columns == 2 else (box.height - gap) // 2) - above
-        high = min(most, round(wide / aspect))
-        corners = [box.topleft, (box.right - wide, box.top + (2 - columns) * (above + high + gap))]
-        map_wide = float(min(wide, round(high * aspect)))
-        views = [(float(x), float(y + above), map_wide, float(high)) for x, y in corners]
-        self.cameras, self._wide = [Camera.fit(bounds, view, 2 * scale) for view in views], wide
-        return corners[1][1] + above + high - box.top
-
-    def _draw_maps(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
-        shows_colours = self._shows_colours
-        look = (*(camera.view for camera in self.cameras), scale, theme, shows_colours)
-
-        def draw() -> Surface:
-            picture = _maps(screen, imported, self.cameras, scale, theme)
-            if shows_colours and imported.sheet is not None:
-                imported.sheet.draw(picture, self.cameras[0])
-            return picture
-
-        maps = self._picture.of(imported, look, draw)
-        screen.blit(maps, (0, 0))
-        self._draw_captions(screen, imported, scale, theme)
-        inside = next(option for option in self.options if option.name == "inside")
-        if "inside" in self.given and not self.trouble:
-            for camera in self.cameras:
-                x, y = camera.to_pixels(np.array(inside.value(self.given["inside"]))).tolist()
-                for width, ink in ((5, theme.background), (2, theme.final)):
-                    arm = 7 * scale + width / 2
-                    pygame.draw.line(screen, ink, (x - arm, y), (x + arm, y), round(width * scale))
-                    pygame.draw.line(screen, ink, (x, y - arm), (x, y + arm), round(width * scale))
-        for camera in self.cameras if self.trouble else ():  # of settings that are no more
-            veil = Surface(camera.view[2:], pygame.SRCALPHA)
-            veil.fill((*theme.panel, 140))
-            screen.blit(veil, camera.view[:2])
-
-    def _draw_captions(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
-        compared, report = imported.comparison, imported.report
-        size, small = round(13 * scale), round(SMALL * scale)
-        lost = "" if compared.lost.is_empty else f"{format_area(compared.lost.area, 3)} left out"
-        opened = "" if compared.opened.is_empty else f"{format_area(compared.opened.area, 3)} opened"
-        passage = f", narrowest passage {compared.gap.width:.3g} m" if compared.gap is not None else ""
-        rows = (
-            ("as read", report.vertices_read, compared.before.area, "", lost, theme.trajectory),
-            ("as imported", report.vertices_kept, compared.after.area, passage, opened, theme.start),
-        )
-        for k, (camera, row) in enumerate(zip(self.cameras, rows, strict=True)):
-            name, vertices, area, more, mark, colour = row
-            if k == 0 and self._shows_colours:
-                name, mark = "in its colours", ""
-            x, y = round(camera.view[0]), round(camera.view[1] - _ABOVE * scale)
-            screen.blit(label(name, size, theme.ink, True), (x, y))
-            left = x + text_width(name, size, True) + round(10 * scale)
-            if mark:
-                square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
-                pygame.draw.rect(screen, colour, square)
-                screen.blit(label(mark, small, theme.ink), (left + round(14 * scale), y + round(2 * scale)))
-            facts = shortened(f"{vertices} vertices, {format_area(area)} free{more}", small, self._wide)
-            screen.blit(label(facts, small, theme.faint), (x, y + round(20 * scale)))
-
-
-def _maps(screen: Surface, imported: Imported, cameras: list[Camera], scale: float, theme: Theme) -> Surface:
-    compared, picture = imported.comparison, Surface(screen.get_size(), pygame.SRCALPHA)
-    before, after = (compared.before, compared.lost), (compared.after, compared.opened)
-    colours = theme.trajectory, theme.start
-    for camera, (free, marked), colour in zip(cameras, (before, after), colours, strict=True):
-        _fill(picture, camera, compared.region, theme.obstacle, theme.obstacle)
-        _fill(picture, camera, free, theme.background, theme.obstacle)
-        for ring in shapely.get_rings(shapely.get_parts(free)):
-            points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
-            pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
-        marks = Surface(screen.get_size(), pygame.SRCALPHA)
-        _fill(marks, camera, marked, (*colour, 150), (0, 0, 0, 0))
-        picture.blit(marks, (0, 0))
-    if compared.gap is not None:
-        ends = cameras[1].to_pixels(np.array(compared.gap.between))
-        pygame.draw.line(picture, theme.final, ends[0].tolist(), ends[1].tolist(), round(2 * scale))
-        if math.dist(*ends) < 20 * scale:
-            pygame.draw.circle(picture, theme.final, ends.mean(axis=0).tolist(), 10 * scale, round(2 * scale))
-    return picture
-
-
-def _fill(
-    surface: Surface, camera: Camera, area: shapely.Geometry, inside: Sequence[int], holes: Sequence[int]
-) -> None:
-    """Fill polygons; what lies in the hole of another is smaller, and drawn after it."""
-    parts = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]
-    for part in sorted(parts, key=lambda each: -shapely.Polygon(each.exterior).area):
-        for ring, colour in [(part.exterior, inside), *((hole, holes) for hole in part.interiors)]:
-            pygame.draw.polygon(surface, colour, camera.to_pixels(shapely.get_coordinates(ring)).tolist())

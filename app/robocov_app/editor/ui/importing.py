@@ -1,15 +1,15 @@
-"""Options of an import, and the worker that imports beside the window."""
+"""Options of an import, and the job that imports in another process."""
 
 import inspect
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote, to_one_line
-from robocov_app.editor.ui.import_sheet import Sheet, make_sheet
+from robocov_app.editor.ui.import_sheet import ColourSheet, build_colour_sheet
 from robocov_app.formats import (
     ForeignMap,
     Importer,
@@ -22,111 +22,175 @@ from robocov_app.formats import (
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
 from robocov_app.jobs.messages import Line
 
-Kind = Literal["number", "place", "words", "colours", "width", "text", "choice"]
-ON = "yes"  # a switch that is on
-Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]  # a file, its format, and how to import it
+OptionKind = Literal["number", "place", "words", "colours", "width", "text", "choice"]
+ImportSettings: TypeAlias = type[ReadOptions] | type[Shaping]
+ImportRequest: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
+"""A file, its format, and how it is to be read and shaped."""
+
+ON = "yes"  # value of a switch that is on
+OFF = "no"
+_DOCUMENTED_FIELD = re.compile(r'^    (\w+): [^\n]*\n    """(.*?)"""', re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Option:
-    """An option of an import."""
+class ImportOption:
+    """An option of an import.
 
-    name: str  # as of the field of `ReadOptions` or `Shaping`
-    kind: Kind  # numbers; words or colours between commas; a width in m or px; any text; or a choice
-    choices: tuple[str, ...]  # the first is the default
-    default: str  # what stands where nothing was given
+    Attributes
+    ----------
+    name : str
+        Name of the field of `ReadOptions` or `Shaping`.
+    kind : str
+        A number; a position; words or colours between commas; a width in m or px; a text; or a choice.
+    choices : tuple of str
+        Possible values of a choice, the default first.
+    default : str
+        Text that is shown where nothing was typed.
+    help : str
+        What it does.
+    """
+
+    name: str
+    kind: OptionKind
+    choices: tuple[str, ...]
+    default: str
     help: str
 
-    def value(self, text: str) -> Any:
+    def parse(self, text: str) -> Any:
+        """Return the value of a typed or chosen text; raise ParameterError if it means nothing."""
         if self.kind == "choice":
             return True if text == ON else text
         if self.kind in ("words", "colours"):
             return tuple(word.strip() for word in text.split(",") if word.strip())
         if self.kind in ("text", "width"):
             return text.strip()
-        try:
-            numbers = tuple(float(word) for word in text.split())
-        except ValueError:
-            numbers = ()
-        if len(numbers) != (2 if self.kind == "place" else 1):
-            wanted = "x and y" if self.kind == "place" else "a number"
-            raise ParameterError(f"{self.name}: expected {wanted}, got {quote(text)}")
-        return numbers if self.kind == "place" else numbers[0]
+        numbers = _parse_numbers(text)
+        if self.kind == "place":
+            if len(numbers) != 2:
+                raise ParameterError(f"{self.name}: expected x and y, got {quote(text)}")
+            return numbers
+        if len(numbers) != 1:
+            raise ParameterError(f"{self.name}: expected a number, got {quote(text)}")
+        return numbers[0]
 
 
-def options_of(importer: Importer) -> tuple[Option, ...]:
-    reading = [option for option in _options(ReadOptions) if option.name in importer.options]
-    return (*reading, *_options(Shaping))
+def _parse_numbers(text: str) -> tuple[float, ...]:
+    """Return the numbers between blanks; none if any word is not a number."""
+    try:
+        return tuple(float(word) for word in text.split())
+    except ValueError:
+        return ()
 
 
-def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
+def list_options(importer: Importer) -> tuple[ImportOption, ...]:
+    """Return the options of an importer, those of reading first."""
+    reading = [option for option in _list_fields(ReadOptions) if option.name in importer.options]
+    return (*reading, *_list_fields(Shaping))
+
+
+def _list_fields(settings: ImportSettings) -> Iterator[ImportOption]:
     hints = get_type_hints(settings)
-    docstrings = re.findall(r'^    (\w+): [^\n]*\n    """(.*?)"""', inspect.getsource(settings), re.M | re.S)
-    helps = {name: " ".join(words.split()) for name, words in docstrings}
+    docstrings = dict(_DOCUMENTED_FIELD.findall(inspect.getsource(settings)))
     for field in fields(settings):
-        hint = hints[field.name]
-        plain = next((each for each in get_args(hint) if each is not type(None)), hint)
-        hint = hint if get_origin(hint) in (Literal, tuple) else plain
-        name, words = field.name, helps.get(field.name, "")
-        default = "" if field.default is None else str(field.default)
-        if hint is bool:
-            yield Option(name, "choice", ("no", ON), "no", words)
-        elif get_origin(hint) is Literal:
-            choices = sorted(get_args(hint), key=lambda each: bool(default) and each != default)
-            yield Option(name, "choice", tuple(choices), default, words)
-        elif get_origin(hint) is tuple:
-            kind: Kind = "place"
-            if ... in get_args(hint):
-                kind = "colours" if name.endswith("_colour") else "words"
-            yield Option(name, kind, (), default, words)
-        elif name == "min_stroke":
-            yield Option(name, "width", (), default, words)
-        else:
-            yield Option(name, "number" if hint is float else "text", (), default, words)
+        text = " ".join(docstrings.get(field.name, "").split())
+        yield _build_option(field, hints[field.name], text)
+
+
+def _build_option(field: Field[Any], hint: Any, help_text: str) -> ImportOption:
+    """Return the option for a field, by the type of its values."""
+    name = field.name
+    default = "" if field.default is None else str(field.default)
+    if get_origin(hint) not in (Literal, tuple):
+        # Of an optional type, the type that is not None.
+        members = [member for member in get_args(hint) if member is not type(None)]
+        hint = members[0] if members else hint
+    if hint is bool:
+        return ImportOption(name, "choice", (OFF, ON), OFF, help_text)
+    if get_origin(hint) is Literal:
+        choices = tuple(sorted(get_args(hint), key=lambda choice: bool(default) and choice != default))
+        return ImportOption(name, "choice", choices, default, help_text)
+    return ImportOption(name, _choose_kind(name, hint), (), default, help_text)
+
+
+def _choose_kind(name: str, hint: Any) -> OptionKind:
+    if get_origin(hint) is tuple:
+        if ... not in get_args(hint):
+            return "place"
+        return "colours" if name.endswith("_colour") else "words"
+    if name == "min_stroke":
+        return "width"
+    return "number" if hint is float else "text"
 
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """Answer: the imported map, with its report, what walls changed sides, and the file in its colours."""
+    """An imported map.
+
+    Attributes
+    ----------
+    environment : Environment
+        The map.
+    report : ImportReport
+        What was read, changed and left out.
+    comparison : ImportComparison
+        The free space before and after.
+    sheet : ColourSheet or None
+        The file in its own colours.
+    """
 
     environment: Environment
     report: ImportReport
     comparison: ImportComparison
-    sheet: Sheet | None = None
+    sheet: ColourSheet | None = None
 
 
-class Importing:
-    """Importer that keeps the file it read last: shaping it anew takes less."""
+class _ReadKey(NamedTuple):
+    """Everything on which reading a file depends."""
+
+    path: Path
+    format: str
+    options: ReadOptions
+
+
+class ImportJob:
+    """Imports maps; keeps the latest file, because shaping it again takes less time than reading it."""
 
     failing = "the map could not be imported"
 
     def __init__(self) -> None:
-        self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
-        self._sheet: tuple[tuple[Path, str, ReadOptions], Sheet | None] | None = None
+        self._read: tuple[_ReadKey, ForeignMap] | None = None
+        self._sheet: tuple[_ReadKey, ColourSheet | None] | None = None
 
-    def __call__(self, questions: list[Wanted], line: Line) -> Imported:
-        path, name, options, shaping = questions[-1]
-        key = path, name, options
-        if self._read is None or self._read[0] != key:
-            self._read = None
-            self._read = key, read_map(path, format=name, options=options)
-        foreign = self._read[1]
-        sheet = self._make_sheet(path, name, options, foreign)
+    def __call__(self, questions: list[ImportRequest], line: Line) -> Imported:
+        """Import the newest request."""
+        path, format_name, options, shaping = questions[-1]
+        key = _ReadKey(path, format_name, options)
+        foreign = self._read_map(key)
+        sheet = self._build_sheet(key, foreign)
         environment, report = build_environment(foreign, shaping, to_one_line(path.name))
         return Imported(environment, report, compare_maps(foreign, environment, report), sheet)
 
-    def _make_sheet(self, path: Path, name: str, options: ReadOptions, foreign: ForeignMap) -> Sheet | None:
-        """Return the file in its own colours, those included that its options leave out."""
-        plain = replace(
-            options,
+    def _read_map(self, key: _ReadKey) -> ForeignMap:
+        if self._read is None or self._read[0] != key:
+            # Frees the memory of the previous file first.
+            self._read = None
+            self._read = (key, read_map(key.path, format=key.format, options=key.options))
+        return self._read[1]
+
+    def _build_sheet(self, key: _ReadKey, foreign: ForeignMap) -> ColourSheet | None:
+        """Return the file in its own colours, including those that its options leave out."""
+        options = replace(
+            key.options,
             free_colour=None,
             solid_colour=None,
             ignore_colour=None,
             colour_tolerance=None,
             min_stroke=None,
         )
-        key = path, name, plain
-        if self._sheet is None or self._sheet[0] != key:
-            source = foreign if plain == options else read_map(path, format=name, options=plain)
-            self._sheet = key, make_sheet(source)
+        plain_key = key._replace(options=options)
+        if self._sheet is None or self._sheet[0] != plain_key:
+            source = foreign
+            if plain_key != key:
+                source = read_map(key.path, format=key.format, options=options)
+            self._sheet = (plain_key, build_colour_sheet(source))
         return self._sheet[1]

@@ -1,4 +1,4 @@
-"""Opening the editor: with a display or without, from the command line's options."""
+"""Opening the editor with or without a display, from the options of the command line."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -6,11 +6,18 @@ from functools import partial
 from pathlib import Path
 
 from robocov.errors import InputError
-from robocov_app.editor.model.document import Autosave, Document, opened_elsewhere, recoverable
-from robocov_app.editor.model.measurement import measurement_worker
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.model.document import Autosave, Document, find_recoverable, is_open_elsewhere
+from robocov_app.editor.model.measurement import create_measurement_worker
+from robocov_app.editor.settings import (
+    LAYERS,
+    SETTING_ATTRIBUTES,
+    SETTINGS_FILE,
+    SIZE_LIMITS_PX,
+    EditorSettings,
+)
 from robocov_app.editor.tools.snapping import SNAPS
-from robocov_app.editor.ui.editor import FILE, KEPT, SHOWN, Editor, EditorSettings
-from robocov_app.editor.ui.file_commands import heading, lay_under, opened
+from robocov_app.editor.ui.file_commands import describe_opening, open_or_detect, set_reference_image
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.storage.autosave import find_draft_folder, remove_draft
 from robocov_app.storage.settings import (
@@ -47,82 +54,133 @@ def editor_window(
     path : Path or None
         Map to open, or foreign file to import; None for a new map.
     folder : Path
-        Folder for what is saved without a path. Drafts of a `served` window are in it, too.
+        Folder of files without a path, and of the drafts of a `served` window.
+    background : Path, optional
+        Picture to put under the map.
+    theme : str, optional
+        Colours: "light" or "dark".
+    size : tuple of int, optional
+        Width and height of the window, px.
+    scale : float, optional
+        Size of texts and widgets.
     headless : bool
         Draw without a display; keep neither settings nor drafts.
     served : bool
         Draw without a display, but live; keep no settings.
+
+    Yields
+    ------
+    EditorWindow
+        The window.
+
+    Raises
+    ------
+    InputError
+        If there is no display, or another editor has the map open.
+    MapError
+        If the file cannot be read.
     """
-    alone = headless or served
+    has_display = not headless and not served
     drafts = None if headless else find_draft_folder(folder if served else None)
-    if path is not None and opened_elsewhere(drafts, path=path):
+    if path is not None and is_open_elsewhere(drafts, path=path):
         raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
-    # what is wrong with the file is told before a window flashes up
-    found = Document.new(drafts) if path is None else opened(path, drafts)
-    document = found if isinstance(found, Document) else Document.new(drafts)
+    # The file is read before a window appears, so that its errors are reported without one.
+    opened = Document.new(drafts) if path is None else open_or_detect(path, drafts)
+    document = opened if isinstance(opened, Document) else Document.new(drafts)
     with ExitStack() as stack:
-        stack.callback(document.close, discard=False)  # unless it was closed by then
-        readings = stack.enter_context(closing(measurement_worker(direct=headless)))
-        stack.enter_context(open_display(headless=alone, missing_message=NO_DISPLAY))
-        file = None if alone else find_settings_file(FILE)
-        settings, trouble = load_settings(EditorSettings, file)
-        editor = Editor(document, readings, folder, settings)
+        # Does nothing if the document was closed by then.
+        stack.callback(document.close, discard=False)
+        worker = stack.enter_context(closing(create_measurement_worker(direct=headless)))
+        stack.enter_context(open_display(headless=not has_display, missing_message=NO_DISPLAY))
+        file = find_settings_file(SETTINGS_FILE) if has_display else None
+        settings, settings_error = load_settings(EditorSettings, file)
+        editor = Editor(document, worker, folder, settings)
         editor.theme = theme or settings.theme
         if background is not None:
-            lay_under(editor, background)
-            editor.choose("picture", tell=False)
-        wanted = size or (settings.width, settings.height)
-        wanted = wanted if size or alone else fit_to_screen(wanted)
-        scale = scale or settings.scale or (1.0 if alone else get_screen_scale())
-        editor.say(trouble or (heading(document) if path is not None and document is found else ""))
-        window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
+            set_reference_image(editor, background)
+            editor.choose_tool("picture", shows_hint=False)
+        window_size = _choose_size(size, settings, has_display=has_display)
+        window_scale = _choose_scale(scale, settings, has_display=has_display)
+        if settings_error:
+            editor.show_message(settings_error)
+        elif path is not None and document is opened:
+            editor.show_message(describe_opening(document))
+        window = EditorWindow(editor, window_size, window_scale, drafts, patient=headless)
         window.faults = FaultLog(drafts)
         window.contains_faults = not headless
         window.panel.show_tab(settings.tab)
         if document.path is not None:
             window.documents.remember(document.path)
-        offer(window, recoverable(drafts))
-        if path is not None and not isinstance(found, Document):
-            window.documents.ask_import(path, found)
-        begun, discarding = settings_of(window, settings), False
+        offer_recovery(window, find_recoverable(drafts))
+        if path is not None and not isinstance(opened, Document):
+            window.documents.ask_import(path, opened)
+        first_settings = read_settings(window, settings)
+        is_discarded = False
         try:
             yield window
-            save_settings(merge_changed_settings(settings, begun, settings_of(window, settings)), file)
-            discarding = window.documents.leaving
+            changed = merge_changed_settings(settings, first_settings, read_settings(window, settings))
+            save_settings(changed, file)
+            is_discarded = window.documents.leaving
         finally:
             window.close()
-            # what was not saved stays to be offered, unless it was decided about
-            editor.document.close(discard=discarding)
+            # Unsaved changes are kept to be offered, unless the user has decided about them.
+            editor.document.close(discard=is_discarded)
 
 
-def offer(window: EditorWindow, found: Sequence[Autosave]) -> None:
-    if not found:
+def _choose_size(
+    size: tuple[int, int] | None, settings: EditorSettings, *, has_display: bool
+) -> tuple[int, int]:
+    """Return the size of the window, px; that of the settings is limited to the display."""
+    if size:
+        return size
+    saved = (settings.width, settings.height)
+    return fit_to_screen(saved) if has_display else saved
+
+
+def _choose_scale(scale: float | None, settings: EditorSettings, *, has_display: bool) -> float:
+    chosen = scale or settings.scale
+    if chosen:
+        return chosen
+    return get_screen_scale() if has_display else 1.0
+
+
+def offer_recovery(window: EditorWindow, drafts: Sequence[Autosave]) -> None:
+    """Offer to recover the first of several drafts; after discarding it, the next one."""
+    if not drafts:
         return
-    draft, rest = found[0], found[1:]
+    draft = drafts[0]
+    others = drafts[1:]
 
-    def throw_away() -> None:
+    def discard() -> None:
         remove_draft(draft.folder)
-        offer(window, rest)
+        offer_recovery(window, others)
 
-    recover = partial(window.documents.recover, draft)
-    answers = (("Recover", "r", recover), ("Discard", "d", throw_away), ("Later", "l", lambda: None))
-    words = f"An editor ended without saving: {draft.words()}."
-    if rest:
-        words += f"\n{len(rest)} more {'are' if len(rest) > 1 else 'is'} kept besides."
-    window.editor.ask("Recover unsaved work?", words, *answers)
+    text = f"An editor ended without saving: {draft.describe()}."
+    if others:
+        verb = "are" if len(others) > 1 else "is"
+        text += f"\n{len(others)} more {verb} kept besides."
+    recover = ("Recover", "r", partial(window.documents.recover, draft))
+    later = ("Later", "l", lambda: None)
+    window.editor.ask_question("Recover unsaved work?", text, recover, ("Discard", "d", discard), later)
 
 
-def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:
+def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:
+    """Return the present settings of a window; what it does not change is as before."""
     editor = window.editor
     width, height = window.windowed or window.screen.get_size()
-    changes = {
-        **{name: getattr(editor, attribute) for name, attribute in KEPT.items()},
-        "theme": editor.theme,
-        "tab": window.panel.tab,
-        "snaps": tuple(name for name in SNAPS if name in editor.snaps),
-        "shown": tuple(name for name in SHOWN if name in editor.shown),
-        "recent": tuple(editor.recent),
-        "width": min(max(width, 900), 7680),
-        "height": min(max(height, 600), 4320),
+    changes: dict[str, object] = {
+        setting: getattr(editor, attribute) for setting, attribute in SETTING_ATTRIBUTES.items()
     }
+    changes["theme"] = editor.theme
+    changes["tab"] = window.panel.tab
+    changes["snaps"] = tuple(name for name in SNAPS if name in editor.snaps)
+    changes["shown"] = tuple(name for name in LAYERS if name in editor.shown)
+    changes["recent"] = tuple(editor.recent)
+    changes["width"] = _limit_size("width", width)
+    changes["height"] = _limit_size("height", height)
     return before.model_copy(update=changes)
+
+
+def _limit_size(side: str, length: int) -> int:
+    minimum, maximum = SIZE_LIMITS_PX[side]
+    return min(max(length, minimum), maximum)

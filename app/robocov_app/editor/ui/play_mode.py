@@ -1,16 +1,18 @@
-"""The demo on the map that is being drawn, in the same window; and back."""
+"""The viewer on the map that is being edited, in the same window; and the way back."""
 
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 
 import pygame
 
 from robocov.controllers import list_controller_classes
 from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.editor.ui.editor import Editor
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import Costs
@@ -19,17 +21,30 @@ from robocov_app.viewer.session.scenario import Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
+DRAFT_PAUSE_S = 1.0  # between two drafts of a map that is tried
+FIRST_UPDATE_S = 0.01
+
 
 class PlayPresenter(Presenter):
-    """The viewer's presenter, which knows whether the map is still the one that is tried."""
+    """The viewer's presenter, which knows whether it still shows the map that is tried.
 
-    elsewhere = False  # whether another map was opened meanwhile
+    Attributes
+    ----------
+    tried : Environment
+        The map as it was in the editor.
+    elsewhere : bool
+        Whether another map was opened meanwhile.
+    """
+
+    elsewhere = False
 
     def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
-        self.tried, self._title = session.environment, title
+        self.tried = session.environment
+        self._title = title
         super().__init__(session, costs, shown, folder, title, list_controller_classes())
 
     def open_map(self, name: str) -> None:
+        """Open a map, or the one that is tried by its title."""
         if name == self._title:
             self.session.restart(environment=self.tried)
             self.map_name = name
@@ -38,22 +53,33 @@ class PlayPresenter(Presenter):
         self.elsewhere = name != self._title
 
     def maps(self) -> list[str]:
+        """Return the names of the maps that can be opened."""
         return list(dict.fromkeys([self._title, *super().maps()]))
 
 
 class PlayWindow(Window):
-    """The viewer's window, out of which F5 and Escape lead back."""
+    """The viewer's window, from which F5 and Escape lead back to the editor.
+
+    Attributes
+    ----------
+    ended : bool
+        Whether to return to the editor.
+    held : int or None
+        The key that started it, until it is released, because it may repeat.
+    """
 
     viewer: PlayPresenter
     hint = "F5 back to the editor · F1 keys"
 
     def __init__(self, viewer: PlayPresenter, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
-        self.ended = False  # back to the editor
-        self.held: int | None = None  # the key that began it, until it comes up: it may repeat
+        self.ended = False
+        self.held: int | None = None
         super().__init__(viewer, screen.get_size(), scale, patient=patient, screen=screen)
 
     def take(self, event: pygame.event.Event) -> None:
-        if event.type == pygame.WINDOWFOCUSLOST or (event.type == pygame.KEYUP and event.key == self.held):
+        """Handle an event; F5 leads back."""
+        is_released = event.type == pygame.KEYUP and event.key == self.held
+        if event.type == pygame.WINDOWFOCUSLOST or is_released:
             self.held = None
         if event.type == pygame.KEYDOWN and event.key == self.held:
             return
@@ -63,51 +89,116 @@ class PlayWindow(Window):
             super().take(event)
 
     def do(self, name: str) -> None:
-        """Do the action of this name; Escape leads back where it would do nothing."""
-        idle = not (self.help or self.dialogs.open or self.tour is not None)
+        """Run a command; Escape leads back where it would do nothing."""
+        is_open = self.help or self.dialogs.open or self.tour is not None
         viewer = self.viewer
-        if name == "cancel" and idle and viewer.tool is viewer.hand and viewer.selected is None:
+        is_idle = not is_open and viewer.tool is viewer.hand and viewer.selected is None
+        if name == "cancel" and is_idle:
             self.ended = not viewer.hand.cancel(viewer.session)
         else:
             super().do(name)
 
 
-def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
-    environment = editor.sketch.environment()
-    name = editor.start_name if editor.start_name in environment.starts else None
-    spec = TeamSpec(radius=editor.radius)
-    session = Session(Scenario(environment, robots=editor.robots, start=name, seed=editor.seed, limits=spec))
+class TrialDrafts:
+    """Keeps drafts of a map with what is changed in the viewer, about once a second.
+
+    Parameters
+    ----------
+    document : Document
+        The document that is tried.
+    tried : Environment
+        The map as it was in the editor.
+    """
+
+    def __init__(self, document: Document, tried: Environment) -> None:
+        self._document = document
+        self._tried = tried
+        self._drafted = tried
+        self._due = 0.0
+
+    def update(self, environment: Environment, *, at_once: bool) -> None:
+        """Keep a draft if the map has changed, and the previous draft is old enough or it is the last one."""
+        now = monotonic()
+        if environment is self._drafted or (now < self._due and not at_once):
+            return
+        self._drafted = environment
+        self._due = now + DRAFT_PAUSE_S
+        change = build_trial_change(self._document.history.sketch, self._tried, environment)
+        if change is None:
+            self._document.keep_aside()
+        else:
+            self._document.keep_draft(change.sketch)
+
+
+def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
+    """Open the viewer on the map of an editor.
+
+    Parameters
+    ----------
+    editor : Editor
+        The editor.
+    screen : Surface
+        The window in which the viewer is shown.
+    scale : float
+        Size of texts and widgets.
+    patient : bool
+        Whether to wait for everything that is computed beside the window.
+
+    Raises
+    ------
+    MapError
+        If the map breaks a rule.
+    """
+    environment = editor.sketch.build_environment()
+    start = editor.start_name if editor.start_name in environment.starts else None
+    limits = TeamSpec(radius=editor.radius)
+    scenario = Scenario(environment, robots=editor.robots, start=start, seed=editor.seed, limits=limits)
+    session = Session(scenario)
     if patient:
         session.clock.budget = float("inf")
     costs = Costs(DEFAULT_LATTICE, direct=patient)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
-        demo = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
-        demo.theme = editor.theme
-        trial = PlayWindow(demo, screen, scale, patient=patient)
+        viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
+        viewer.theme = editor.theme
+        trial = PlayWindow(viewer, screen, scale, patient=patient)
     except BaseException:
         costs.close()
         raise
-    trial.panel.update(0.01)  # or its first frame would be without it
-    demo.say(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
+    # Without an update the first frame would have no panel.
+    trial.panel.update(FIRST_UPDATE_S)
+    viewer.say(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
     return trial
 
 
-def brought_back(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
-    """Return what was drawn, moved and deleted while it was tried, as one change; None if nothing was."""
+def build_trial_change(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
+    """Return what was drawn, moved and deleted in the viewer as one change.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map in the editor.
+    before, after : Environment
+        The map as it was tried, and as it is in the viewer.
+
+    Returns
+    -------
+    Change or None
+        The change; None if no obstacle has changed. Obstacles that are the same keep their key and note.
+    """
     if after is before or after.obstacles == before.obstacles or after.boundary != before.boundary:
         return None
-    left = list(sketch.obstacles)
+    remaining = list(sketch.obstacles)
     items: list[Item] = []
-    key = sketch.fresh_key
+    key = sketch.next_key
     for shape in after.obstacles:
-        # who is as it was keeps its key and its notes
-        same = next((item for item in left if item.shape == shape), None)
+        same = next((item for item in remaining if item.shape == shape), None)
         if same is not None:
-            left.remove(same)
+            remaining.remove(same)
+            items.append(same)
         else:
-            same, key = Item(key, shape), key + 1
-        items.append(same)
-    new = frozenset(item.key for item in items if item.key not in sketch.places)
-    words = "what was changed while trying it, taken over"
-    return Change(replace(sketch, obstacles=tuple(items)), Selection(items=new), words)
+            items.append(Item(key, shape))
+            key += 1
+    new = frozenset(item.key for item in items if item.key not in sketch.index_by_key)
+    description = "what was changed while trying it, taken over"
+    return Change(replace(sketch, obstacles=tuple(items)), Selection(items=new), description)

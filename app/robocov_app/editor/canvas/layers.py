@@ -1,0 +1,296 @@
+"""Layers over the sheet, in the order in which they are drawn."""
+
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+import pygame
+import shapely
+from pygame import Rect, Surface
+
+from robocov_app.editor.canvas import overlay
+from robocov_app.editor.canvas.hatching import draw_hatching
+from robocov_app.editor.canvas.scene import Scene
+from robocov_app.editor.canvas.sheet import Sheet
+from robocov_app.editor.edits import paths
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov_app.editor.tools.tool import CarriedItems, compute_frame, list_handles
+from robocov_app.render import marks, sprites
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.layout import fitted_radii
+from robocov_app.render.surface_cache import Latest
+from robocov_app.render.theme import Colour, mix
+
+MANY_OBJECTS = 200  # outlines of more selected objects are drawn once, and then as a picture
+DRAGGED_TINT = 0.22  # share of the accent colour in obstacles that are dragged
+MAX_RADIUS_PX = 400.0  # of a robot that is drawn as a sprite
+MIN_NUMBER_PX = 7.5  # at scale 1: smaller numbers are not written on robots
+_PREMULTIPLIED = pygame.BLEND_PREMULTIPLIED
+
+
+class Layer(Protocol):
+    """A layer over the sheet."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the layer."""
+
+
+class DraggedObstacles:
+    """Obstacles that are dragged, changed or copied by the tool."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self._sheet = sheet
+        self._picture: Latest[Surface] = Latest()
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the obstacles."""
+        if scene.state.carried is not None:
+            self._draw_carried(scene, scene.state.carried)
+        elif scene.sketch is not scene.saved:
+            theme = scene.canvas.theme
+            keys = scene.saved.index_by_key.keys() - scene.lifted
+            items = [item for item in scene.sketch.obstacles if item.key not in keys]
+            self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.final, DRAGGED_TINT))
+
+    def _draw_carried(self, scene: Scene, carried: CarriedItems) -> None:
+        camera = scene.view.camera
+        picture = self._picture.of(
+            scene.saved,
+            (carried.selection, camera, scene.view.theme.name),
+            lambda: self._draw_picture(scene, carried.selection),
+        )
+        dx = round(camera.zoom * carried.offset[0])
+        dy = round(-(camera.zoom * carried.offset[1]))
+        scene.screen.blit(picture, (dx, dy), special_flags=_PREMULTIPLIED)
+
+    def _draw_picture(self, scene: Scene, selection: Selection) -> Surface:
+        theme = scene.view.theme
+        page = scene.view.build_page()
+        items = [item for item in scene.saved.obstacles if item.key in selection.items]
+        fill = mix(theme.obstacle, theme.final, DRAGGED_TINT)
+        self._sheet.draw_items(page, items, fill, theme.final)
+        for owner in selection.owners - selection.items:
+            draw_object_outline(page, self._sheet, scene.saved, owner, theme.final, 2.0)
+        return page.surface
+
+
+class Passages:
+    """Areas that robots cannot reach, and the narrowest gap."""
+
+    def __init__(self) -> None:
+        self._hatching: Latest[tuple[Surface, Rect] | None] = Latest()
+
+    def draw(self, scene: Scene) -> None:
+        """Draw hatching and gap."""
+        measurement = scene.measurement
+        if measurement is None:
+            return
+        view = scene.view
+        look = (view.camera, view.theme.name, view.scale, view.size)
+        patch = self._hatching.of(measurement, look, lambda: draw_hatching(view, measurement))
+        if patch is not None:
+            surface, position = patch
+            scene.screen.blit(surface, position, special_flags=_PREMULTIPLIED)
+        if measurement.gap is not None:
+            overlay.draw_gap(scene.canvas, measurement.gap, measurement.radius)
+
+
+class Paths:
+    """Paths of moving obstacles, and where the obstacles are while they are shown moving."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the paths."""
+        sketch = scene.sketch if scene.state.pending is None else scene.state.pending
+        theme = scene.canvas.theme
+        for key in paths.list_moving_obstacles(sketch):
+            item = sketch.get_item(key)
+            path = item.shape.path
+            assert path is not None
+            is_selected = key in scene.editor.selection.items
+            colour = theme.final if is_selected else mix(theme.background, theme.ink, 0.6)
+            overlay.draw_path(scene.canvas, path, colour)
+            if scene.editor.moves_since is not None and paths.leads_somewhere(path):
+                shift = path.compute_displacement(scene.editor.now - scene.editor.moves_since)
+                moved = shapely.transform(item.geometry, lambda points, by=shift: points + by)
+                overlay.draw_ghost(scene.canvas, moved)
+
+
+class Starts:
+    """The starts of the map."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the starts with their names."""
+        for number, (name, start) in enumerate(scene.sketch.starts):
+            label = f"{name}, default" if number == 0 else name
+            is_selected = name in scene.editor.selection.starts
+            overlay.draw_start(scene.canvas, start, label if name else "", is_selected=is_selected)
+
+
+class TeamAtStart:
+    """The robots of the team at a start."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the robots."""
+        team = scene.team
+        if team is None or not team.positions or "robots" not in scene.view.shown:
+            return
+        canvas = scene.canvas
+        theme = canvas.theme
+        scale = canvas.scale
+        centres = canvas.camera.to_pixels(np.array(team.positions))
+        true_radii = np.full(len(centres), team.radius * canvas.camera.zoom)
+        readable = min(marks.READABLE * scale, MAX_RADIUS_PX)
+        radii = np.minimum(fitted_radii(centres, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
+        edge = mix(theme.background, theme.ink, 0.55)
+        for k, (centre, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
+            size = round(2 * min(radius, MAX_RADIUS_PX)) / 2
+            number = str(k + 1)
+            is_legible = sprites.number_size(size, min(len(number), 4)) > MIN_NUMBER_PX * scale
+            sprite = partial(
+                sprites.disc,
+                size,
+                theme.robots[k % len(theme.robots)],
+                theme.robot_ring,
+                min(1.4 * scale, 0.3 * size),
+                edge,
+                number if is_legible else "",
+            )
+            canvas.stamp(sprite, centre)
+
+
+class SelectedObjects:
+    """Outlines of the selected and the hovered objects, frame and handles."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self._sheet = sheet
+        self._outlines: Latest[Surface] = Latest()
+
+    def draw(self, scene: Scene) -> None:
+        """Draw outlines and handles."""
+        if scene.state.carried is not None:
+            return
+        selection = scene.selection.restrict_to(scene.sketch)
+        owners: set[Owner] = set(selection.owners) | {vertex.owner for vertex in selection.vertices}
+        self._draw_hovered(scene, owners)
+        self._draw_outlines(scene, selection, owners)
+        if "handles" in scene.view.shown and scene.state.shows_handles and selection:
+            self._draw_handles(scene, selection)
+
+    def _draw_hovered(self, scene: Scene, selected: set[Owner]) -> None:
+        hovered = scene.state.hovered
+        if hovered is None or hovered in selected or not scene.cursor:
+            return
+        if Selection.of(hovered).restrict_to(scene.sketch):
+            theme = scene.canvas.theme
+            colour = mix(theme.background, theme.final, 0.7)
+            draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, colour, 1.5)
+
+    def _draw_outlines(self, scene: Scene, selection: Selection, owners: set[Owner]) -> None:
+        if len(owners) <= MANY_OBJECTS:
+            self._draw_all(scene.canvas, scene.sketch, owners)
+            return
+
+        def draw_page() -> Surface:
+            page = scene.view.build_page()
+            self._draw_all(page, scene.sketch, owners)
+            return page.surface
+
+        look = (selection, scene.view.camera, scene.view.theme.name, scene.view.scale)
+        page = self._outlines.of(scene.sketch, look, draw_page)
+        scene.canvas.surface.blit(page, (0, 0), special_flags=_PREMULTIPLIED)
+
+    def _draw_all(self, canvas: Canvas, sketch: Sketch, owners: set[Owner]) -> None:
+        for owner in owners:
+            draw_object_outline(canvas, self._sheet, sketch, owner, canvas.theme.final, 2.0)
+
+    def _draw_handles(self, scene: Scene, selection: Selection) -> None:
+        canvas = scene.canvas
+        editor = scene.editor
+        frame = compute_frame(scene.sketch, selection, editor.pixel)
+        if frame is not None:
+            corners = overlay.to_pixels(canvas, shapely.box(*frame).exterior.coords).tolist()
+            colour = mix(canvas.theme.background, canvas.theme.final, 0.6)
+            overlay.draw_dashes(canvas, corners, colour, 3.0)
+        handles = editor.handles
+        if scene.sketch is not editor.sketch:
+            handles = list_handles(scene.sketch, selection, editor.pixel)
+        overlay.draw_handles(canvas, handles, selection.vertices, scene.state.near)
+
+
+class GapLabel:
+    """The width of the narrowest gap, next to it."""
+
+    def draw(self, scene: Scene) -> None:
+        """Write the width."""
+        measurement = scene.measurement
+        if measurement is not None and measurement.gap is not None:
+            cursor = scene.cursor if scene.state.labels_cursor else None
+            overlay.draw_gap_label(scene.canvas, measurement.gap, measurement.radius, cursor)
+
+
+class Problems:
+    """Badges of the problems, with the message of the chosen one."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the problems."""
+        if "problems" in scene.view.shown:
+            editor = scene.editor
+            overlay.draw_problems(scene.canvas, scene.view, editor.problems, editor.problem, scene.hovered)
+
+
+class Guides:
+    """Guides of the latest snap."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the guides."""
+        overlay.draw_guides(scene.canvas, scene.editor.tool.guides)
+
+
+class ToolPreview:
+    """What the tool is about to do."""
+
+    def draw(self, scene: Scene) -> None:
+        """Draw the preview."""
+        overlay.draw_preview(scene.canvas, scene.state, scene.cursor)
+
+
+class TypedText:
+    """The value that is being typed, next to the cursor."""
+
+    def draw(self, scene: Scene) -> None:
+        """Write the text."""
+        if scene.editor.typed:
+            position = scene.cursor or Rect(scene.view.camera.view).center
+            overlay.draw_typed_text(scene.canvas, scene.editor.typed, position)
+
+
+def build_layers(sheet: Sheet) -> tuple[Layer, ...]:
+    """Return the layers over a sheet, from the bottom to the top."""
+    return (
+        DraggedObstacles(sheet),
+        Passages(),
+        Paths(),
+        Starts(),
+        TeamAtStart(),
+        SelectedObjects(sheet),
+        GapLabel(),
+        Problems(),
+        Guides(),
+        ToolPreview(),
+        TypedText(),
+    )
+
+
+def draw_object_outline(
+    canvas: Canvas, sheet: Sheet, sketch: Sketch, owner: Owner, colour: Colour, width: float
+) -> None:
+    """Draw the outline of an obstacle, a start or the boundary; `width` in px at scale 1."""
+    if isinstance(owner, str):
+        overlay.draw_start(canvas, sketch.get_start(owner), "", is_selected=True, dot_scale=1.3)
+    elif owner == BOUNDARY:
+        corners = overlay.to_pixels(canvas, sketch.boundary or ())
+        canvas.outline(corners, colour, canvas.width(width + 0.5))
+    else:
+        for ring in sheet.outlines.get(sketch.get_item(owner)).rings:
+            canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))

@@ -1,0 +1,84 @@
+"""Entries of the editor's legend."""
+
+from functools import partial
+
+from pygame import Rect
+
+from robocov_app.editor.canvas import overlay
+from robocov_app.editor.canvas.hatching import CUT_OFF_FORCE, draw_hatch_page
+from robocov_app.editor.canvas.view import choose_outside_colour
+from robocov_app.editor.model.measurement import Measurement
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
+from robocov_app.render.theme import mix
+
+
+def build_legend_entries(
+    measurement: Measurement | None, *, has_starts: bool, has_team: bool, has_hull_excess: bool
+) -> list[LegendEntry]:
+    """Return the legend entries of what is on the sheet.
+
+    Parameters
+    ----------
+    measurement : Measurement or None
+        The measurement, if passages that are too narrow are shown.
+    has_starts : bool
+        Whether the map has starts.
+    has_team : bool
+        Whether a team is shown.
+    has_hull_excess : bool
+        Whether the convex hull of the boundary is larger than the boundary.
+
+    Returns
+    -------
+    list of LegendEntry
+        The entries, in their order.
+    """
+    rows: list[tuple[bool, str, Glyph]] = [
+        (True, "obstacle", _draw_obstacle),
+        (True, "boundary", _draw_boundary),
+        (has_hull_excess, "outside, in the robots' hull", _draw_hull_excess),
+        (has_starts, "start", _draw_start),
+        (has_team, "robot", _draw_robot),
+    ]
+    if measurement is not None:
+        narrow = partial(_draw_hatch, is_narrow=True)
+        cut_off = partial(_draw_hatch, is_narrow=False)
+        badge = partial(overlay.draw_badge, is_error=True, is_small=True)
+        rows.append((bool(measurement.impassable), "too narrow for a robot", narrow))
+        rows.append((bool(measurement.sealed), "cut off", cut_off))
+        rows.append((bool(measurement.problems), "problem", badge))
+    return [LegendEntry(text, glyph) for is_present, text, glyph in rows if is_present]
+
+
+def _draw_obstacle(canvas: Canvas, x: float, y: float) -> None:
+    canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
+
+
+def _draw_boundary(canvas: Canvas, x: float, y: float) -> None:
+    half = 9 * canvas.scale
+    width = canvas.width(canvas.theme.boundary_line)
+    canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, width)
+
+
+def _draw_hull_excess(canvas: Canvas, x: float, y: float) -> None:
+    theme = canvas.theme
+    fill = mix(choose_outside_colour(theme), theme.obstacle, 0.55)
+    canvas.swatch(x, y, fill, mix(fill, theme.obstacle_edge, 0.5))
+
+
+def _draw_start(canvas: Canvas, x: float, y: float) -> None:
+    overlay.draw_ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)
+
+
+def _draw_robot(canvas: Canvas, x: float, y: float) -> None:
+    theme = canvas.theme
+    edge = mix(theme.background, theme.ink, 0.55)
+    colours = overlay.DiscColours(theme.robots[0], theme.robot_ring, edge)
+    overlay.draw_disc(canvas, (x, y), 6.5, colours, rim=1.4)
+
+
+def _draw_hatch(canvas: Canvas, x: float, y: float, *, is_narrow: bool) -> None:
+    size = round(12 * canvas.scale)
+    colour = canvas.theme.trajectory if is_narrow else canvas.theme.forces[CUT_OFF_FORCE]
+    page = draw_hatch_page(Rect(0, 0, size, size), colour, canvas.scale)
+    canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))

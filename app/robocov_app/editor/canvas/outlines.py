@@ -1,0 +1,136 @@
+"""Outlines of obstacles as they are drawn, built once for each obstacle."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array
+from robocov_app.editor.model.geometry import Box
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.render.surface_cache import Latest
+
+MAX_OUTLINES_PER_OBSTACLE = 4  # kept, among them those of obstacles that may come back by undoing
+SPARE_OUTLINES = 1000
+MIN_NAME_GAIN = 1.2  # a second position for a name must be so much wider than the first
+
+
+class NameSpace(NamedTuple):
+    """Space for the name of an obstacle: centre, width and height, m."""
+
+    x: float = 0.0
+    y: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Outline of a geometry.
+
+    Attributes
+    ----------
+    rings : list of (k, 2) array
+        Outer ring and holes of each part, m.
+    outer : list of bool
+        Whether each ring is an outer one.
+    lines : list of (k, 2) array
+        Lines and points that cover no area, m.
+    bounds : (4,) array
+        Low x, low y, high x, high y, m; nan for an empty geometry.
+    geometry : shapely.Geometry
+        The geometry.
+    """
+
+    rings: list[Array]
+    outer: list[bool]
+    lines: list[Array]
+    bounds: Array
+    geometry: shapely.Geometry
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether any ring is a hole."""
+        return not all(self.outer)
+
+    @cached_property
+    def name_space(self) -> NameSpace:
+        """The widest space for a name among two heights."""
+        best = NameSpace()
+        if self.geometry.is_empty:
+            return best
+        for y in (self.geometry.centroid.y, self.geometry.representative_point().y):
+            for row in _cut_horizontally(self.geometry, y):
+                x = row.centroid.x
+                columns = [
+                    column
+                    for column in _cut_vertically(self.geometry, x)
+                    if column.bounds[1] <= y <= column.bounds[3]
+                ]
+                if columns and row.length > best.width * MIN_NAME_GAIN:
+                    best = NameSpace(x, columns[0].centroid.y, row.length, columns[0].length)
+        return best
+
+
+def _cut_horizontally(geometry: shapely.Geometry, y: float) -> list[shapely.Geometry]:
+    low_x, _, high_x, _ = geometry.bounds
+    return _intersect_line(geometry, [(low_x - 1.0, y), (high_x + 1.0, y)])
+
+
+def _cut_vertically(geometry: shapely.Geometry, x: float) -> list[shapely.Geometry]:
+    _, low_y, _, high_y = geometry.bounds
+    return _intersect_line(geometry, [(x, low_y - 1.0), (x, high_y + 1.0)])
+
+
+def _intersect_line(
+    geometry: shapely.Geometry, ends: Iterable[tuple[float, float]]
+) -> list[shapely.Geometry]:
+    parts = shapely.get_parts(shapely.intersection(geometry, shapely.LineString(ends)))
+    return [part for part in parts if part.length > 0.0]
+
+
+def build_outline(geometry: shapely.Geometry) -> Outline:
+    """Build the outline of a geometry."""
+    rings: list[Array] = []
+    outer: list[bool] = []
+    lines: list[Array] = []
+    for part in shapely.get_parts(geometry):
+        if isinstance(part, shapely.Polygon):
+            rings += [np.asarray(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)]
+            outer += [True] + [False] * len(part.interiors)
+        elif not part.is_empty:
+            lines.append(shapely.get_coordinates(part))
+    return Outline(rings, outer, lines, np.array(shapely.bounds(geometry)), geometry)
+
+
+class Outlines:
+    """Outlines of obstacles, built once for each."""
+
+    def __init__(self) -> None:
+        self._outlines: dict[int, tuple[Item, Outline]] = {}  # by the identity of the item
+        self._bounds: Latest[Array] = Latest()
+
+    def get(self, item: Item) -> Outline:
+        """Return the outline of an obstacle."""
+        entry = self._outlines.get(id(item))
+        if entry is None or entry[0] is not item:
+            entry = (item, build_outline(item.geometry))
+            self._outlines[id(item)] = entry
+        return entry[1]
+
+    def find_items(self, sketch: Sketch, box: Box) -> list[Item]:
+        """Return the visible obstacles whose bounding boxes meet a box, m, from the bottom to the top."""
+        bounds = self._bounds.of(sketch, None, lambda: self._list_bounds(sketch))
+        low_x, low_y, high_x, high_y = bounds.T
+        is_near = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
+        items = [sketch.obstacles[k] for k in np.flatnonzero(is_near)]
+        return [item for item in items if not item.hidden]
+
+    def _list_bounds(self, sketch: Sketch) -> Array:
+        """Return the (n, 4) bounds of all obstacles, m."""
+        if len(self._outlines) > MAX_OUTLINES_PER_OBSTACLE * len(sketch.obstacles) + SPARE_OUTLINES:
+            self._outlines = {}
+        return np.array([self.get(item).bounds for item in sketch.obstacles]).reshape(-1, 4)

@@ -1,0 +1,122 @@
+"""The picture under the map."""
+
+from pathlib import Path
+
+import numpy as np
+import pygame
+from PIL import Image, ImageOps
+from pygame import Rect, Surface
+
+from robocov_app.editor.model.background import Background
+from robocov_app.render.camera import Camera
+from robocov_app.storage.regular_files import require_regular_file
+
+MAX_IMAGE_PX = 4096  # side that is kept of a larger picture
+MAX_SHOWN_PX = 8192  # side of the magnified part that is drawn
+MIN_PIXELATED_FACTOR = 4.0  # from this magnification on pixels stay sharp
+
+
+class ReferenceImage:
+    """Loads and draws the picture under a map, and keeps the latest one.
+
+    Attributes
+    ----------
+    error : str
+        Why the picture cannot be shown; cleared when it has been reported.
+    """
+
+    def __init__(self) -> None:
+        self.error = ""
+        self._path: Path | None = None
+        self._picture: Surface | None = None
+        self._reduction = 1.0  # pixels of the file per pixel of the kept picture
+
+    def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
+        """Draw a picture.
+
+        Parameters
+        ----------
+        page : Surface
+            The page.
+        background : Background
+            Position and opacity of the picture.
+        folder : Path
+            Folder to which its path is relative.
+        camera : Camera
+            The view.
+        clip : Rect
+            Visible part of the page, px.
+        """
+        self._load(folder / background.path)
+        if self._picture is None or not background.shown or background.opacity <= 0.0:
+            return
+        factor = background.scale * camera.zoom * self._reduction
+        if background.turn % 360.0:
+            drawn = self._rotate(self._picture, background, camera, factor)
+        else:
+            drawn = self._magnify(self._picture, background, camera, factor, clip)
+        if drawn is not None:
+            picture, position = drawn
+            picture.set_alpha(round(255 * background.opacity))
+            page.blit(picture, position)
+
+    def _load(self, path: Path) -> None:
+        if path == self._path:
+            return
+        self._path = path
+        self._picture = None
+        self.error = ""
+        try:
+            require_regular_file(path)
+            with Image.open(path) as file:
+                full = ImageOps.exif_transpose(file)
+                picture = _convert_to_rgb(full)
+            picture.thumbnail((MAX_IMAGE_PX, MAX_IMAGE_PX))
+            self._reduction = full.size[0] / picture.size[0]
+            self._picture = pygame.image.frombytes(picture.tobytes(), picture.size, "RGB").convert()
+        except Exception as error:  # Decoders raise anything for broken pictures.
+            self.error = f"the picture {path.name} cannot be shown: {error}"
+
+    def _rotate(
+        self, picture: Surface, background: Background, camera: Camera, factor: float
+    ) -> tuple[Surface, Rect] | None:
+        if factor * max(picture.get_size()) > MAX_SHOWN_PX:
+            return None
+        rotated = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
+        corners = camera.to_pixels(np.array(background.corners))
+        x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+        return rotated, rotated.get_rect(center=(round(x), round(y)))
+
+    def _magnify(
+        self, picture: Surface, background: Background, camera: Camera, factor: float, clip: Rect
+    ) -> tuple[Surface, Rect] | None:
+        """Magnify the visible part only, because the whole picture may become huge."""
+        left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
+        width, height = picture.get_size()
+        first_x = max(int((clip.left - left) / factor) - 1, 0)
+        first_y = max(int((clip.top - top) / factor) - 1, 0)
+        last_x = min(int((clip.right - left) / factor) + 2, width)
+        last_y = min(int((clip.bottom - top) / factor) + 2, height)
+        low_x = round(left + first_x * factor)
+        low_y = round(top + first_y * factor)
+        size_x = max(round(left + last_x * factor) - low_x, 1)
+        size_y = max(round(top + last_y * factor) - low_y, 1)
+        if last_x <= first_x or last_y <= first_y or max(size_x, size_y) > MAX_SHOWN_PX:
+            return None
+        part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
+        is_smooth = factor < MIN_PIXELATED_FACTOR
+        magnify = pygame.transform.smoothscale if is_smooth else pygame.transform.scale
+        return magnify(part, (size_x, size_y)), Rect(low_x, low_y, 0, 0)
+
+
+def _convert_to_rgb(picture: Image.Image) -> Image.Image:
+    """Return a picture in RGB: transparent ones on white, grey values of any range stretched."""
+    if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
+        transparent = picture.convert("RGBA")
+        white = Image.new("RGBA", transparent.size, "white")
+        return Image.alpha_composite(white, transparent).convert("RGB")
+    if picture.mode.startswith("I") or picture.mode == "F":
+        values = np.asarray(picture, dtype=float)
+        grey = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
+        return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
+    return picture.convert("RGB")

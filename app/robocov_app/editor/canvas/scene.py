@@ -1,0 +1,67 @@
+"""The state of the editor that is drawn in one frame."""
+
+from dataclasses import dataclass
+
+from pygame import Surface
+
+from robocov.environment import Point
+from robocov_app.editor.canvas.view import View
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.validation import Problem
+from robocov_app.editor.team import Team
+from robocov_app.editor.tools.tool import DrawState
+from robocov_app.render.canvas import Canvas
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that the layers draw in one frame.
+
+    Attributes
+    ----------
+    screen : Surface
+        The window.
+    canvas : Canvas
+        The part of the window in which the map is drawn.
+    view : View
+        The view of the sheet.
+    editor : Editor
+        The editor.
+    state : DrawState
+        What the tool shows.
+    saved : Sketch
+        The map without what is being dragged.
+    sketch : Sketch
+        The map as it is displayed.
+    selection : Selection
+        The selection as it is displayed.
+    lifted : frozenset of int
+        Keys of obstacles that are dragged, and not drawn on the sheet.
+    team : Team or None
+        The team at a start.
+    hovered : Problem or None
+        Problem under the cursor.
+    cursor : Point or None
+        Position of the cursor, px.
+    """
+
+    screen: Surface
+    canvas: Canvas
+    view: View
+    editor: Editor
+    state: DrawState
+    saved: Sketch
+    sketch: Sketch
+    selection: Selection
+    lifted: frozenset[int]
+    team: Team | None
+    hovered: Problem | None
+    cursor: Point | None
+
+    @property
+    def measurement(self) -> Measurement | None:
+        """The measurement, if passages that are too narrow are shown."""
+        return self.editor.measurement if "impassable" in self.view.shown else None

@@ -1,0 +1,386 @@
+"""The sheet: floor, picture, grid, obstacles and boundary on one page, of which only changes are redrawn."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import pygame
+import shapely
+from pygame import Rect, Surface
+
+from robocov.arrays import Array
+from robocov_app.editor.canvas.outlines import Outline, Outlines
+from robocov_app.editor.canvas.reference_image import ReferenceImage
+from robocov_app.editor.canvas.view import View, choose_outside_colour, compute_pixel_box
+from robocov_app.editor.model.geometry import Box
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.render import fonts, heatmaps
+from robocov_app.render.camera import Camera, round_length
+from robocov_app.render.canvas import FAR, Canvas
+from robocov_app.render.surface_cache import Latest
+from robocov_app.render.theme import LIGHT, Colour, mix
+
+# Lengths in pixels at scale 1.
+MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
+MIN_COARSE_GRID_PX = 55.0  # between the strong lines
+REDRAW_MARGIN_PX = 6  # around what has changed
+NAME_MARGIN_PX = 8.0  # that a name leaves free on both sides together
+
+PIXEL_BIAS = 1e-4  # shift of the camera: round coordinates would otherwise lie between two pixels
+MAX_SCROLL_ERROR_PX = 0.02  # of a camera that has moved by whole pixels
+MAX_REDRAWN_FRACTION = 0.5  # of the page; if more has changed, the whole page is redrawn
+MAX_BOXES = 40  # more boxes are redrawn as one
+MIN_LABEL_CHARACTERS = 6  # of a shortened name
+OBSTACLE_OPACITY = 0.62  # over a picture
+
+
+@dataclass(frozen=True, eq=False)
+class _PageState:
+    """What the page shows."""
+
+    look: tuple[object, ...]  # everything but the position of the camera and the obstacles
+    camera: Camera
+    items: dict[int, Item]
+
+
+class Sheet:
+    """Draws the sheet on a page, and keeps the page.
+
+    Attributes
+    ----------
+    outlines : Outlines
+        Outlines of the obstacles.
+    reference_image : ReferenceImage
+        The picture under the map.
+    """
+
+    def __init__(self) -> None:
+        self.outlines = Outlines()
+        self.reference_image = ReferenceImage()
+        self._page: Surface | None = None
+        self._state: _PageState | None = None
+        self._hull_excess: Latest[shapely.Geometry] = Latest()
+
+    def draw(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> Surface:
+        """Draw the sheet.
+
+        Parameters
+        ----------
+        view : View
+            The view.
+        sketch : Sketch
+            The map.
+        lifted : frozenset of int
+            Keys of obstacles that are not drawn, because they are dragged.
+
+        Returns
+        -------
+        Surface
+            The page, as large as the window; it is drawn on again by the next call.
+        """
+        left, top, width, height = view.camera.view
+        camera = view.camera.within((left + PIXEL_BIAS, top + PIXEL_BIAS, width, height))
+        view = replace(view, camera=camera)
+        items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
+        state = _PageState(_describe_look(view, sketch), camera, items)
+        boxes = self._find_changes(view, self._state, state)
+        if self._page is None or self._page.get_size() != view.size:
+            self._page = Surface(view.size, 0, 32)
+        self._state = state
+        for box in boxes:
+            self._paint(self._page, view, sketch, items, box)
+        return self._page
+
+    def _find_changes(self, view: View, before: _PageState | None, after: _PageState) -> list[Rect]:
+        """Return the boxes to redraw, px, after moving the page with the camera."""
+        whole = view.clip
+        if before is None or before.look != after.look:
+            return [whole]
+        boxes: list[Rect] = []
+        if before.camera.center != after.camera.center:
+            uncovered = self._scroll(before.camera, view)
+            if uncovered is None:
+                return [whole]
+            boxes += uncovered
+        margin = 2 * round(REDRAW_MARGIN_PX * view.scale)
+        for item in _list_changed_items(before.items, after.items):
+            bounds = self.outlines.get(item).bounds
+            if np.isfinite(bounds[0]):
+                boxes.append(compute_pixel_box(view.camera, bounds).inflate(margin, margin))
+        visible = [box.clip(whole) for box in boxes]
+        visible = [box for box in visible if box]
+        area = sum(box.width * box.height for box in visible)
+        if area > MAX_REDRAWN_FRACTION * whole.width * whole.height:
+            return [whole]
+        return _merge_boxes(visible)
+
+    def _scroll(self, camera: Camera, view: View) -> list[Rect] | None:
+        """Move the page with the camera.
+
+        Returns
+        -------
+        list of Rect or None
+            What has come into sight, px; None if the page cannot be moved by whole pixels.
+        """
+        shift = np.array(view.camera.middle) - camera.to_pixels(np.array(view.camera.center))
+        dx, dy = shift.tolist()
+        whole_x = round(dx)
+        whole_y = round(dy)
+        clip = view.clip
+        is_far = abs(whole_x) >= clip.width / 2 or abs(whole_y) >= clip.height / 2
+        if is_far or max(abs(dx - whole_x), abs(dy - whole_y)) > MAX_SCROLL_ERROR_PX:
+            return None
+        assert self._page is not None
+        self._page.set_clip(clip)
+        self._page.scroll(whole_x, whole_y)
+        self._page.set_clip(None)
+        boxes = []
+        if whole_x:
+            left = clip.left if whole_x > 0 else clip.right + whole_x
+            boxes.append(Rect(left, clip.top, abs(whole_x), clip.height))
+        if whole_y:
+            # The two boxes must not overlap.
+            top = clip.top if whole_y > 0 else clip.bottom + whole_y
+            left = clip.left + max(whole_x, 0)
+            boxes.append(Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
+        return boxes
+
+    def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
+        """Paint a box of the page, px."""
+        page.set_clip(box)
+        theme = view.theme
+        canvas = view.build_canvas(page)
+        page.fill(choose_outside_colour(theme), box)
+        boundary = None
+        if sketch.boundary is not None and len(sketch.boundary) > 2:
+            boundary = view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
+            canvas.polygon(boundary, theme.background)
+        background = sketch.background if "picture" in view.shown else None
+        has_picture = background is not None and background.shown
+        if background is not None:
+            self.reference_image.draw(page, background, view.folder, view.camera, view.clip)
+        if "grid" in view.shown:
+            _draw_grid(page, view, box, has_fine_lines=not has_picture)
+        if boundary is not None:
+            _draw_density(canvas, sketch)
+        self._draw_hull_excess(canvas, sketch)
+        near = self.outlines.find_items(sketch, _compute_visible_box(view, box))
+        visible = [item for item in near if items.get(item.key) is item]
+        if has_picture:
+            self._draw_translucent_items(canvas, visible, box)
+        else:
+            self.draw_items(canvas, visible)
+        if boundary is not None:
+            canvas.outline(boundary, theme.boundary, canvas.width(theme.boundary_line))
+        if "names" in view.shown:
+            self._draw_names(canvas, visible)
+        page.set_clip(None)
+
+    def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:
+        """Draw what robots take for free although it lies outside the boundary: their hull contains it."""
+        theme = canvas.theme
+        excess = self._hull_excess.of(sketch.boundary, None, lambda: compute_hull_excess(sketch))
+        fill = mix(choose_outside_colour(theme), theme.obstacle, 0.55)
+        for part in shapely.get_parts(excess):
+            if isinstance(part, shapely.Polygon):
+                corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+                canvas.polygon(corners, fill)
+                canvas.outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
+
+    def _draw_translucent_items(self, canvas: Canvas, items: list[Item], box: Rect) -> None:
+        """Draw obstacles so that the picture under them stays visible."""
+        layer = Surface(box.size, pygame.SRCALPHA, 32)
+        left, top, width, height = canvas.camera.view
+        camera = canvas.camera.within((left - box.x, top - box.y, width, height))
+        self.draw_items(replace(canvas, surface=layer, camera=camera), items)
+        layer.set_alpha(round(255 * OBSTACLE_OPACITY))
+        canvas.surface.blit(layer, box)
+
+    def draw_items(
+        self, canvas: Canvas, items: list[Item], fill: Colour | None = None, edge: Colour | None = None
+    ) -> None:
+        """Draw obstacles, by default in the colours of the theme."""
+        fill = fill or canvas.theme.obstacle
+        edge = edge or canvas.theme.obstacle_edge
+        outlines = [self.outlines.get(item) for item in items]
+        rings = [ring for outline in outlines for ring in outline.rings]
+        if rings:
+            ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
+            corners = canvas.camera.to_pixels(np.concatenate(rings))
+            fills: list[Colour | None] = []
+            for outline in outlines:
+                fills += [None if outline.has_holes else fill] * len(outline.rings)
+            canvas.polygons(corners, ends, fills)
+            for outline in outlines:
+                if outline.has_holes:
+                    _fill_with_holes(canvas, outline, fill)
+            _draw_rings(canvas, corners, ends, edge)
+        for outline in outlines:
+            for line in outline.lines:
+                points = canvas.camera.to_pixels(line)
+                if len(points) > 1:
+                    canvas.outline(points, canvas.theme.trajectory, canvas.width(1.5), closed=False)
+
+    def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
+        """Write the names of obstacles that are large enough."""
+        size = canvas.text_size(canvas.theme.small_text)
+        colour = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
+        zoom = canvas.camera.zoom
+        for item in items:
+            name = item.shape.name
+            outline = self.outlines.get(item)
+            low_x, low_y, high_x, high_y = outline.bounds.tolist()
+            if not name or (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
+                continue
+            space = outline.name_space
+            width = space.width * zoom - NAME_MARGIN_PX * canvas.scale
+            text = fonts.shortened(name, size, width)
+            is_readable = text == name or len(text) > MIN_LABEL_CHARACTERS
+            if space.height * zoom > size + 2 and is_readable:
+                centre = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
+                canvas.text(text, centre, size=canvas.theme.small_text, colour=colour, anchor="middle")
+
+
+def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:
+    """Return everything on which the page depends, apart from obstacles and the position of the camera."""
+    return (
+        view.camera.zoom,
+        view.camera.view,
+        view.theme.name,
+        view.scale,
+        view.size,
+        view.grid,
+        view.shown & {"grid", "names", "picture"},
+        view.folder,
+        sketch.background,
+        sketch.boundary,
+        sketch.density,
+    )
+
+
+def _list_changed_items(before: dict[int, Item], after: dict[int, Item]) -> list[Item]:
+    """Return obstacles that have gone or changed, as they were, and those that are new, as they are."""
+    changed = [item for key, item in before.items() if after.get(key) is not item]
+    changed += [item for key, item in after.items() if before.get(key) is not item]
+    return changed
+
+
+def _compute_visible_box(view: View, box: Rect) -> Box:
+    """Return the part of the map, m, that a box of the page shows, with a margin."""
+    ends = np.array([box.bottomleft, box.topright], dtype=float)
+    (low_x, low_y), (high_x, high_y) = view.camera.to_world(ends).tolist()
+    margin = REDRAW_MARGIN_PX * view.scale / view.camera.zoom
+    return low_x - margin, low_y - margin, high_x + margin, high_y + margin
+
+
+def compute_hull_excess(sketch: Sketch) -> shapely.Geometry:
+    """Return the part of the boundary's convex hull that lies outside the boundary."""
+    if not sketch.boundary or len(sketch.boundary) <= 2:
+        return shapely.Polygon()
+    polygon = shapely.Polygon(sketch.boundary)
+    if not polygon.is_valid:
+        return shapely.Polygon()
+    return shapely.difference(polygon.convex_hull, polygon)
+
+
+def _draw_density(canvas: Canvas, sketch: Sketch) -> None:
+    density = sketch.density
+    if density is not None and not density.is_uniform and sketch.boundary is not None:
+        heatmaps.draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
+
+
+def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) -> None:
+    theme = view.theme
+    fine_step, coarse_step = compute_grid_steps(view.grid, view.camera.zoom, view.scale)
+    fine_share, coarse_share = (0.32, 0.75) if theme is LIGHT else (0.2, 0.5)
+    if has_fine_lines:
+        _draw_grid_lines(page, view, box, fine_step, mix(theme.background, theme.grid, fine_share))
+    _draw_grid_lines(page, view, box, coarse_step, mix(theme.background, theme.grid, coarse_share))
+
+
+def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, colour: Colour) -> None:
+    low_x, low_y, high_x, high_y = view.camera.visible()
+    width = max(1, round(view.scale))
+    xs = np.arange(np.ceil(low_x / step), np.floor(high_x / step) + 1) * step
+    ys = np.arange(np.ceil(low_y / step), np.floor(high_y / step) + 1) * step
+    columns = view.camera.to_pixels(np.column_stack([xs, np.zeros(len(xs))]))[:, 0]
+    rows = view.camera.to_pixels(np.column_stack([np.zeros(len(ys)), ys]))[:, 1]
+    for x in columns[(columns >= box.left - 2) & (columns <= box.right + 2)].tolist():
+        page.fill(colour, Rect(round(x - width / 2), box.top, width, box.height))
+    for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
+        page.fill(colour, Rect(box.left, round(y - width / 2), box.width, width))
+
+
+def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
+    """Compute the spacings of the grid's fine and strong lines.
+
+    Parameters
+    ----------
+    grid : float
+        Spacing of the grid, m.
+    zoom : float
+        Magnification, px/m.
+    scale : float
+        Scale of the window.
+
+    Returns
+    -------
+    fine, coarse : float
+        Multiples of the grid, m, that are far enough apart on the screen.
+    """
+    fine = grid
+    min_fine = MIN_FINE_GRID_PX * scale / zoom
+    if fine < min_fine:
+        factor = round_length(min_fine / grid)
+        if factor < min_fine / grid:
+            factor = round_length(2.5001 * factor)
+        fine = grid * factor
+    min_coarse = MIN_COARSE_GRID_PX * scale / zoom
+    factor = round_length(max(min_coarse / fine, 1.0))
+    if factor * fine < min_coarse:
+        factor = round_length(2.5001 * factor)
+    coarse = fine * factor
+    return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
+
+
+def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Colour) -> None:
+    """Fill an obstacle on a page of its own, so that what lies below is visible through the holes."""
+    clip = canvas.surface.get_clip()
+    page = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
+    for ring, is_outer in zip(outline.rings, outline.outer, strict=True):
+        corners = canvas.camera.to_pixels(ring) - np.array(clip.topleft)
+        page.polygon(corners, (*fill, 255) if is_outer else (0, 0, 0, 0))
+    canvas.surface.blit(page.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
+    """Draw closed lines; the (k, 2) corners, px, of all lines follow each other, and `ends` divides them."""
+    width = canvas.width(canvas.theme.line)
+    if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
+        for start, end in pairwise((0, *ends)):
+            if end - start > 1:
+                pygame.draw.aalines(canvas.surface, colour, True, corners[start:end].tolist())
+        return
+    following = np.arange(1, len(corners) + 1)
+    following[np.array(ends) - 1] = [0, *ends[:-1]]
+    edges = np.hstack([corners, corners[following]])
+    # Edges outside the page would only take time.
+    clip = canvas.surface.get_clip()
+    low = np.minimum(edges[:, :2], edges[:, 2:])
+    high = np.maximum(edges[:, :2], edges[:, 2:])
+    is_visible = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
+    is_visible &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
+    canvas.segments(edges[is_visible], colour, width)
+
+
+def _merge_boxes(boxes: list[Rect]) -> list[Rect]:
+    """Return boxes that cover the same and do not overlap; of many, the box around all."""
+    if len(boxes) > MAX_BOXES:
+        boxes = [boxes[0].unionall(boxes[1:])]
+    merged: list[Rect] = []
+    for box in boxes:
+        union = box.copy()
+        while (index := union.collidelist(merged)) >= 0:
+            union.union_ip(merged.pop(index))
+        merged.append(union)
+    return merged

@@ -1,0 +1,74 @@
+"""The view of the sheet: camera, theme, and what is shown."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
+
+MAX_RECT_PX = 30_000  # coordinates of rectangles are limited to this
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """View of the sheet.
+
+    Attributes
+    ----------
+    camera : Camera
+        Position and magnification.
+    theme : Theme
+        Colours.
+    scale : float
+        Scale of the window.
+    size : tuple of int
+        Width and height of the window, px.
+    shown : frozenset of str
+        Layers that are shown.
+    grid : float
+        Spacing of the grid, m.
+    folder : Path
+        Folder to which the path of the reference image is relative.
+    """
+
+    camera: Camera
+    theme: Theme
+    scale: float
+    size: tuple[int, int]
+    shown: frozenset[str]
+    grid: float
+    folder: Path
+
+    @property
+    def clip(self) -> Rect:
+        """Part of the window in which the sheet is visible, px."""
+        return Rect([round(value) for value in self.camera.view])
+
+    def build_canvas(self, surface: Surface) -> Canvas:
+        """Return a canvas that draws on a surface."""
+        return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
+
+    def build_page(self) -> Canvas:
+        """Return a transparent canvas as large as the window."""
+        return self.build_canvas(Surface(self.size, pygame.SRCALPHA, 32))
+
+
+def choose_outside_colour(theme: Theme) -> Colour:
+    """Return the colour of the sheet outside the boundary."""
+    if theme is LIGHT:
+        return mix(theme.panel, theme.ink, 0.05)
+    return mix(theme.background, (0, 0, 0), 0.28)
+
+
+def compute_pixel_box(camera: Camera, bounds: Iterable[float]) -> Rect:
+    """Return the pixels covered by a box, m, with a margin of one or two pixels."""
+    low_x, low_y, high_x, high_y = bounds
+    ends = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+    (left, top), (right, bottom) = np.clip(ends, -MAX_RECT_PX, MAX_RECT_PX).tolist()
+    return Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)

@@ -1,0 +1,325 @@
+"""The editor without its window: what is open, selected and shown, and how changes are made."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from robocov.environment import Point
+from robocov.errors import MapError, RobocovError
+from robocov.mapfile.models import MIN_SIZE_M
+from robocov_app.editor.model import require
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.validation import Problem, translate_message
+from robocov_app.editor.settings import LAYERS, EditorSettings
+from robocov_app.editor.tools.density import DensityTool
+from robocov_app.editor.tools.door import DoorTool
+from robocov_app.editor.tools.draw import (
+    BoundaryTool,
+    CircleTool,
+    DiscTool,
+    MeasureTool,
+    PlacesTool,
+    PolygonTool,
+    RectangleTool,
+    WallTool,
+)
+from robocov_app.editor.tools.motion_path import MotionPathTool
+from robocov_app.editor.tools.reference_image import ReferenceImageTool
+from robocov_app.editor.tools.select import PanTool, SelectTool
+from robocov_app.editor.tools.snapping import SNAPS, count_vertices
+from robocov_app.editor.tools.tool import Tool, Workspace
+from robocov_app.jobs.workers import Worker
+from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
+from robocov_app.toolkit.faults import describe_os_error
+
+MESSAGE_S = 5.0  # time for which a message is shown
+ERROR_MESSAGE_S = 8.0
+MAX_LIVE_VERTICES = 1500  # larger maps are not measured while something is dragged
+GRIDS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+MAX_ROBOTS = 1000
+MAX_LENGTHS_M = {"grid": 100.0, "wall_width": 100.0, "radius": 10.0}
+
+
+class Editor(Workspace):
+    """State of the editor, and the actions of the user on it.
+
+    Parameters
+    ----------
+    document : Document
+        The open map.
+    measurement_worker : Worker of Measurement
+        Measures the map, given a sketch and the radius of a robot.
+    folder : Path
+        Folder of files without a path.
+    settings : EditorSettings
+        Settings of the previous session.
+
+    Attributes
+    ----------
+    selector : SelectTool
+        The selection tool.
+    tools : dict of str to Tool
+        All tools by their names, in the order in which they are shown.
+    tool : Tool
+        The tool in use.
+    theme : str
+        Colours: "light" or "dark".
+    panel : bool
+        Whether the panel is shown.
+    shown : set of str
+        Layers that are shown, see `LAYERS`.
+    radius : float
+        Radius of a robot, m.
+    robots : int
+        Number of robots in the team.
+    seed : int
+        Seed of the team's positions.
+    start : str or None
+        Start chosen for the team.
+    recent : list of str
+        Paths of recent maps, the newest first.
+    measurement : Measurement or None
+        Latest measurement of the map.
+    problem : Problem or None
+        Problem whose message is shown on the sheet.
+    dialogs : Dialogs
+        The open dialog.
+    cursor : Point or None
+        Position of the pointer over the map, m.
+    typed : str
+        Value that is being typed for the tool.
+    moves_since : float or None
+        Time since which moving obstacles are shown moving, s; None while they stand.
+    """
+
+    def __init__(
+        self,
+        document: Document,
+        measurement_worker: Worker[Measurement],
+        folder: Path,
+        settings: EditorSettings,
+    ) -> None:
+        super().__init__(document)
+        self.measurement_worker = measurement_worker
+        self.folder = folder
+        self.selector = SelectTool()
+        self.tape = MeasureTool()
+        self.density_tool = DensityTool()
+        self.tools: dict[str, Tool] = {tool.name: tool for tool in self._list_tools()}
+        self.tool: Tool = self.selector
+        self.theme: str = settings.theme
+        self.panel = True
+        self.shown = set(settings.shown) & set(LAYERS)
+        self.snaps = set(settings.snaps) & set(SNAPS)
+        self.grid = settings.grid
+        self.snap_angle = settings.angle
+        self.wall_width = settings.wall
+        self.radius = settings.radius
+        self.robots = settings.robots
+        self.seed = 0
+        self.start: str | None = None
+        self.recent = list(settings.recent)
+        self.measurement: Measurement | None = None
+        self.problem: Problem | None = None
+        self.dialogs = Dialogs()
+        self.cursor: Point | None = None
+        self.typed = ""
+        self.moves_since: float | None = None
+        self._measured: tuple[Sketch, float] | None = None  # sketch and radius last sent to the worker
+
+    def _list_tools(self) -> list[Tool]:
+        return [
+            self.selector,
+            PanTool(),
+            PolygonTool(),
+            RectangleTool(),
+            CircleTool(),
+            WallTool(),
+            DoorTool(),
+            BoundaryTool(),
+            self.tape,
+            DiscTool(),
+            PlacesTool(),
+            self.density_tool,
+            MotionPathTool(),
+            ReferenceImageTool(),
+        ]
+
+    @property
+    def displayed(self) -> tuple[Sketch, Selection]:
+        """Map and selection as shown: during a drag, as a release would make them."""
+        drag = self.selector.drag
+        if drag is None or drag.change is None:
+            return self.sketch, self.selection
+        return drag.change.sketch, drag.change.selection
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """Problems of the map, as far as it has been measured."""
+        return self.measurement.problems if self.measurement is not None else ()
+
+    @property
+    def start_names(self) -> list[str]:
+        """Names of the starts."""
+        return [name for name, _ in self.sketch.starts]
+
+    @property
+    def start_name(self) -> str | None:
+        """Start at which the team is shown: the selected one, the chosen one, or the first."""
+        for name in (*sorted(self.selection.starts), self.start, *self.start_names):
+            if name in self.start_names:
+                return name
+        return None
+
+    def _handle_change(self) -> None:
+        super()._handle_change()
+        self.problem = None
+        self.document.keep_aside()
+        self.request_measurement()
+
+    def request_measurement(self) -> None:
+        """Request a measurement of the map as displayed, unless it is the same as before."""
+        sketch, _ = self.displayed
+        if sketch is not self.sketch and count_vertices(sketch) >= MAX_LIVE_VERTICES:
+            sketch = self.sketch
+        measured = self._measured
+        if measured is None or measured[0] is not sketch or measured[1] != self.radius:
+            self._measured = (sketch, self.radius)
+            self.measurement_worker.put(self._measured)
+
+    def undo_steps(self, steps: int) -> None:
+        """Undo a number of changes, or redo them if it is negative."""
+        history = self.document.history
+        change: Change | None = None
+        for _ in range(abs(steps)):
+            change = history.undo() if steps > 0 else history.redo()
+        if steps == 1:
+            self.show_message(f"undone: {change.description}" if change else "nothing to undo")
+        elif steps == -1:
+            self.show_message(f"done again: {change.description}" if change else "nothing to do again")
+        self._handle_change()
+
+    def open_document(self, document: Document) -> None:
+        """Replace the document."""
+        self.document = document
+        self.measurement = None
+        self._measured = None
+        self.selector.cancel(self)
+        self.choose_tool("select", shows_hint=False)
+        self._handle_change()
+
+    def choose_tool(self, name: str, *, shows_hint: bool = True) -> None:
+        """Choose a tool by its name."""
+        self.tool.cancel(self)
+        self.tool = self.tools[name]
+        self.typed = ""
+        self.revision += 1
+        if shows_hint:
+            self.show_message(self.tool.hint)
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Carry an action out, and show its message or its error."""
+        try:
+            self.carry_out(action)
+        except RobocovError as error:
+            self.show_message(str(error), is_error=True)
+        except OSError as error:
+            self.show_message(describe_os_error(error), is_error=True)
+
+    def carry_out(self, action: Callable[[], object]) -> None:
+        """Carry an action out, and show the message that it returns.
+
+        Raises
+        ------
+        MapError
+            If the action fails. Objects are named as in the window, not by their place in the file.
+        """
+        self.revision += 1
+        try:
+            message = action()
+        except RobocovError as error:
+            raise MapError(translate_message(str(error), self.sketch)) from None
+        if isinstance(message, str):
+            self.show_message(message)
+
+    def ask_question(self, title: str, text: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
+        """Ask a question.
+
+        Parameters
+        ----------
+        title, text : str
+            The question.
+        *answers : tuple of str, str and callable
+            Label, key and action of each answer; Escape gives the last one.
+        """
+        buttons = [Answer(label, partial(self.attempt, action), key) for label, key, action in answers]
+        self.dialogs.ask(Question(title, text, buttons, on_cancel=buttons[-1].call))
+
+    def advance(self, seconds: float) -> None:
+        """Advance the clock: old messages go, and measurements arrive."""
+        self.now += seconds
+        duration = ERROR_MESSAGE_S if self.has_error_message else MESSAGE_S
+        if self.message and self.now - self.message_time > duration:
+            self.message = ""
+        measurement = self.measurement_worker.poll()
+        if measurement is not None:
+            self.measurement = measurement
+            self.revision += 1
+
+    def toggle_layer(self, name: str) -> None:
+        """Show or hide a layer."""
+        self.shown ^= {name}
+        self._report_switch(LAYERS[name].title, is_on=name in self.shown)
+
+    def toggle_snap(self, name: str) -> None:
+        """Switch a snap mode on or off."""
+        self.snaps ^= {name}
+        self._report_switch(SNAPS[name].title, is_on=name in self.snaps)
+
+    def toggle_all_snaps(self) -> None:
+        """Switch all snap modes off, or on if all are off."""
+        self.snaps = set() if self.snaps else set(SNAPS)
+        self.show_message("snaps to everything" if self.snaps else "snaps to nothing")
+
+    def _report_switch(self, title: str, *, is_on: bool) -> None:
+        self.show_message(f"{title}: {'on' if is_on else 'off'}")
+
+    def set_length(self, name: str, length: float) -> None:
+        """Set the attribute grid, wall_width or radius to a length, m."""
+        maximum = MAX_LENGTHS_M[name]
+        if not MIN_SIZE_M <= length <= maximum:
+            label = name.replace("_", " ")
+            raise MapError(f"{label}: expected {MIN_SIZE_M:g} to {maximum:g} m, got {length:g} m")
+        setattr(self, name, length)
+        if name == "grid":
+            self.show_message(f"the grid is {length:g} m")
+
+    def refine_grid(self) -> None:
+        """Choose the next finer grid."""
+        finer = [grid for grid in GRIDS_M if grid < self.grid * 0.999]
+        self.set_length("grid", finer[-1] if finer else GRIDS_M[0])
+
+    def coarsen_grid(self) -> None:
+        """Choose the next coarser grid."""
+        coarser = [grid for grid in GRIDS_M if grid > self.grid * 1.001]
+        self.set_length("grid", coarser[0] if coarser else GRIDS_M[-1])
+
+    def set_robots(self, count: int) -> None:
+        """Set the number of robots in the team."""
+        require(1 <= count <= MAX_ROBOTS, f"robots: expected 1 to {MAX_ROBOTS}, got {count}")
+        self.robots = count
+
+    def add_robots(self, count: int) -> None:
+        """Add robots to the team, or remove some if the number is negative."""
+        self.set_robots(min(max(self.robots + count, 1), MAX_ROBOTS))
+
+    def switch_theme(self) -> None:
+        """Switch between light and dark colours."""
+        self.theme = "dark" if self.theme == "light" else "light"
+
+    def toggle_panel(self) -> None:
+        """Show or hide the panel."""
+        self.panel = not self.panel

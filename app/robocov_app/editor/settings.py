@@ -1,0 +1,96 @@
+"""Settings that the editor remembers between sessions, and the layers that it can show."""
+
+from typing import Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from robocov.defaults import DEFAULT_RADIUS_M
+from robocov_app.editor.tools.snapping import SNAPS
+
+SETTINGS_FILE = "editor.json"
+MAX_RECENT = 10  # recent maps
+SIZE_LIMITS_PX = {"width": (900, 7680), "height": (600, 4320)}
+
+
+class Layer(NamedTuple):
+    """A layer of the sheet that can be shown or hidden.
+
+    Attributes
+    ----------
+    title : str
+        Its label.
+    key : str
+        Key that shows or hides it.
+    """
+
+    title: str
+    key: str
+
+
+LAYERS = {
+    "grid": Layer("Grid", "alt+3"),
+    "names": Layer("Names", "alt+2"),
+    "impassable": Layer("Too narrow", "alt+1"),
+    "problems": Layer("Problems", "alt+5"),
+    "robots": Layer("Robots at start", "a"),
+    "picture": Layer("Picture", "alt+6"),
+    "legend": Layer("Legend", "alt+7"),
+    "handles": Layer("Handles", "alt+4"),
+}
+
+SETTING_ATTRIBUTES = {
+    "grid": "grid",
+    "angle": "snap_angle",
+    "radius": "radius",
+    "robots": "robots",
+    "wall": "wall_width",
+}
+"""Attribute of the editor that holds each setting."""
+
+
+class EditorSettings(BaseModel):
+    """Appearance and snapping of the editor, and its recent maps.
+
+    Attributes
+    ----------
+    theme : {"light", "dark"}
+        Colours of the window.
+    scale : float or None
+        Size of texts and widgets; None for that of the screen.
+    width, height : int
+        Size of the window, px.
+    tab : str
+        Page of the panel.
+    grid : float
+        Spacing of the grid, m.
+    angle : float
+        Lines snap to multiples of this angle, degrees.
+    snaps : tuple of str
+        Snap modes that are on.
+    shown : tuple of str
+        Layers that are shown.
+    radius : float
+        Radius of a robot, m.
+    robots : int
+        Number of robots in the team.
+    wall : float
+        Width of new walls, m.
+    recent : tuple of str
+        Paths of recent maps, the newest first.
+    """
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    theme: Literal["light", "dark"] = "light"
+    scale: float | None = Field(default=None, ge=0.5, le=4.0)
+    width: int = Field(default=1280, ge=SIZE_LIMITS_PX["width"][0], le=SIZE_LIMITS_PX["width"][1])
+    height: int = Field(default=720, ge=SIZE_LIMITS_PX["height"][0], le=SIZE_LIMITS_PX["height"][1])
+    tab: str = "map"
+    grid: float = Field(default=0.1, ge=0.001, le=100.0)
+    angle: float = Field(default=15.0, gt=0.0, le=90.0)
+    snaps: tuple[str, ...] = tuple(SNAPS)
+    shown: tuple[str, ...] = tuple(name for name in LAYERS if name != "robots")
+    radius: float = Field(default=DEFAULT_RADIUS_M, ge=0.001, le=10.0)
+    robots: int = Field(default=6, ge=1, le=1000)
+    wall: float = Field(default=0.1, ge=0.001, le=100.0)
+    recent: tuple[str, ...] = ()

@@ -1,0 +1,95 @@
+"""The team shown at a start of the map, sampled in a thread so that the window does not wait."""
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+from robocov.environment import Point
+from robocov_app.editor.model.sketch import Sketch
+
+
+@dataclass(frozen=True)
+class TeamRequest:
+    """Describes a team and where it starts.
+
+    Attributes
+    ----------
+    sketch : Sketch
+        The map.
+    start : str or None
+        Name of the start; None for anywhere in the free space.
+    robots : int
+        Number of robots.
+    seed : int
+        Seed of the positions.
+    radius : float
+        Radius of a robot, m.
+    """
+
+    sketch: Sketch
+    start: str | None
+    robots: int
+    seed: int
+    radius: float
+
+
+@dataclass(frozen=True)
+class Team:
+    """A team at a start.
+
+    Attributes
+    ----------
+    start : str or None
+        Name of the start; None for anywhere in the free space.
+    robots : int
+        Number of robots.
+    radius : float
+        Radius of a robot, m.
+    positions : tuple of Point
+        Positions of the robots, m; empty if they do not fit.
+    message : str
+        Why they do not fit.
+    """
+
+    start: str | None
+    robots: int
+    radius: float
+    positions: tuple[Point, ...] = ()
+    message: str = ""
+
+
+def sample_team(request: TeamRequest) -> Team:
+    """Sample the positions of a team; a failure is in the team's message."""
+    try:
+        start = request.sketch.build_environment().start(request.start)
+        positions = start.sample(request.robots, seed=request.seed, radius=request.radius)
+    except Exception as error:  # An unforeseen error must not end the window.
+        message = str(error).removeprefix("map: ")
+        return Team(request.start, request.robots, request.radius, message=message)
+    points = tuple((x, y) for x, y in positions.tolist())
+    return Team(request.start, request.robots, request.radius, points)
+
+
+class TeamSampler:
+    """Samples teams in a thread; only the newest request counts."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "team")
+        self._request: TeamRequest | None = None
+        self._future: Future[Team] | None = None
+
+    def poll(self, request: TeamRequest) -> Team | None:
+        """Request a team unless it was requested before, and return it once when it is ready."""
+        if self._request != request:
+            self._request = request
+            if self._future is not None:
+                self._future.cancel()
+            self._future = self._pool.submit(sample_team, request)
+        if self._future is None or not self._future.done():
+            return None
+        team = self._future.result()
+        self._future = None
+        return team
+
+    def close(self) -> None:
+        """End the thread."""
+        self._pool.shutdown(wait=False, cancel_futures=True)

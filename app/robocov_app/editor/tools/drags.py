@@ -1,0 +1,353 @@
+"""Drags of the selection tool: each move of the pointer gives the change that a release would make."""
+
+import math
+
+from robocov.environment import CircleObstacle, Point
+from robocov.errors import MapError
+from robocov_app.editor.edits import transform, vertices
+from robocov_app.editor.edits.transform import compute_bounds
+from robocov_app.editor.model import geometry, require
+from robocov_app.editor.model.coordinates import parse_angle, parse_length, parse_next_point
+from robocov_app.editor.model.hit_test import find_in_box, find_vertices_in_box
+from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position, list_vertices
+from robocov_app.editor.tools.snapping import Guide, Snap, SnapTargets, snap_angle, snap_move
+from robocov_app.editor.tools.tool import (
+    CarriedItems,
+    DrawState,
+    Handle,
+    PointerEvent,
+    Workspace,
+    compute_side_position,
+)
+
+MANY_POINTS = 1000  # of more vertices, a picture is moved instead of the obstacles
+MAX_SNAPPING_POINTS = 60  # of the vertices that are moved, about so many can snap
+NO_MOVE_M = 1e-9  # shorter moves are none
+MIN_SIZE_M = 1e-3  # of the selection after scaling
+_FACTOR_TOLERANCE = 1e-9
+_UNIT_TOLERANCE = 1e-12
+
+
+class Drag:
+    """Base class of the drags.
+
+    Parameters
+    ----------
+    context : Workspace
+        The editor.
+    selection : Selection
+        What is dragged.
+    start : Point
+        Position at which the drag started, m.
+
+    Attributes
+    ----------
+    change : Change or None
+        Change that ending the drag would make.
+    guides : tuple of Guide
+        Guides of the latest snap.
+    label : str
+        Text next to the cursor.
+    cursor_shape : str
+        Shape of the cursor; empty for that of the handle.
+    """
+
+    cursor_shape = ""
+
+    def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
+        self.context = context
+        self.selection = selection
+        self.change: Change | None = None
+        self.guides: tuple[Guide, ...] = ()
+        self.label = ""
+        self._start = start
+        self._end = start
+
+    @property
+    def carried(self) -> CarriedItems | None:
+        """Obstacles that are dragged as a picture."""
+        return None
+
+    def follow(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+
+    def enter_text(self, text: str) -> None:
+        """Drag by a typed value; raise MapError if it means nothing."""
+        raise MapError(f"“{text}”: there is nothing to type here")
+
+    def build_draw_state(self) -> DrawState:
+        """Return what the drag shows on the sheet."""
+        return DrawState(label=self.label, carried=self.carried, shows_handles=True)
+
+    def end(self) -> None:
+        """Apply the change."""
+        if self.change is not None:
+            self.context.apply(self.change)
+
+    def _snap(self, event: PointerEvent, position: Point, origin: Point | None = None) -> Point:
+        """Snap a position to anything but what is dragged, unless Ctrl is held down."""
+        snap = Snap(position)
+        if not event.ctrl:
+            dragged = self.selection.vertices or self.selection.owners
+            snap = self.context.snap(position, event.reach, origin, without=dragged)
+        self.guides = snap.guides
+        return snap.point
+
+
+class MoveDrag(Drag):
+    """Moves objects: with Alt copies, with Shift at round angles, with Ctrl without snapping."""
+
+    cursor_shape = "move"
+
+    def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
+        super().__init__(context, selection, start)
+        points: list[Point] = []
+        for owner in selection.owners:
+            points += [position for _, position in list_vertices(context.sketch, owner)]
+        self._points = points[:: max(1, len(points) // MAX_SNAPPING_POINTS)]
+        self._is_carried = len(points) > MANY_POINTS
+        self._offset = (0.0, 0.0)
+        self._copies = False
+
+    @property
+    def carried(self) -> CarriedItems | None:
+        """Obstacles that are dragged as a picture, if they are many."""
+        if not self._is_carried:
+            return None
+        return CarriedItems(self.selection, self._offset, self._copies)
+
+    def follow(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+        self._copies = event.alt
+        self.guides = ()
+        end = geometry.constrain_angle(self._start, event.raw) if event.shift else event.raw
+        dx = end[0] - self._start[0]
+        dy = end[1] - self._start[1]
+        context = self.context
+        targets = context.snapper.find_targets(context.sketch, self.selection.owners)
+        if targets is not None and not event.ctrl and not event.shift:
+            dx, dy = self._snap_offset(event, (dx, dy), targets)
+        self._move(dx, dy)
+
+    def _snap_offset(
+        self, event: PointerEvent, offset: tuple[float, float], targets: SnapTargets
+    ) -> tuple[float, float]:
+        """Snap the displacement; along axes without another snap, the first point snaps to the grid."""
+        context = self.context
+        settings = context.build_snap_settings(event.reach)
+        snap = snap_move(self._points, offset[0], offset[1], targets, settings)
+        self.guides = snap.guides
+        snapped = list(snap.point)
+        for axis in (0, 1):
+            has_snapped = abs(snapped[axis] - offset[axis]) >= NO_MOVE_M
+            if not has_snapped and "grid" in context.snaps and self._points:
+                first = self._points[0][axis]
+                snapped[axis] = context.grid * round((first + snapped[axis]) / context.grid) - first
+        return snapped[0], snapped[1]
+
+    def _move(self, dx: float, dy: float) -> None:
+        self._end = (self._start[0] + dx, self._start[1] + dy)
+        if self._is_carried:
+            self._offset = (dx, dy)
+        else:
+            self.change = self._build_change(dx, dy)
+        length = geometry.format_length(math.hypot(dx, dy))
+        self.label = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {length}"
+
+    def _build_change(self, dx: float, dy: float) -> Change | None:
+        if not dx and not dy:
+            return None
+        edit = transform.duplicate if self._copies else transform.move
+        return edit(self.context.sketch, self.selection, dx, dy)
+
+    def end(self) -> None:
+        """Apply the change."""
+        if self._is_carried:
+            self.change = self._build_change(*self._offset)
+        super().end()
+
+    def enter_text(self, text: str) -> None:
+        """Move by a length towards the cursor, or by a typed displacement: ``0.5 -2`` or ``2<45``."""
+        text = text.strip()
+        has_two_values = len(text.split()) > 1 or "<" in text or ";" in text
+        if has_two_values and text[0] not in "@+":
+            text = f"@{text}"
+        end = parse_next_point(text, self._start, self._end)
+        self._move(end[0] - self._start[0], end[1] - self._start[1])
+
+
+class VertexDrag(Drag):
+    """Moves a vertex with the selected ones; with Shift at a round angle from the vertex before it."""
+
+    def __init__(self, context: Workspace, vertex: Vertex, selection: Selection) -> None:
+        dragged = Selection(vertices=selection.vertices | {vertex})
+        super().__init__(context, dragged, find_position(context.sketch, vertex))
+        self._origin = self._find_origin(vertex)
+
+    def _find_origin(self, vertex: Vertex) -> Point | None:
+        """Return the previous vertex on the ring, after a wall's first; None for circles and starts."""
+        rings = self.context.sketch.list_rings(vertex.owner)
+        if vertex.ring >= len(rings):
+            return None
+        _, points, is_closed = rings[vertex.ring]
+        if vertex.index == 0 and not is_closed:
+            return points[min(1, len(points) - 1)]
+        return points[vertex.index - 1]
+
+    def follow(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+        if event.shift and self._origin is not None:
+            self.guides = ()
+            self._place(geometry.constrain_angle(self._origin, event.raw))
+        else:
+            self._place(self._snap(event, event.raw, self._origin))
+
+    def _place(self, position: Point) -> None:
+        self._end = position
+        dx = position[0] - self._start[0]
+        dy = position[1] - self._start[1]
+        self.change = None
+        if dx or dy:
+            self.change = vertices.move_vertices(self.context.sketch, self.selection, dx, dy)
+        self.label = geometry.format_point(position)
+        if self._origin is not None:
+            self.label += f"   {geometry.format_bearing(self._origin, position)}"
+
+    def enter_text(self, text: str) -> None:
+        """Move to a typed position, or by a length towards the cursor."""
+        self._place(parse_next_point(text, self._origin or self._start, self._end))
+
+
+class TurnDrag(Drag):
+    """Turns objects about the centre of their box; with Shift in steps, with Ctrl without snapping."""
+
+    def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
+        super().__init__(context, selection, start)
+        bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
+        self._centre = geometry.compute_centre(bounds)
+        self._start_angle = geometry.compute_bearing(self._centre, start)
+
+    def follow(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+        bearing = geometry.compute_bearing(self._centre, event.raw)
+        degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
+        if event.shift:
+            degrees = geometry.SHIFT_ANGLE_DEG * round(degrees / geometry.SHIFT_ANGLE_DEG)
+        elif not event.ctrl:
+            degrees = snap_angle(degrees, self.context.snap_angle)
+        self._turn(degrees)
+
+    def _turn(self, degrees: float) -> None:
+        self.label = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
+        self.change = None
+        if degrees:
+            self.change = transform.rotate(self.context.sketch, self.selection, degrees, self._centre)
+
+    def enter_text(self, text: str) -> None:
+        """Turn by a typed angle."""
+        self._turn(parse_angle(text))
+
+
+class ScaleDrag(Drag):
+    """Scales objects by a handle of their frame; with Shift in proportion, with Alt about its centre."""
+
+    def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
+        super().__init__(context, selection, handle.at)
+        self._side = handle.side
+        self._bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
+        self._grip = compute_side_position(self._bounds, self._side)
+        self._fixed = compute_side_position(self._bounds, (-self._side[0], -self._side[1]))
+        # The handle is outside the box, by the margin of the frame.
+        self._margin = (handle.at[0] - self._grip[0], handle.at[1] - self._grip[1])
+        # A stretched circle would no longer be one.
+        shapes = {type(item.shape) for item in selection.list_items(context.sketch)}
+        self._keeps_proportion = bool(selection.starts) or shapes == {CircleObstacle}
+
+    def follow(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+        pointer = (event.raw[0] - self._margin[0], event.raw[1] - self._margin[1])
+        position = self._snap(event, pointer)
+        centre = geometry.compute_centre(self._bounds) if event.alt else self._fixed
+        factors = [1.0, 1.0]
+        for axis in (0, 1):
+            if self._side[axis] and abs(self._grip[axis] - centre[axis]) > NO_MOVE_M:
+                factors[axis] = (position[axis] - centre[axis]) / (self._grip[axis] - centre[axis])
+        if event.shift or self._keeps_proportion:
+            factor = max(factors, key=lambda factor: abs(factor - 1.0))
+            factors = [factor, factor]
+        self._scale(factors[0], factors[1], centre)
+
+    def _scale(self, factor_x: float, factor_y: float, centre: Point) -> None:
+        width = self._bounds[2] - self._bounds[0]
+        height = self._bounds[3] - self._bounds[1]
+        factor_x = _limit_factor(factor_x, width)
+        factor_y = _limit_factor(factor_y, height)
+        is_unchanged = max(abs(factor_x - 1.0), abs(factor_y - 1.0)) < _UNIT_TOLERANCE
+        self.change = None
+        if not is_unchanged:
+            self.change = transform.scale(self.context.sketch, self.selection, factor_x, factor_y, centre)
+        percent = f"{100 * factor_x:.0f} %"
+        if abs(factor_x - factor_y) >= _FACTOR_TOLERANCE:
+            percent += f" x {100 * factor_y:.0f} %"
+        new_width = geometry.format_length(abs(width * factor_x))
+        new_height = geometry.format_length(abs(height * factor_y))
+        self.label = f"{new_width} x {new_height}   {percent}"
+
+    def enter_text(self, text: str) -> None:
+        """Scale to a typed width or height."""
+        axis = 0 if self._side[0] else 1
+        length = self._bounds[2 + axis] - self._bounds[axis]
+        factor = parse_length(text, now=length) / length
+        require(factor > 0.0, f"“{text}”: expected a size above 0")
+        factors = [1.0, 1.0]
+        factors[axis] = factor
+        if self._keeps_proportion or (self._side[0] and self._side[1]):
+            factors = [factor, factor]
+        self._scale(factors[0], factors[1], self._fixed)
+
+
+def _limit_factor(factor: float, length: float) -> float:
+    """Return a factor that does not shrink a length, m, below the minimum."""
+    min_factor = MIN_SIZE_M / max(length, MIN_SIZE_M)
+    return factor if abs(factor) >= min_factor else min_factor
+
+
+class BoxDrag(Drag):
+    """Selects what lies in a box; drawn to the left, also what the box touches."""
+
+    def __init__(self, context: Workspace, start: Point, *, adds: bool) -> None:
+        super().__init__(context, Selection(), start)
+        self._adds = adds
+        self._previous = context.selection if adds else Selection()
+
+    @property
+    def _selects_touched(self) -> bool:
+        return self._end[0] < self._start[0]
+
+    def follow(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+        self._end = event.raw
+
+    def find_selection(self) -> Selection:
+        """Return what is in the box: objects, or vertices if it contains some of those shown."""
+        sketch = self.context.sketch
+        owners = self.context.vertex_owners
+        inside = find_in_box(sketch, self._start, self._end, touched=self._selects_touched)
+        inside = inside.with_groups(sketch)
+        has_other_objects = bool((inside.items | inside.starts) - set(owners))
+        if owners and not self._adds and not has_other_objects:
+            selected = find_vertices_in_box(sketch, self._start, self._end, owners)
+            shown = sum(len(list_vertices(sketch, owner)) for owner in owners)
+            if 0 < len(selected.vertices) < shown:
+                return selected
+        return inside
+
+    def end(self) -> None:
+        """Select what is in the box."""
+        if self._start != self._end:
+            self.context.select(self._previous.union(self.find_selection()))
+
+    def build_draw_state(self) -> DrawState:
+        """Return the box."""
+        box = (self._start, self._end)
+        return DrawState(box=box, box_selects_touched=self._selects_touched, shows_handles=True)

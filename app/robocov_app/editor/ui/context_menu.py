@@ -1,0 +1,97 @@
+"""The commands of the context menu, by what is selected."""
+
+from robocov.environment import PolygonObstacle, WallObstacle
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.model.sketch import BOUNDARY
+from robocov_app.editor.ui.actions import select_owners
+
+DRAW_COMMANDS = (
+    "tool:polygon",
+    "tool:rectangle",
+    "tool:circle",
+    "tool:wall",
+    "tool:boundary",
+    "tool:disc",
+)
+
+
+def list_menu_commands(editor: Editor) -> list[str]:
+    """Return the names of the commands that apply to the selection, with empty ones between groups."""
+    if editor.selection.vertices:
+        groups = _list_vertex_groups(editor)
+    else:
+        groups = _list_object_groups(editor)
+    names: list[str] = []
+    for group in groups:
+        if group and names:
+            names.append("")
+        names += group
+    return names
+
+
+def _list_object_groups(editor: Editor) -> list[list[str]]:
+    selection = editor.selection
+    if not selection:
+        return [["paste", "select:all"], [*DRAW_COMMANDS], ["fit", "background", "try"]]
+    if selection.items & editor.sketch.index_by_key.keys():
+        return _list_obstacle_groups(editor)
+    if selection.starts:
+        return [["copy", "duplicate", "delete"], ["name", "show:robots", "fit:selection"]]
+    return [["fit", "simplify", "straighten", "repair"], ["tool:boundary"]]
+
+
+def _list_obstacle_groups(editor: Editor) -> list[list[str]]:
+    selection = editor.selection
+    count = len(selection.items & editor.sketch.index_by_key.keys())
+    groups = [["cut", "copy", "duplicate", "delete"]]
+    if len(selection.owners) == 1 and not selection.boundary:
+        groups.append(["name", "fit:selection"])
+    groups.append(["rotate:left", "rotate:right", "mirror:x", "mirror:y"])
+    if count > 1:
+        groups.append(["unite", "subtract", "intersect", "divide"])
+        distribute = ["distribute:x", "distribute:y"] if count > 2 else []
+        groups.append(["align:left", "align:bottom", *distribute])
+        groups.append(["group", "lock", "hide"])
+    else:
+        groups.append(["lock", "hide"])
+    groups.append(_list_shape_commands(editor))
+    return groups
+
+
+def _list_shape_commands(editor: Editor) -> list[str]:
+    """Return commands that apply to the kinds of the selected obstacles."""
+    selection = editor.selection
+    index_by_key = editor.sketch.index_by_key
+    shapes = [editor.sketch.get_item(key).shape for key in selection.items if key in index_by_key]
+    walls = sum(isinstance(shape, WallObstacle) for shape in shapes)
+    polygons = sum(isinstance(shape, PolygonObstacle) for shape in shapes)
+    names: list[str] = []
+    if len(shapes) > 1 and walls == len(shapes):
+        names.append("join")
+    if polygons < len(shapes):
+        names.append("polygons")
+    if polygons or selection.boundary:
+        names += ["simplify", "straighten"]
+    if len(selection.owners) == 1 and len(shapes) == polygons == 1:
+        names.append("boundary:of")
+    if any(problem.owner in selection.owners and problem.is_error for problem in editor.problems):
+        names.append("repair")
+    return names
+
+
+def _list_vertex_groups(editor: Editor) -> list[list[str]]:
+    selection = editor.selection
+    edit = ["delete", "bevel", "round"]
+    align = ["align:left", "align:bottom"]
+    if len(selection.vertices) == 1:
+        align = []
+        (vertex,) = selection.vertices
+        shape = editor.sketch.find_object(vertex.owner)
+        if isinstance(shape, WallObstacle):
+            is_end = vertex.index in (0, len(shape.points) - 1)
+            edit.append("extend" if is_end else "split")
+        if vertex.ring:
+            edit.append("fill")
+    can_copy = BOUNDARY not in select_owners(selection).owners
+    copy = ["copy", "duplicate"] if can_copy else []
+    return [edit, align, ["straighten", "simplify"], copy]

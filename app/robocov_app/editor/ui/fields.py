@@ -1,0 +1,222 @@
+"""Fields of the panel: what each shows, and how it takes what was typed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+from robocov.environment import CircleObstacle, DiscStart
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.edits import properties, transform
+from robocov_app.editor.model import require
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.coordinates import parse_angle, parse_length, parse_point
+from robocov_app.editor.model.selection import find_position
+from robocov_app.editor.settings import SETTING_ATTRIBUTES
+from robocov_app.editor.ui import actions
+from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, run_typed_command
+
+DECIMALS = 4  # of numbers in fields: a tenth of a millimetre
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of the panel.
+
+    Attributes
+    ----------
+    read : callable
+        Returns the text for an editor; raises MapError or LookupError if there is no value.
+    write : callable
+        Gets the editor and what was typed; raises MapError if that means nothing.
+    tip : str
+        Tool tip.
+    """
+
+    read: Callable[[Editor], str]
+    write: Callable[[Editor, str], object]
+    tip: str
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Position of the selection, m, and size of its bounding box, m."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+def format_number(value: float | None) -> str:
+    """Format a number for a field, without needless zeros; None as an empty text."""
+    return "" if value is None else f"{round(value, DECIMALS) + 0.0:.12g}"
+
+
+def _compute_frame(editor: Editor) -> _Frame:
+    """Return the position of a vertex, of a centre, or of the box's lower left corner, and the size."""
+    sketch, selection = editor.displayed
+    bounds = transform.compute_bounds(sketch, actions.select_owners(selection))
+    x, y, high_x, high_y = require(bounds, "nothing is selected")
+    width = high_x - x
+    height = high_y - y
+    if len(selection.vertices) == 1:
+        (vertex,) = selection.vertices
+        x, y = find_position(sketch, vertex)
+    elif not selection.vertices and len(selection.owners) == 1:
+        (owner,) = selection.owners
+        shape = sketch.find_object(owner)
+        if isinstance(shape, CircleObstacle | DiscStart):
+            x, y = shape.center
+    return _Frame(x, y, width, height)
+
+
+def _read_x(editor: Editor) -> str:
+    return format_number(_compute_frame(editor).x)
+
+
+def _read_y(editor: Editor) -> str:
+    return format_number(_compute_frame(editor).y)
+
+
+def _read_width(editor: Editor) -> str:
+    return format_number(_compute_frame(editor).width)
+
+
+def _read_height(editor: Editor) -> str:
+    return format_number(_compute_frame(editor).height)
+
+
+def _write_x(editor: Editor, text: str) -> None:
+    step = _parse_step(text, _compute_frame(editor).x)
+    editor.apply(actions.move(editor, step, 0.0, editor.selection))
+
+
+def _write_y(editor: Editor, text: str) -> None:
+    step = _parse_step(text, _compute_frame(editor).y)
+    editor.apply(actions.move(editor, 0.0, step, editor.selection))
+
+
+def _parse_step(text: str, present: float) -> float:
+    """Return the distance from the present coordinate to a typed one, or a typed step as ``+0.5``, m."""
+    text = text.strip()
+    if text.startswith(("+", "@")):
+        return parse_length(text.lstrip("+@"))
+    # Parsed as a point, so that signs and units mean the same as everywhere else.
+    x, _ = parse_point(f"{text} 0", last=(present, 0.0))
+    return x - present
+
+
+def _write_width(editor: Editor, text: str) -> None:
+    frame = _compute_frame(editor)
+    _resize(editor, parse_length(text, now=frame.width), frame.height)
+
+
+def _write_height(editor: Editor, text: str) -> None:
+    frame = _compute_frame(editor)
+    _resize(editor, frame.width, parse_length(text, now=frame.height))
+
+
+def _resize(editor: Editor, width: float, height: float) -> None:
+    """Resize the selection; a size of 0 m stays as it is."""
+    selection = actions.select_owners(editor.selection)
+    editor.apply(transform.resize(editor.sketch, selection, width or None, height or None))
+
+
+def _read_name(editor: Editor) -> str:
+    (owner,) = actions.select_owners(editor.selection).owners
+    if isinstance(owner, str):
+        return owner
+    return editor.sketch.get_item(owner).shape.name or ""
+
+
+def _read_note(editor: Editor) -> str:
+    notes = {editor.sketch.get_item(key).note for key in editor.selection.items}
+    return notes.pop() if len(notes) == 1 else ""
+
+
+def _read_title(editor: Editor) -> str:
+    return editor.sketch.name
+
+
+def _write_title(editor: Editor, text: str) -> None:
+    editor.apply(properties.set_title(editor.sketch, text.strip()))
+
+
+def _read_description(editor: Editor) -> str:
+    return editor.sketch.description
+
+
+def _write_description(editor: Editor, text: str) -> None:
+    editor.apply(properties.set_description(editor.sketch, text.strip()))
+
+
+def _require_picture(editor: Editor) -> Background:
+    return require(editor.sketch.background, "there is no picture under the map: Ctrl B takes one")
+
+
+def _read_picture_scale(editor: Editor) -> str:
+    return f"{_require_picture(editor).scale:.6g}"
+
+
+def _write_picture_scale(editor: Editor, text: str) -> None:
+    picture = _require_picture(editor)
+    scale = parse_length(text, now=picture.scale)
+    require(scale > 0.0, "a pixel must be larger than 0 m")
+    editor.apply(properties.set_background(editor.sketch, replace(picture, scale=scale)))
+
+
+def _read_picture_turn(editor: Editor) -> str:
+    return format_number(_require_picture(editor).turn)
+
+
+def _write_picture_turn(editor: Editor, text: str) -> None:
+    degrees = parse_angle(text)
+    picture = replace(_require_picture(editor), turn=degrees)
+    editor.apply(properties.set_background(editor.sketch, picture))
+
+
+def set_picture_opacity(editor: Editor, opacity: float) -> None:
+    """Set the opacity of the picture under the map, from 0 to 1."""
+    picture = replace(_require_picture(editor), opacity=opacity)
+    editor.apply(properties.set_background(editor.sketch, picture), drag="opacity")
+
+
+def _build_setting_field(word: str, tip: str) -> Field:
+    """Return a field for a setting that has a typed command."""
+
+    def read(editor: Editor) -> str:
+        return format_number(getattr(editor, SETTING_ATTRIBUTES[word]))
+
+    return Field(read, partial(run_typed_command, word=word), tip)
+
+
+def _build_length_field(attribute: str, word: str, tip: str) -> Field:
+    """Return a field for a length that the selected objects have in common."""
+
+    def read(editor: Editor) -> str:
+        return format_number(actions.find_common_length(editor, attribute))
+
+    return Field(read, TYPED_COMMANDS[word].action, tip)
+
+
+FIELDS: dict[str, Field] = {
+    "title": Field(_read_title, _write_title, "The map's name, for people"),
+    "description": Field(_read_description, _write_description, "A sentence about the map"),
+    "radius": _build_setting_field("radius", "Radius of a robot: what is too narrow for it is hatched"),
+    "robots": _build_setting_field(
+        "robots", "Robots of the team that is shown at a start, and tried with F5"
+    ),
+    "grid": _build_setting_field("grid", "Distance of the grid's lines; arrows move by it"),
+    "angle": _build_setting_field("angle", "Lines snap to multiples of this"),
+    "name": Field(_read_name, actions.rename, "What people call it"),
+    "note": Field(_read_note, TYPED_COMMANDS["note"].action, "Whatever is worth remembering of it"),
+    "x": Field(_read_x, _write_x, "From the left; +0.5 moves by half a metre"),
+    "y": Field(_read_y, _write_y, "From below; +0.5 moves by half a metre"),
+    "wide": Field(_read_width, _write_width, "Also *2, 50% or +0.3"),
+    "high": Field(_read_height, _write_height, "Also *2, 50% or +0.3"),
+    "width": _build_length_field("width", "width", "How thick the wall is"),
+    "size:radius": _build_length_field("radius", "circle", "Its radius"),
+    "picture:scale": Field(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
+    "picture:turn": Field(_read_picture_turn, _write_picture_turn, "Counter-clockwise"),
+}
+"""The fields of the panel by their names."""

@@ -1,0 +1,213 @@
+"""The two maps in the import dialog: as read, and as imported."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+import shapely
+from pygame import Rect, Surface
+
+from robocov.environment import Point
+from robocov_app.editor.ui.import_sheet import ColourSheet
+from robocov_app.editor.ui.importing import Imported
+from robocov_app.formats.geometry.comparison import ImportComparison
+from robocov_app.formats.reports import format_area
+from robocov_app.render import layout
+from robocov_app.render.camera import Camera
+from robocov_app.render.fonts import label, shortened, text_width
+from robocov_app.render.surface_cache import Latest
+from robocov_app.render.theme import Colour, Theme
+from robocov_app.toolkit.ui import SMALL
+
+# Lengths in pixels at scale 1.
+CAPTION_HEIGHT_PX = 40  # above each map
+MAPS_GAP_PX = 20
+MAP_MARGIN_PX = 2
+MIN_GAP_LENGTH_PX = 20  # shorter gaps are circled
+MARK_ARM_PX = 7
+MARK_OPACITY = 150
+VEIL_OPACITY = 140
+_CLEAR = (0, 0, 0, 0)
+
+
+class _Caption(NamedTuple):
+    """Caption of a map: title, facts, and the label of the marked areas."""
+
+    title: str
+    facts: str
+    mark: str
+    mark_colour: Colour
+
+
+class ImportPreview:
+    """Draws the map before and after the import.
+
+    Attributes
+    ----------
+    cameras : list of Camera
+        Views of the map as read and as imported.
+    """
+
+    def __init__(self) -> None:
+        self.cameras: list[Camera] = []
+        self._width = 0  # for a caption, px
+        self._picture: Latest[Surface] = Latest()
+
+    def arrange(self, box: Rect, imported: Imported, scale: float) -> float:
+        """Place the two maps at the top of a box, next to or below each other.
+
+        Parameters
+        ----------
+        box : Rect
+            Free space, px.
+        imported : Imported
+            The maps.
+        scale : float
+            Scale of the window.
+
+        Returns
+        -------
+        float
+            Height that they take, px.
+        """
+        low_x, low_y, high_x, high_y = imported.comparison.bounds
+        aspect = (high_x - low_x) / (high_y - low_y)
+        caption_height = round(CAPTION_HEIGHT_PX * scale)
+        gap = round(MAPS_GAP_PX * scale)
+        columns = layout.columns_for(2, aspect, box.size, caption_height)
+        width = (box.width - (columns - 1) * gap) // columns
+        free_height = box.height if columns == 2 else (box.height - gap) // 2
+        height = min(free_height - caption_height, round(width / aspect))
+        second_top = box.top
+        if columns == 1:
+            second_top += caption_height + height + gap
+        corners = [box.topleft, (box.right - width, second_top)]
+        map_width = float(min(width, round(height * aspect)))
+        self.cameras = []
+        for x, y in corners:
+            view = (float(x), float(y + caption_height), map_width, float(height))
+            self.cameras.append(Camera.fit(imported.comparison.bounds, view, MAP_MARGIN_PX * scale))
+        self._width = width
+        return second_top + caption_height + height - box.top
+
+    def draw(
+        self, screen: Surface, imported: Imported, scale: float, theme: Theme, sheet: ColourSheet | None
+    ) -> None:
+        """Draw both maps with their captions; with a sheet, the first one in its own colours."""
+        look = (*(camera.view for camera in self.cameras), scale, theme, sheet is not None)
+
+        def draw_maps() -> Surface:
+            picture = _draw_comparison(screen.get_size(), imported.comparison, self.cameras, scale, theme)
+            if sheet is not None:
+                sheet.draw(picture, self.cameras[0])
+            return picture
+
+        screen.blit(self._picture.of(imported, look, draw_maps), (0, 0))
+        captions = _list_captions(imported, theme, has_own_colours=sheet is not None)
+        for camera, caption in zip(self.cameras, captions, strict=True):
+            self._draw_caption(screen, camera, caption, scale, theme)
+
+    def _draw_caption(
+        self, screen: Surface, camera: Camera, caption: _Caption, scale: float, theme: Theme
+    ) -> None:
+        title_size = round(13 * scale)
+        text_size = round(SMALL * scale)
+        x = round(camera.view[0])
+        y = round(camera.view[1] - CAPTION_HEIGHT_PX * scale)
+        screen.blit(label(caption.title, title_size, theme.ink, True), (x, y))
+        if caption.mark:
+            left = x + text_width(caption.title, title_size, True) + round(10 * scale)
+            square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
+            pygame.draw.rect(screen, caption.mark_colour, square)
+            mark = label(caption.mark, text_size, theme.ink)
+            screen.blit(mark, (left + round(14 * scale), y + round(2 * scale)))
+        facts = shortened(caption.facts, text_size, self._width)
+        screen.blit(label(facts, text_size, theme.faint), (x, y + round(20 * scale)))
+
+    def mark(self, screen: Surface, position: Point, scale: float, theme: Theme) -> None:
+        """Draw a cross at a position, m, of both maps."""
+        for camera in self.cameras:
+            x, y = camera.to_pixels(np.array(position)).tolist()
+            for line_width, colour in ((5, theme.background), (2, theme.final)):
+                arm = MARK_ARM_PX * scale + line_width / 2
+                width = round(line_width * scale)
+                pygame.draw.line(screen, colour, (x - arm, y), (x + arm, y), width)
+                pygame.draw.line(screen, colour, (x, y - arm), (x, y + arm), width)
+
+    def veil(self, screen: Surface, theme: Theme) -> None:
+        """Draw a veil over both maps, which are outdated."""
+        for camera in self.cameras:
+            left, top, width, height = camera.view
+            veil = Surface((width, height), pygame.SRCALPHA)
+            veil.fill((*theme.panel, VEIL_OPACITY))
+            screen.blit(veil, (left, top))
+
+
+def _list_captions(imported: Imported, theme: Theme, *, has_own_colours: bool) -> list[_Caption]:
+    comparison = imported.comparison
+    report = imported.report
+    lost = "" if comparison.lost.is_empty else f"{format_area(comparison.lost.area, 3)} left out"
+    opened = "" if comparison.opened.is_empty else f"{format_area(comparison.opened.area, 3)} opened"
+    facts_before = f"{report.vertices_read} vertices, {format_area(comparison.before.area)} free"
+    facts_after = f"{report.vertices_kept} vertices, {format_area(comparison.after.area)} free"
+    if comparison.gap is not None:
+        facts_after += f", narrowest passage {comparison.gap.width:.3g} m"
+    if has_own_colours:
+        before = _Caption("in its colours", facts_before, "", theme.trajectory)
+    else:
+        before = _Caption("as read", facts_before, lost, theme.trajectory)
+    return [before, _Caption("as imported", facts_after, opened, theme.start)]
+
+
+def _draw_comparison(
+    size: tuple[int, int], comparison: ImportComparison, cameras: list[Camera], scale: float, theme: Theme
+) -> Surface:
+    """Draw the free space before and after on a transparent picture of a size, px, with what has changed."""
+    picture = Surface(size, pygame.SRCALPHA)
+    before, after = cameras
+    _draw_map(picture, before, comparison, comparison.before, theme)
+    _draw_marked_area(picture, before, comparison.lost, theme.trajectory)
+    _draw_map(picture, after, comparison, comparison.after, theme)
+    _draw_marked_area(picture, after, comparison.opened, theme.start)
+    if comparison.gap is not None:
+        ends = after.to_pixels(np.array(comparison.gap.between))
+        width = round(2 * scale)
+        pygame.draw.line(picture, theme.final, ends[0].tolist(), ends[1].tolist(), width)
+        if math.dist(*ends) < MIN_GAP_LENGTH_PX * scale:
+            pygame.draw.circle(picture, theme.final, ends.mean(axis=0).tolist(), 10 * scale, width)
+    return picture
+
+
+def _draw_map(
+    picture: Surface, camera: Camera, comparison: ImportComparison, free: shapely.Geometry, theme: Theme
+) -> None:
+    _fill_polygons(picture, camera, comparison.region, theme.obstacle, theme.obstacle)
+    _fill_polygons(picture, camera, free, theme.background, theme.obstacle)
+    for ring in shapely.get_rings(shapely.get_parts(free)):
+        points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
+        pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
+
+
+def _draw_marked_area(picture: Surface, camera: Camera, area: shapely.Geometry, colour: Colour) -> None:
+    layer = Surface(picture.get_size(), pygame.SRCALPHA)
+    _fill_polygons(layer, camera, area, (*colour, MARK_OPACITY), _CLEAR)
+    picture.blit(layer, (0, 0))
+
+
+def _fill_polygons(
+    surface: Surface, camera: Camera, area: shapely.Geometry, inside: Sequence[int], holes: Sequence[int]
+) -> None:
+    """Fill polygons and their holes, large ones first, because small ones may lie in their holes."""
+    polygons = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]
+    polygons.sort(key=lambda polygon: -shapely.Polygon(polygon.exterior).area)
+    for polygon in polygons:
+        _fill_ring(surface, camera, polygon.exterior, inside)
+        for hole in polygon.interiors:
+            _fill_ring(surface, camera, hole, holes)
+
+
+def _fill_ring(surface: Surface, camera: Camera, ring: shapely.LinearRing, colour: Sequence[int]) -> None:
+    points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
+    pygame.draw.polygon(surface, colour, points)

@@ -1,0 +1,140 @@
+"""Facts about the map that the panel and the status bar show."""
+
+from typing import NamedTuple
+
+from robocov.errors import format_count
+from robocov_app.editor.editor import Editor
+from robocov_app.editor.edits import density
+from robocov_app.editor.model.geometry import format_point
+from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.team import Team
+
+UNKNOWN = "…"
+
+
+class Fact(NamedTuple):
+    """A fact about the map.
+
+    Attributes
+    ----------
+    label : str
+        What it is about.
+    text : str
+        The fact; "…" while the map is being measured.
+    tip : str
+        Tool tip.
+    """
+
+    label: str
+    text: str
+    tip: str
+
+
+def list_map_facts(editor: Editor) -> list[Fact]:
+    """Return the facts on the map page of the panel."""
+    sketch = editor.sketch
+    measurement = editor.measurement
+    return [
+        Fact("Size", _describe_size(sketch), "Width and height of the boundary"),
+        Fact("Free", _describe_free_area(measurement), "Area inside the boundary where robots can be"),
+        Fact(
+            "Parts",
+            _describe_parts(measurement),
+            "Connected parts of the free space, and those that a robot can sweep",
+        ),
+        Fact("Gap", _describe_gap(measurement), "The narrowest passage, against a robot's diameter"),
+        Fact("Holds", _describe_content(sketch, measurement), "Obstacles and their vertices"),
+        Fact(
+            "Density",
+            density.describe_density(sketch.density),
+            "How much each place counts: the tool Density; floor 0.5 and density none are commands",
+        ),
+    ]
+
+
+def _describe_size(sketch: Sketch) -> str:
+    if not sketch.boundary:
+        return "no boundary yet: B draws one"
+    xs, ys = zip(*sketch.boundary, strict=True)
+    return f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
+
+
+def _describe_free_area(measurement: Measurement | None) -> str:
+    return UNKNOWN if measurement is None else f"{measurement.free_area:.2f} m²"
+
+
+def _describe_parts(measurement: Measurement | None) -> str:
+    if measurement is None:
+        return UNKNOWN
+    parts = len(measurement.components)
+    reachable = len(measurement.reached)
+    return f"{parts}" if parts == reachable else f"{parts}; {reachable} for a robot"
+
+
+def _describe_gap(measurement: Measurement | None) -> str:
+    if measurement is None:
+        return UNKNOWN
+    gap = measurement.gap
+    if gap is None:
+        return "none"
+    diameter = 2 * measurement.radius
+    sign = "≥" if gap.width >= diameter else "<"
+    return f"{gap.width:.3f} m {sign} {diameter:.2f} m"
+
+
+def _describe_content(sketch: Sketch, measurement: Measurement | None) -> str:
+    if measurement is None:
+        return UNKNOWN
+    return f"{format_count(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices"
+
+
+def list_status(editor: Editor, frame_rate: float, team: Team | None) -> list[str]:
+    """Return the texts of the status bar.
+
+    Parameters
+    ----------
+    editor : Editor
+        The editor.
+    frame_rate : float
+        Frames per second.
+    team : Team or None
+        The team at a start.
+    """
+    texts: list[str] = []
+    if editor.cursor is not None:
+        texts.append(format_point(editor.cursor))
+    is_selecting = editor.tool is editor.selector
+    item = _find_hovered_item(editor) if is_selecting else None
+    if not is_selecting:
+        texts.append(f"{editor.tool.title}: {editor.tool.hint}")
+    if item is not None and item.note:
+        texts.append(f"{item.shape.name or 'note'}: {item.note}")
+    if is_selecting and editor.selection:
+        texts.append(editor.selection.describe(editor.sketch))
+    if team is not None and "robots" in editor.shown:
+        texts.append(_describe_team(team))
+    if is_selecting and not editor.selection:
+        texts.append(editor.tool.hint)
+    texts.append(_describe_snapping(editor))
+    if editor.measurement_worker.busy:
+        texts.append("measuring …")
+    texts.append(f"{frame_rate:.0f} fps")
+    return texts
+
+
+def _find_hovered_item(editor: Editor) -> Item | None:
+    owner = editor.selector.hovered
+    if isinstance(owner, int) and owner in editor.sketch.index_by_key:
+        return editor.sketch.get_item(owner)
+    return None
+
+
+def _describe_team(team: Team) -> str:
+    return team.message or f"{len(team.positions)} robots at {team.start or 'anywhere'}"
+
+
+def _describe_snapping(editor: Editor) -> str:
+    if not editor.snaps:
+        return "no snapping"
+    return f"grid {editor.grid:g} m" if "grid" in editor.snaps else "grid off"

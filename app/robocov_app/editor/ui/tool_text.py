@@ -1,0 +1,52 @@
+"""Values that are typed for a tool while something is drawn."""
+
+import pygame
+
+from robocov_app.editor.editor import Editor
+from robocov_app.toolkit.input import key_of
+
+MAX_TYPED_CHARACTERS = 40
+_VALUE_CHARACTERS = frozenset("0123456789.,-+@<*/%°×x; ")
+_UNIT_CHARACTERS = frozenset("mcm'\"rad")  # only after the first character
+_NEVER_FIRST = frozenset("x×*/ ;%")
+_NEVER_FIRST_WHEN_IDLE = frozenset("x×*/ ;%,-+@<°")
+_COMMAND_MODIFIERS = pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
+
+
+def type_for_tool(editor: Editor, event: pygame.event.Event) -> bool:
+    """Handle a key as part of a value for the tool; return whether it was."""
+    if not _accepts_text(editor) or event.mod & _COMMAND_MODIFIERS:
+        return False
+    text = editor.typed
+    key = key_of(event)
+    if text and key in ("return", "enter"):
+        editor.typed = ""
+        editor.attempt(lambda: editor.tool.enter_text(editor, text))
+        return True
+    if text and key == "backspace":
+        editor.typed = text[:-1]
+        return True
+    if text and key == "tab":
+        editor.typed = f"{text} "
+        return True
+    if _continues_value(editor, event.unicode):
+        editor.typed = (text + event.unicode)[:MAX_TYPED_CHARACTERS]
+        return True
+    return False
+
+
+def _accepts_text(editor: Editor) -> bool:
+    tool = editor.tool
+    if not tool.accepts_text:
+        return False
+    return tool.is_busy or tool.starts_with_text or bool(editor.typed)
+
+
+def _continues_value(editor: Editor, character: str) -> bool:
+    """Return whether a character can follow what is typed."""
+    if len(character) != 1:
+        return False
+    if editor.typed:
+        return character in _VALUE_CHARACTERS or character in _UNIT_CHARACTERS
+    never_first = _NEVER_FIRST if editor.tool.is_busy else _NEVER_FIRST_WHEN_IDLE
+    return character in _VALUE_CHARACTERS and character not in never_first
