@@ -14,11 +14,11 @@ import pytest
 import robocov as rc
 from robocov.controllers import CONTROLLERS
 from robocov_app.cli import COMMANDS, main
-from robocov_app.commands.handbook import sources
+from robocov_app.commands.handbook import find_page_sources
 
 ROOT = Path(__file__).parents[1]
 ROOTS = ROOT / "app/robocov_app", ROOT / "coverage/robocov"
-PAGES = {page.name: page.read_text() for page in sources().glob("*.md")}
+PAGES = {page.name: page.read_text() for page in find_page_sources().glob("*.md")}
 WITH_SPHINX = all(find_spec(name) for name in ("sphinx", "furo", "myst_parser"))
 
 

@@ -16,11 +16,11 @@ from swept import InProcess
 from robocov.errors import InputError
 from robocov_app.benchmark import suite
 from robocov_app.cli import COMMANDS, main
-from robocov_app.commands.handbook import sources
+from robocov_app.commands.handbook import find_page_sources
 from robocov_app.terminal.arguments import parse_options
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", ROOT / ".readme/package.md", *sorted(sources().glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / ".readme/package.md", *sorted(find_page_sources().glob("*.md"))]
 
 _SHOWN = {"demo", "edit", "handbook"}  # they open windows: their words are parsed
 _SHORTER = {
@@ -67,7 +67,7 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) 
         (folder / "study.toml").write_text('maps = ["square"]\ncontrollers = ["rapf"]\nduration = 0.5\n')
         assert main(["sweep", "study.toml", "--out", "study"]) == 0
     if page.stem == "benchmark":
-        mine = (sources() / "own-controller.md").read_text()
+        mine = (find_page_sources() / "own-controller.md").read_text()
         (folder / "mine.py").write_text(next(re.finditer(r"```python\n(# mine.py.*?)```", mine, re.S))[1])
     if page.stem == "maps":
         (folder / "museum.zip").write_bytes(imdf_zip(IMDF))

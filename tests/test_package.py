@@ -41,18 +41,19 @@ def test_the_description_names_the_extras_and_links_to_nothing() -> None:
     assert not re.findall(r"\]\(|<\w+", TEXT), "pictures and pages of the repository are not on an index"
 
 
-def test_a_handbook_that_was_brought_is_taken(
+def test_a_bundled_handbook_is_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    brought, opened = tmp_path / "pages", list[str]()
-    brought.mkdir()
-    (brought / "index.html").write_text("the pages")
-    monkeypatch.setattr(handbook, "_BROUGHT", brought)
+    bundled = tmp_path / "pages"
+    opened: list[str] = []
+    bundled.mkdir()
+    (bundled / "index.html").write_text("the pages")
+    monkeypatch.setattr(handbook, "_BUNDLED_PAGES", bundled)
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)  # no Sphinx
     assert main(["handbook"]) == 0
-    assert capsys.readouterr().out == f"{brought / 'index.html'}\n"
-    assert opened == [(brought / "index.html").as_uri()]
+    assert capsys.readouterr().out == f"{bundled / 'index.html'}\n"
+    assert opened == [(bundled / "index.html").as_uri()]
     assert main(["handbook", "--out", str(tmp_path / "site")]) == 0
     assert (tmp_path / "site/index.html").read_text() == "the pages"
 

@@ -1,8 +1,9 @@
 """`robocov completion`."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, dataclass, fields
 from importlib import import_module
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import tyro
 
@@ -12,7 +13,7 @@ from robocov_app.commands import COMMANDS
 from robocov_app.terminal.arguments import list_option_groups
 from robocov_app.terminal.output import echo
 
-_BASH = """\
+_BASH_TEMPLATE = """\
 _robocov() {{
     local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} names=""
     COMPREPLY=()
@@ -24,7 +25,7 @@ _robocov() {{
 {options}
             esac ;;
             *) case "${{COMP_WORDS[1]}}" in
-                {mapped}) names="{maps}" ;;
+                {map_commands}) names="{maps}" ;;
 {words}
             esac ;;
         esac ;;
@@ -33,15 +34,20 @@ _robocov() {{
 }}
 complete -o bashdefault -o default -F _robocov robocov
 """
-_ZSH = "#compdef robocov\nautoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
+_ZSH_PROLOGUE = (
+    "#compdef robocov\nautoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
+)
+_CONTROLLER_OPTIONS = ("--controller", "--controllers")
+_MAP_ARGUMENTS = {"map", "files"}
+"""Names of positional arguments that take maps."""
 
 
 @dataclass
 class Arguments:
-    """Print a script by which the shell completes commands, options, controllers and maps.
+    """Print a shell script that completes commands, options, controllers and maps.
 
-    Put the line into the start-up file of your shell: eval "$(robocov completion bash)" into ~/.bashrc,
-    eval "$(robocov completion zsh)" into ~/.zshrc, robocov completion fish | source into config.fish.
+    Add a line to the startup file of your shell: eval "$(robocov completion bash)" to ~/.bashrc,
+    eval "$(robocov completion zsh)" to ~/.zshrc, robocov completion fish | source to config.fish.
 
     Example: robocov completion bash
     """
@@ -50,50 +56,118 @@ class Arguments:
     """bash, zsh or fish."""
 
 
+class _Completions(NamedTuple):
+    """Words that the shell completes after a command.
+
+    Attributes
+    ----------
+    options : list of str
+        Names of options, as ``--robots``.
+    words : list of str
+        Choices of positional arguments.
+    takes_maps : bool
+        Whether a positional argument is a map.
+    """
+
+    options: list[str]
+    words: list[str]
+    takes_maps: bool
+
+
 def command(options: Arguments) -> None:
-    flags, words, mapped = {}, {}, []
-    for name, (module, _, _) in COMMANDS.items():
-        own, words[name], positionals = _described(import_module(f"robocov_app.commands.{module}").Arguments)
-        flags[name] = ["--help", *own]
-        mapped += [name] * bool({"map", "files"} & positionals)
-    maps, controllers = " ".join(list_bundled_maps()), " ".join(CONTROLLERS)
+    """Run `robocov completion`."""
+    completions = {}
+    for name, subcommand in COMMANDS.items():
+        module = import_module(f"robocov_app.commands.{subcommand.module}")
+        completions[name] = _collect_completions(module.Arguments)
     if options.shell == "fish":
-        echo("complete -c robocov -n __fish_use_subcommand -f")
-        for name, (_, line, _) in COMMANDS.items():
-            told = line.replace("'", "\\'")
-            echo(f"complete -c robocov -n __fish_use_subcommand -f -a {name} -d '{told}'")
-            seen = f"complete -c robocov -n '__fish_seen_subcommand_from {name}'"
-            for flag in flags[name]:
-                more = f" -x -a '{controllers}'" if flag in ("--controller", "--controllers") else ""
-                echo(f"{seen} -l {flag[2:]}{more}")
-            if offered := maps if name in mapped else " ".join(words[name]):
-                echo(f"{seen} -a '{offered}'")
+        for line in _write_fish_script(completions):
+            echo(line)
         return
-    cases = [
-        "\n".join(f'                {name}) names="{" ".join(own)}" ;;' for name, own in some.items() if own)
-        for some in (flags, words)
-    ]
-    names: dict[str, str] = {"commands": " ".join(COMMANDS), "controllers": controllers, "maps": maps}
-    script = _BASH.format(**names, mapped="|".join(mapped), options=cases[0], words=cases[1])
-    echo(_ZSH * (options.shell == "zsh") + script, end="")
+    script = _write_bash_script(completions)
+    if options.shell == "zsh":
+        script = _ZSH_PROLOGUE + script
+    echo(script, end="")
 
 
-def _described(kind: Any) -> tuple[list[str], list[str], set[str]]:
-    """Return a command's options, its groups' too, and words and names of its positional arguments."""
-    hints, plain, groups = (
-        get_type_hints(kind, include_extras=True),
-        get_type_hints(kind),
-        list_option_groups(kind),
-    )
-    flags, positionals = [], set()
+def _collect_completions(kind: type) -> _Completions:
+    """Collect the completions of a command from the dataclass of its options."""
+    positionals = [field for field in fields(kind) if _is_positional(kind, field)]
+    choices = get_type_hints(kind)
     words: list[str] = []
-    for each in fields(kind):
-        more = getattr(hints[each.name], "__metadata__", ())
-        if tyro.conf.Positional in more:
-            positionals.add(each.name)
-            words += get_args(plain[each.name]) if get_origin(plain[each.name]) is Literal else ()
-        elif each.default_factory not in groups:
-            name = next((told.name for told in more if getattr(told, "name", None)), each.name)
-            flags.append(f"--{'no-' * (each.default is True)}{name.replace('_', '-')}")
-            flags += each.metadata.get("aliases", ())
-    return flags + [flag for group in groups for flag in _described(group)[0]], words, positionals
+    for field in positionals:
+        if get_origin(choices[field.name]) is Literal:
+            words += get_args(choices[field.name])
+    names = {field.name for field in positionals}
+    return _Completions(["--help", *_list_options(kind)], words, bool(names & _MAP_ARGUMENTS))
+
+
+def _list_options(kind: Any) -> list[str]:
+    """List the options of a dataclass, and those of the groups in it."""
+    groups = list_option_groups(kind)
+    options = []
+    for field in fields(kind):
+        if not _is_positional(kind, field) and field.default_factory not in groups:
+            options.append(_name_option(kind, field))
+            options += field.metadata.get("aliases", ())
+    for group in groups:
+        options += _list_options(group)
+    return options
+
+
+def _is_positional(kind: Any, field: "Field[Any]") -> bool:
+    return tyro.conf.Positional in _get_annotations(kind, field)
+
+
+def _name_option(kind: Any, field: "Field[Any]") -> str:
+    """Return the option of a field; a flag that is on by default is negated."""
+    name = field.name
+    for annotation in _get_annotations(kind, field):
+        name = getattr(annotation, "name", None) or name
+    prefix = "--no-" if field.default is True else "--"
+    return prefix + name.replace("_", "-")
+
+
+def _get_annotations(kind: Any, field: "Field[Any]") -> tuple[Any, ...]:
+    """Return the annotations of a field for tyro."""
+    hints = get_type_hints(kind, include_extras=True)
+    annotations: tuple[Any, ...] = getattr(hints[field.name], "__metadata__", ())
+    return annotations
+
+
+def _write_bash_script(completions: Mapping[str, _Completions]) -> str:
+    """Return the script for bash."""
+    return _BASH_TEMPLATE.format(
+        commands=" ".join(COMMANDS),
+        controllers=" ".join(CONTROLLERS),
+        maps=" ".join(list_bundled_maps()),
+        map_commands="|".join(name for name, completion in completions.items() if completion.takes_maps),
+        options=_write_cases({name: completion.options for name, completion in completions.items()}),
+        words=_write_cases({name: completion.words for name, completion in completions.items()}),
+    )
+
+
+def _write_cases(words_by_command: Mapping[str, list[str]]) -> str:
+    """Return cases of bash that set the names to complete after each command."""
+    cases = []
+    for name, words in words_by_command.items():
+        if words:
+            cases.append(f'                {name}) names="{" ".join(words)}" ;;')
+    return "\n".join(cases)
+
+
+def _write_fish_script(completions: Mapping[str, _Completions]) -> Iterator[str]:
+    """Yield the lines of the script for fish."""
+    controllers = " ".join(CONTROLLERS)
+    maps = " ".join(list_bundled_maps())
+    yield "complete -c robocov -n __fish_use_subcommand -f"
+    for name, completion in completions.items():
+        summary = COMMANDS[name].summary.replace("'", "\\'")
+        yield f"complete -c robocov -n __fish_use_subcommand -f -a {name} -d '{summary}'"
+        prefix = f"complete -c robocov -n '__fish_seen_subcommand_from {name}'"
+        for option in completion.options:
+            suffix = f" -x -a '{controllers}'" if option in _CONTROLLER_OPTIONS else ""
+            yield f"{prefix} -l {option[2:]}{suffix}"
+        words = maps if completion.takes_maps else " ".join(completion.words)
+        if words:
+            yield f"{prefix} -a '{words}'"

@@ -1,8 +1,10 @@
 """`robocov controllers`."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -12,10 +14,14 @@ from robocov.text import escape_controls
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import create_console, print_answer
 
+_HINT = (
+    "A controller of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
+)
+
 
 @dataclass
 class Arguments(JsonOption):
-    """List the controllers: one line each, and their gains with units, defaults and ranges.
+    """List the controllers, with units, defaults and ranges of their gains.
 
     In JSON the recommended controller has "flagship": true.
 
@@ -24,36 +30,59 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    out, rows = create_console(), []
-    for name, kind in list_controller_classes().items():
-        label, summary = str(getattr(kind, "label", name)), str(getattr(kind, "summary", ""))
-        information, gains = get_information(kind), get_gains(kind).values()
-        row = {"name": name, "label": label, "summary": summary, "flagship": name == RECOMMENDED_CONTROLLER}
-        rows.append(row | {"information": information, "gains": list(map(_told, gains))})
-        if options.json:
-            continue
-        mark = "   (recommended)" * (name == RECOMMENDED_CONTROLLER)
-        mark += f"   (informed: {information})" * (information != "own")
-        out.print(Text.assemble((escape_controls(name), "bold"), escape_controls(f"   {label}{mark}")))
-        out.print(Text(escape_controls(f"  {summary}")))
-        table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
-        for gain in gains:
-            default = format_value(gain.default, none="null")
-            if isinstance(gain, Option):
-                span = " | ".join(gain.choices)
-            else:
-                span = f"{gain.low:g} to {gain.high:g}{', or null' if gain.optional else ''}"
-            cells = ("   ", gain.name, f"{default} {gain.unit}", span, gain.meaning)
-            table.add_row(*map(escape_controls, cells))
-        out.print(table)
-    own = "A law of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
-    print_answer(options, {"controllers": rows}, own, indent=1)
+    """Run `robocov controllers`."""
+    console = create_console()
+    rows = []
+    for name, controller_class in list_controller_classes().items():
+        gains = get_gains(controller_class).values()
+        row = {
+            "name": name,
+            "label": str(getattr(controller_class, "label", name)),
+            "summary": str(getattr(controller_class, "summary", "")),
+            "flagship": name == RECOMMENDED_CONTROLLER,
+            "information": get_information(controller_class),
+            "gains": [_build_gain_row(gain) for gain in gains],
+        }
+        rows.append(row)
+        if not options.json:
+            _print_controller(console, row, gains)
+    print_answer(options, {"controllers": rows}, _HINT, indent=1)
 
 
-def _told(gain: Gain | Option) -> dict[str, Any]:
-    told: dict[str, Any] = {"name": gain.name, "default": gain.default, "unit": gain.unit}
+def _print_controller(console: Console, row: dict[str, Any], gains: Iterable[Gain | Option]) -> None:
+    """Print a controller with the table of its gains."""
+    notes = ""
+    if row["flagship"]:
+        notes += "   (recommended)"
+    if row["information"] != "own":
+        notes += f"   (informed: {row['information']})"
+    name = (escape_controls(row["name"]), "bold")
+    console.print(Text.assemble(name, escape_controls(f"   {row['label']}{notes}")))
+    console.print(Text(escape_controls(f"  {row['summary']}")))
+    table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
+    for gain in gains:
+        default = format_value(gain.default, none="null")
+        cells = ("   ", gain.name, f"{default} {gain.unit}", _format_range(gain), gain.meaning)
+        table.add_row(*map(escape_controls, cells))
+    console.print(table)
+
+
+def _format_range(gain: Gain | Option) -> str:
+    """Return the values that a gain may have, as text."""
     if isinstance(gain, Option):
-        told["words"] = list(gain.choices)
+        return " | ".join(gain.choices)
+    suffix = ", or null" if gain.optional else ""
+    return f"{gain.low:g} to {gain.high:g}{suffix}"
+
+
+def _build_gain_row(gain: Gain | Option) -> dict[str, Any]:
+    """Build the answer for programs about a gain."""
+    row: dict[str, Any] = {"name": gain.name, "default": gain.default, "unit": gain.unit}
+    if isinstance(gain, Option):
+        row["words"] = list(gain.choices)
     else:
-        told |= {"low": gain.low, "high": gain.high, "nullable": gain.optional}
-    return {**told, "meaning": gain.meaning}
+        row["low"] = gain.low
+        row["high"] = gain.high
+        row["nullable"] = gain.optional
+    row["meaning"] = gain.meaning
+    return row

@@ -9,6 +9,8 @@ import numpy as np
 import tyro
 
 from robocov.arrays import Array
+from robocov.cost import CoverageCost, CoverageResult
+from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
 from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import load_map
@@ -17,24 +19,27 @@ from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_distance_figure
 from robocov_app.terminal.output import print_answer
 
+_MAX_COORDINATE_M = 1e300
+"""Coordinates are smaller than this, so that their squares and differences can be checked."""
+
 
 @dataclass
 class Arguments(FigureOptions):
-    """Evaluate the exact coverage cost (22) of given positions; --plot draws a map of the distances.
+    """Compute the exact coverage cost (22) of given positions; --plot draws a map of the distances.
 
     Example: robocov cost rooms --positions robots.json --lattice 256
     """
 
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")]
-    """Path to a map JSON, or the name of a bundled map."""
+    """Path of a map file, or the name of a bundled map."""
     positions: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """JSON file with a list of [x, y] in metres, one for each robot."""
     speeds: tuple[float, ...] = ()
-    """Speed of each robot in m/s, or one for all: who is first at a place counts; cost also in seconds."""
+    """Speed of each robot, or one for all, m/s; sites then belong to the first robot to arrive."""
     lattice: int = 128
-    """Evaluate on N x N sites over the map."""
+    """Compute the coverage cost on a lattice of N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
-    """Save per-site points (m,2), distances (m,) and owner (m,) there, with speeds also times (m,)."""
+    """File for arrays per site: points (m,2), distances (m,), owner (m,); with --speeds also times (m,)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -44,53 +49,98 @@ class Arguments(FigureOptions):
 
 
 def command(options: Arguments) -> None:
+    """Run `robocov cost`."""
     environment = load_map(options.map)
-    robots = read_positions(options.positions)
-    speeds = speeds_of(options.speeds, len(robots))
+    positions = _read_positions(options.positions)
+    speeds = _build_speeds(options.speeds, len(positions))
     cost = build_cost(environment, options.lattice, quiet=options.json)
     try:
-        result = cost(robots)
-        timed = None if speeds is None else cost(robots, speeds)
+        result = cost(positions)
+        timed_result = None if speeds is None else cost(positions, speeds)
     except InputError as error:
         raise InputError(f"{options.positions}: {error}") from error
     if options.sites is not None:
-        chosen = timed or result
-        arrays: dict[str, Any] = {"points": cost.points, "distances": chosen.distances, "owner": chosen.owner}
-        with replace_file(options.sites) as part, part.open("wb") as file:
-            np.savez(file, **arrays if timed is None else arrays | {"times": timed.times})
+        _save_sites(options.sites, cost, result, timed_result)
     if options.plot is not None:
-        mean = f"{mean_label(environment)} {result.mean_distance:.3f} m"
-        mean = mean if timed is None else f"mean time {timed.mean_time:.3f} s"
-        fine = refine_cost_for_figures(environment, cost)
-        title, theme = "Coverage cost", options.theme
-        save_distance_figure(options.plot, fine, robots, mean, title=title, theme=theme, speeds=speeds)
+        text = f"{mean_label(environment)} {result.mean_distance:.3f} m"
+        if timed_result is not None:
+            text = f"mean time {timed_result.mean_time:.3f} s"
+        save_distance_figure(
+            options.plot,
+            refine_cost_for_figures(environment, cost),
+            positions,
+            text,
+            title="Coverage cost",
+            theme=options.theme,
+            speeds=speeds,
+        )
+    answer = _build_answer(environment, cost, result, timed_result)
+    print_answer(options, answer, *_describe_result(environment, cost, result, timed_result))
+
+
+def _save_sites(
+    path: Path, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
+) -> None:
+    """Write distances and owners of the sites to an npz file, by time if there are speeds."""
+    owning_result = timed_result or result
+    arrays: dict[str, Any] = {
+        "points": cost.points,
+        "distances": owning_result.distances,
+        "owner": owning_result.owner,
+    }
+    if timed_result is not None:
+        arrays["times"] = timed_result.times
+    with replace_file(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def _build_answer(
+    environment: Environment, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
+) -> dict[str, Any]:
+    """Build the answer for programs."""
     answer: dict[str, Any] = {"mean_distance_m": result.mean_distance}
+    if timed_result is not None:
+        answer["mean_time_s"] = timed_result.mean_time
+        answer["cost_m2_s"] = timed_result.value
+    answer["cost_m3"] = result.value
+    answer["uncovered_area_m2"] = result.uncovered_area
+    answer["robots"] = len(result.positions)
+    answer["sites"] = len(cost.points)
+    answer["density"] = density_kind(environment)
+    return answer
+
+
+def _describe_result(
+    environment: Environment, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
+) -> list[str]:
+    """Return the costs as lines of text."""
     lines = [f"mean distance   {result.mean_distance:.4f} m"]
-    if timed is not None:
-        answer |= {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}
-        lines += [f"mean time       {timed.mean_time:.4f} s"]
-    answer |= {"cost_m3": result.value, "uncovered_area_m2": result.uncovered_area, "robots": len(robots)}
-    answer |= {"sites": len(cost.points), "density": density_kind(environment)}
-    lines += [f"coverage cost   {result.value:.3f} m³", f"uncovered area  {result.uncovered_area:.3f} m²"]
-    lines += [*density_lines(environment), f"on {len(cost.points)} sites, {len(robots)} robots"]
-    print_answer(options, answer, *lines)
+    if timed_result is not None:
+        lines.append(f"mean time       {timed_result.mean_time:.4f} s")
+    lines += [
+        f"coverage cost   {result.value:.3f} m³",
+        f"uncovered area  {result.uncovered_area:.3f} m²",
+        *density_lines(environment),
+        f"on {len(cost.points)} sites, {len(result.positions)} robots",
+    ]
+    return lines
 
 
-def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
-    """Return the speeds of so many robots, (n,) m/s, from one for all or one for each; None for none."""
-    if not given:
+def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
+    """Build the speeds of the robots, (n,) m/s, from none, one for all, or one for each."""
+    if not values:
         return None
-    if len(given) not in (1, robots):
-        wanted = f"expected one, or one for each of {robots} robots"
-        raise ParameterError(f"--speeds: {wanted}, got {len(given)} numbers")
-    for speed in given:
+    if len(values) not in (1, robots):
+        expected = f"expected one, or one for each of {robots} robots"
+        raise ParameterError(f"--speeds: {expected}, got {len(values)} numbers")
+    for speed in values:
         if not 0.0 < speed < np.inf:
             raise ParameterError(f"--speeds: expected a number above 0, got {speed!r} m/s")
-    return np.array(given if len(given) == robots else given * robots)
+    return np.array(values if len(values) == robots else values * robots)
 
 
-def read_positions(path: Path) -> Array:
-    """Return the positions in a JSON file, (n, 2) m, or raise InputError: file, place and value."""
+def _read_positions(path: Path) -> Array:
+    """Read positions, (n, 2) m, from a JSON file. Raises InputError with the place and the value."""
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:
@@ -99,9 +149,14 @@ def read_positions(path: Path) -> Array:
         raise InputError(f"{path}: not JSON: {error}") from error
     if not isinstance(content, list) or not content:
         raise InputError(f"{path}: expected a list of [x, y] in metres, got {quote(content)}")
-    for k, pair in enumerate(content):
-        fits = isinstance(pair, list) and len(pair) == 2
-        if not fits or not all(is_number(value) and abs(value) < 1e300 for value in pair):
-            wanted = "expected [x, y], two finite numbers in metres"
-            raise InputError(f"{path}: [{k}]: {wanted}, got {quote(pair)}")
+    for index, pair in enumerate(content):
+        if not _is_point(pair):
+            expected = "expected [x, y], two finite numbers in metres"
+            raise InputError(f"{path}: [{index}]: {expected}, got {quote(pair)}")
     return np.array(content, dtype=float)
+
+
+def _is_point(value: Any) -> bool:
+    if not isinstance(value, list) or len(value) != 2:
+        return False
+    return all(is_number(coordinate) and abs(coordinate) < _MAX_COORDINATE_M for coordinate in value)

@@ -1,11 +1,11 @@
-"""``robocov demo``: the interactive window."""
+"""`robocov demo`: the interactive window."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -17,41 +17,44 @@ from robocov_app.terminal.output import echo
 from robocov_app.terminal.progress import show_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.window import Window
 
+_MAX_CONTROLLERS = 4
+"""Maximum number of controllers side by side."""
+
 
 @dataclass
 class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
-    """The interactive window: watch a team cover a map, touch it, compare controllers, go back in time.
+    """Open the interactive window: watch a team cover a map, edit it, compare controllers, go back in time.
 
-    Everything has a key: press F1. Settings of the look are remembered.
+    All commands have keys: press F1. The settings of the window are remembered.
 
     Example: robocov demo museum --controllers rapf rpf lloyd --robots 8
     """
 
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf",)
-    """Up to four, side by side: names, or mine.py:MyController."""
+    """Up to four controllers side by side: names, or mine.py:MyController."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
     """Gains of the first controller, as in --set k_rep=0.3."""
     speed: float = 1.0
-    """Simulated seconds per second at the beginning."""
+    """Initial playback speed, simulated seconds per second."""
     paused: bool = False
-    """Begin paused."""
+    """Start paused."""
     tour: bool = False
-    """Play the lesson that comes with robocov, in eleven short chapters."""
+    """Play the bundled lesson, in eleven short chapters."""
     lesson: Path | None = None
     """Play a lesson of your own, see `robocov lesson`."""
     frames: int | None = None
-    """Render so many frames of the window without a display, 30 a second, and end; needs --out or --video."""
+    """Number of frames to render without a display, 30 per second; requires --out or --video."""
     out: Path | None = None
     """Folder for these frames: 000000.png, 000001.png, ..."""
     video: Path | None = None
-    """Render the window without a display to this film; with --tour, all of the tour."""
+    """MP4 file to render without a display; with --tour, all of the tour."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -61,21 +64,33 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
         require_number("--speed", self.speed, 0.01, 1000.0)
         if self.frames is not None:
             require_number("--frames", self.frames, 1, 1_000_000)
-        if not 1 <= len(self.controllers) <= 4:
+        if not 1 <= len(self.controllers) <= _MAX_CONTROLLERS:
             raise ParameterError(f"--controllers: expected 1 to 4, got {len(self.controllers)}")
+        self._check_headless_options()
+
+    def _check_headless_options(self) -> None:
+        """Check that the options of frames and videos fit together."""
         if self.out is not None and self.frames is None:
-            raise ParameterError("--out: nothing to write there; requires --frames N")
+            raise ParameterError("--out: nothing to write; requires --frames N")
         if self.frames is not None and self.out is None and self.video is None:
             raise ParameterError("--frames: requires --out DIR or --video FILE")
-        if self.video is not None and self.frames is None and not self.tour:
-            raise ParameterError("--video: requires --frames N or --tour")
-        if self.serve and (self.frames is not None or self.video is not None):
+        if self.serve and self.is_headless:
             raise ParameterError("--serve: cannot be combined with --frames or --video")
-        if self.video is not None and self.video.suffix.lower() != ".mp4":
+        if self.video is None:
+            return
+        if self.frames is None and not self.tour:
+            raise ParameterError("--video: requires --frames N or --tour")
+        if self.video.suffix.lower() != ".mp4":
             raise ParameterError(f"--video: expected a name ending in .mp4, got {str(self.video)!r}")
+
+    @property
+    def is_headless(self) -> bool:
+        """Whether the window is rendered without a display."""
+        return self.frames is not None or self.video is not None
 
 
 def command(options: Arguments) -> int:
+    """Run `robocov demo`, and return its exit status."""
     from robocov.kernel_compilation import compile_in_background
     from robocov_app.toolkit.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
@@ -83,107 +98,167 @@ def command(options: Arguments) -> int:
     prepare(options, options.folder)
     if options.each:
         return serve_each(command, options)
-    headless = options.frames is not None or options.video is not None
+    if options.is_headless:
+        return _render(_build_launcher(options), options)
     with ExitStack() as stack:
-        if not headless:
-            stack.enter_context(ending_on_signals())
-            stack.enter_context(compile_in_background())
-        return _open_window(options, headless=headless)
+        stack.enter_context(ending_on_signals())
+        stack.enter_context(compile_in_background())
+        return _open_window(_build_launcher(options), options)
 
 
-def _open_window(options: Arguments, *, headless: bool) -> int:
+def _build_launcher(options: Arguments) -> Launcher:
+    """Load or build the session, and build the launcher of its window."""
     from robocov.controllers import list_controller_classes
     from robocov_app.viewer.launch import Launcher
-    from robocov_app.viewer.session.file import SUFFIX, load_session
-    from robocov_app.viewer.session.session import Session
-    from robocov_app.web import show
+    from robocov_app.viewer.session.file import SUFFIX
 
-    file, name, laws = None, options.map, (*list_controller_classes(), *options.controllers)
+    controllers = (*list_controller_classes(), *options.controllers)
+    file: Path | None = None
     if options.map.endswith(SUFFIX):
         file = Path(options.map)
-        saved = load_session(file, laws)
-        session, name = Session.opened(saved), str(saved.view.get("map") or "")
+        session, map_name = _load_session(file, controllers)
         if options.serve and not file.resolve().is_relative_to(options.folder.resolve()):
-            file = None  # it is saved to a file of its own, where it may be
+            # The session is saved to another file, in the folder that may be written to.
+            file = None
     else:
-        session = session_of(options)
-    also, without = options.read_layers()
-    look: dict[str, Any] = {
-        "theme": options.theme,
-        "size": parse_window_size(options.size),
-        "scale": options.scale,
-    }
-    look |= {"also": also, "without": without, "headless": headless, "served": options.serve}
-    first = file is None and options.lesson is None and not options.tour
-    given: dict[str, Any] = {"laws": laws, "lattice": options.lattice, "file": file, "offers_lesson": first}
-    opening = Launcher(session, name, options.folder, **look, **given)
-    if headless:
-        return rendered(opening, options)
-    with opening.window() as window:
-        _begin_lesson(window, options)
+        session = build_session(options)
+        map_name = options.map
+    shown_layers, hidden_layers = options.read_layers()
+    return Launcher(
+        session,
+        map_name,
+        options.folder,
+        theme=options.theme,
+        size=parse_window_size(options.size),
+        scale=options.scale,
+        also=shown_layers,
+        without=hidden_layers,
+        headless=options.is_headless,
+        served=options.serve,
+        laws=controllers,
+        lattice=options.lattice,
+        file=file,
+        offers_lesson=file is None and options.lesson is None and not options.tour,
+    )
+
+
+def _load_session(file: Path, controllers: tuple[str, ...]) -> tuple[Session, str]:
+    """Load a session, and return it with the name of its map."""
+    from robocov_app.viewer.session.file import load_session
+    from robocov_app.viewer.session.session import Session
+
+    saved = load_session(file, controllers)
+    return Session.opened(saved), str(saved.view.get("map") or "")
+
+
+def build_session(options: Arguments) -> Session:
+    """Build the session that the options describe.
+
+    Parameters
+    ----------
+    options : Arguments
+
+    Returns
+    -------
+    Session
+
+    Raises
+    ------
+    InputError
+        If the map or the team file cannot be used.
+    """
+    from robocov.mapfile import load_map
+    from robocov.team_files import read_team
+    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
+    from robocov_app.viewer.session.session import Session
+
+    robots = options.robots
+    limits = TeamSpec(radius=options.radius)
+    if options.team is not None:
+        team = read_team(options.team, {"radius": options.radius})
+        robots = get_robot_count(team, robots, Arguments.robots, options.team)
+        limits = TeamSpec.of(team)
+    first_name, *other_names = options.controllers
+    choices = [ControllerChoice(first_name, parse_gains(options.gains))]
+    choices += [ControllerChoice(name) for name in other_names]
+    conditions = options.conditions.build_conditions(options.seed, robots)
+    scenario = Scenario(
+        load_map(options.map),
+        tuple(choices),
+        robots,
+        options.start,
+        options.seed,
+        limits=limits,
+        dt=options.dt,
+        conditions=conditions,
+    )
+    session = Session(scenario)
+    session.clock.speed = options.speed
+    session.playing = not options.paused
+    return session
+
+
+def _open_window(launcher: Launcher, options: Arguments) -> int:
+    """Show the window until it is closed."""
+    from robocov_app.web import show
+
+    with launcher.window() as window:
+        _start_lesson(window, options)
         show(window, options, options.folder)
     return 0
 
 
-def _begin_lesson(window: Window, options: Arguments) -> None:
+def _start_lesson(window: Window, options: Arguments) -> None:
+    """Start the lesson that the options name."""
     if options.lesson is not None:
         window.start_lesson(options.lesson)
     elif options.tour:
         window.do("tour")
 
 
-def session_of(options: Arguments) -> Session:
-    from robocov.mapfile import load_map
-    from robocov.team_files import read_team
-    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
-    from robocov_app.viewer.session.session import Session
-
-    robots, limits = options.robots, TeamSpec(radius=options.radius)
-    if options.team is not None:
-        team = read_team(options.team, {"radius": options.radius})
-        robots, limits = get_robot_count(team, robots, Arguments.robots, options.team), TeamSpec.of(team)
-    first, *others = options.controllers
-    laws = (ControllerChoice(first, parse_gains(options.gains)), *map(ControllerChoice, others))
-    conditions, start = (
-        options.conditions.build_conditions(options.seed, robots),
-        (options.start, options.seed),
-    )
-    environment = load_map(options.map)
-    session = Session(Scenario(environment, laws, robots, *start, limits, options.dt, conditions=conditions))
-    session.clock.speed = options.speed
-    session.playing = not options.paused
-    return session
-
-
-def rendered(opening: Launcher, options: Arguments) -> int:
+def _render(launcher: Launcher, options: Arguments) -> int:
+    """Render the window to frames and a video, and return the exit status."""
     from robocov.files.result_folder import create_result
     from robocov.files.writing import resolve_target
     from robocov_app.runs.encoding import find_encoder, save_frames_and_video
-    from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
 
     if options.video is not None:
         resolve_target(options.video)
         find_encoder()
-    made = nullcontext() if options.out is None else create_result(options.out, overwrite=False)
-    with made as result, opening.window() as window, Interruption() as stop:
-        _begin_lesson(window, options)
+    context = nullcontext() if options.out is None else create_result(options.out, overwrite=False)
+    with context as result, launcher.window() as window, Interruption() as interruption:
+        _start_lesson(window, options)
         count = options.frames
         if count is None:
             assert window.tour is not None
             count = round(window.tour.seconds * HEADLESS_FPS)
         with show_progress("frames", count) as update:
+            frames = _draw_frames(window, count, interruption, update, is_whole_tour=options.frames is None)
+            folder = None if result is None else result.staging
+            save_frames_and_video(frames, folder, options.video, HEADLESS_FPS)
+    for target in (options.out, options.video):
+        if target is not None:
+            echo(f"saved {target}")
+    return INTERRUPTED if interruption.requested else 0
 
-            def frames() -> Iterator[Frame]:
-                for done in range(count):
-                    if stop.requested or (options.frames is None and window.tour is None):
-                        return
-                    window.frame(1.0 / HEADLESS_FPS)
-                    yield pixels(window.screen)
-                    update(done + 1)
 
-            out = None if result is None else result.staging
-            save_frames_and_video(frames(), out, options.video, HEADLESS_FPS)
-    for target in filter(None, (options.out, options.video)):
-        echo(f"saved {target}")
-    return INTERRUPTED if stop.requested else 0
+def _draw_frames(
+    window: Window,
+    count: int,
+    interruption: Interruption,
+    update: Callable[[int], None],
+    *,
+    is_whole_tour: bool,
+) -> Iterator[Frame]:
+    """Draw frames of the window, until the count, the end of the tour, or an interruption."""
+    from robocov_app.viewer.film import pixels
+    from robocov_app.viewer.launch import HEADLESS_FPS
+
+    for number in range(1, count + 1):
+        is_tour_over = is_whole_tour and window.tour is None
+        if interruption.requested or is_tour_over:
+            return
+        window.frame(1.0 / HEADLESS_FPS)
+        yield pixels(window.screen)
+        update(number)

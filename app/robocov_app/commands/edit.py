@@ -1,9 +1,11 @@
-"""``robocov edit``: the map editor."""
+"""`robocov edit`: the map editor."""
+
+from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -12,35 +14,45 @@ from robocov_app.commands.options import WindowOptions
 from robocov_app.terminal.arguments import parse_window_size
 from robocov_app.terminal.output import echo
 
+if TYPE_CHECKING:
+    from robocov_app.editor.ui.window import EditorWindow
+
+_SCREENSHOT_FRAMES = 3
+"""Number of frames after which the layout of a window does not change any more."""
+_SCREENSHOT_FRAME_S = 0.2
+
 
 @dataclass
 class Arguments(WindowOptions):
-    """The map editor: draw and change maps, see at once what is wrong with them, try them.
+    """Open the map editor: draw and change maps, see problems at once, try maps with robots.
 
-    Everything has a key: press F1. Nothing is lost: work that was not saved is offered at the next start.
+    All commands have keys: press F1. Unsaved work is offered at the next start.
 
     Example: robocov edit plan.json --background plan.png
     """
 
     map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
-    """A map JSON, new or not, a bundled map, of which a copy is opened, or a foreign file to import."""
+    """Map file, new or existing; bundled map, opened as a copy; or foreign file to import."""
     background: Path | None = None
-    """A picture to put under the map, such as a scanned floor plan."""
+    """Image to display under the map, such as a scanned floor plan."""
     screenshot: Path | None = None
-    """Save a picture of the window, drawn without a display, and end."""
+    """PNG file for a screenshot of the window, drawn without a display; then exit."""
     page: Literal["map", "object", "snap", "problems", "history"] = "map"
-    """The panel's page in that picture."""
+    """Page of the panel in the screenshot."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.serve and self.screenshot is not None:
+        if self.screenshot is None:
+            return
+        if self.serve:
             raise ParameterError("--serve: cannot be combined with --screenshot")
-        if self.screenshot is not None and self.screenshot.suffix.lower() != ".png":
-            wanted = "expected a name ending in .png"
-            raise ParameterError(f"--screenshot: {wanted}, got {str(self.screenshot)!r}")
+        if self.screenshot.suffix.lower() != ".png":
+            expected = "expected a name ending in .png"
+            raise ParameterError(f"--screenshot: {expected}, got {str(self.screenshot)!r}")
 
 
 def command(options: Arguments) -> int:
+    """Run `robocov edit`, and return its exit status."""
     from robocov.kernel_compilation import compile_in_background
     from robocov_app.toolkit.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
@@ -48,43 +60,66 @@ def command(options: Arguments) -> int:
     prepare(options, options.folder)
     if options.each:
         return serve_each(command, options)
-    headless = options.screenshot is not None
     with ExitStack() as stack:
-        if not headless:
+        if options.screenshot is None:
             stack.enter_context(ending_on_signals())
             stack.enter_context(compile_in_background())
-        return _open_editor(options)
+        _open_editor(options)
+    return 0
 
 
-def _open_editor(options: Arguments) -> int:
-    from robocov.mapfile import find_map_file, list_bundled_maps
+def _open_editor(options: Arguments) -> None:
+    """Show the editor until it is closed, or save its screenshot."""
     from robocov_app.editor.ui.launch import editor_window
     from robocov_app.web import show
 
-    look: dict[str, Any] = {
-        "theme": options.theme,
-        "size": parse_window_size(options.size),
-        "scale": options.scale,
-    }
-    look |= {"headless": options.screenshot is not None, "served": options.serve}
-    path = None if options.map is None else Path(options.map)
-    if options.map in list_bundled_maps() or (path is not None and not path.suffix):
-        path = find_map_file(str(options.map))
-    elif path is not None and path.suffix.lower() != ".json" and not path.is_file():
-        raise MapError(f"{options.map}: there is no such file")
-    with editor_window(path, options.folder, background=options.background, **look) as window:
+    with editor_window(
+        _find_path(options.map),
+        options.folder,
+        background=options.background,
+        theme=options.theme,
+        size=parse_window_size(options.size),
+        scale=options.scale,
+        headless=options.screenshot is not None,
+        served=options.serve,
+    ) as window:
         if options.screenshot is None:
             show(window, options, options.folder)
-            return 0
-        from robocov.files.writing import replace_file
-        from robocov_app.runs.encoding import encode_png
-        from robocov_app.viewer.film import pixels
+        else:
+            _save_screenshot(window, options.screenshot, options.page)
+    if options.screenshot is not None:
+        echo(f"saved {options.screenshot}")
 
-        window.panel.show_tab(options.page)
-        window.editor.message = ""
-        for _ in range(3):
-            window.frame(0.2)
-        with replace_file(options.screenshot) as part:
-            part.write_bytes(encode_png(pixels(window.screen)))
-    echo(f"saved {options.screenshot}")
-    return 0
+
+def _find_path(name: str | None) -> Path | None:
+    """Return the path of a map file, a bundled map or a foreign file; None for a new map.
+
+    Raises
+    ------
+    MapError
+        If a foreign file does not exist; a map file need not.
+    """
+    from robocov.mapfile import find_map_file, list_bundled_maps
+
+    if name is None:
+        return None
+    path = Path(name)
+    if name in list_bundled_maps() or not path.suffix:
+        return find_map_file(name)
+    if path.suffix.lower() != ".json" and not path.is_file():
+        raise MapError(f"{name}: no such file")
+    return path
+
+
+def _save_screenshot(window: EditorWindow, path: Path, page: str) -> None:
+    """Draw the window with a page of its panel, and save it as PNG."""
+    from robocov.files.writing import replace_file
+    from robocov_app.runs.encoding import encode_png
+    from robocov_app.viewer.film import pixels
+
+    window.panel.show_tab(page)
+    window.editor.message = ""
+    for _ in range(_SCREENSHOT_FRAMES):
+        window.frame(_SCREENSHOT_FRAME_S)
+    with replace_file(path) as temporary:
+        temporary.write_bytes(encode_png(pixels(window.screen)))

@@ -14,82 +14,124 @@ import tyro
 from robocov.errors import InputError, OutputError, RobocovError
 from robocov_app.terminal.output import echo
 
-_BROUGHT = Path(__file__).parents[1] / "pages"  # those that a wheel brings
+_BUNDLED_PAGES = Path(__file__).parents[1] / "pages"
+"""Pages that a wheel contains."""
+_REQUIRED_MODULES = ("sphinx", "furo", "myst_parser")
+"""Modules of the extra `robocov[docs]` that build the pages."""
 
 
 @dataclass
 class Arguments:
-    """Open the handbook in a browser: tutorials, guides, and a reference of every command and name.
+    """Open the handbook in a browser: tutorials, guides, and a reference of all commands and names.
 
-    Installed packages bring it. In a checkout it is built at first use, and again after the program has
-    changed (pip install "robocov[docs]"), and kept in the user's cache. Searching it needs no network.
+    Installed packages contain it. A checkout builds it at first use, and again after changes of the program
+    (pip install "robocov[docs]"), and keeps it in the user's cache. Its search works offline.
 
     Example: robocov handbook --out site
     """
 
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Put it into this new folder, as static pages for any host, instead of opening it."""
+    """New folder for the handbook as static pages for any host, instead of opening it."""
 
 
 def command(options: Arguments) -> None:
+    """Run `robocov handbook`."""
     if options.out is not None:
-        built(options.out)
-        echo(f"saved in {options.out}/: begin with index.html")
+        _build_pages(options.out)
+        echo(f"saved in {options.out}/: start with index.html")
         return
     import webbrowser
 
-    index = (_BROUGHT if _BROUGHT.is_dir() else _kept()) / "index.html"
+    folder = _BUNDLED_PAGES if _BUNDLED_PAGES.is_dir() else _cache_pages()
+    index = folder / "index.html"
     echo(index)
     webbrowser.open(index.as_uri())
 
 
-def _kept() -> Path:
-    """Return the pages in the user's cache, which are built where they are not those of this program."""
-    import robocov
+def _cache_pages() -> Path:
+    """Return the folder of the pages in the user's cache, and build them if they are out of date."""
     from robocov.files.array_files import ArrayCache
 
     cache = ArrayCache.open_default()
-    home = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
-    # another folder when a page or a module of the program has changed
-    roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
-    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
-    written = [file for file in files if sources() / "reference" not in file.parents]
-    pages = home / ArrayCache.compute_key(*(f"{file} {file.stat().st_mtime_ns}" for file in written))
+    folder = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
+    # The key changes with every page and every module of the program.
+    states = (f"{file} {file.stat().st_mtime_ns}" for file in _list_sources())
+    pages = folder / ArrayCache.compute_key(*states)
     if not (pages / "index.html").is_file():
         if cache is not None:
-            shutil.rmtree(home, ignore_errors=True)  # those of an earlier state
+            # Remove pages of an earlier state of the program.
+            shutil.rmtree(folder, ignore_errors=True)
         echo("building the handbook, once ...", to_stderr=True)
-        built(pages)
+        _build_pages(pages)
     return pages
 
 
-def sources() -> Path:
-    app = Path(__file__).resolve().parents[1]
-    return next(each for each in (app / "handbook", app.parent / "handbook") if each.is_dir())
+def _list_sources() -> list[Path]:
+    """List the files from which the handbook is built, without the generated reference."""
+    import robocov
+
+    pages = find_page_sources()
+    roots = (pages, Path(__file__).parents[1], Path(robocov.__file__).parent)
+    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
+    return [file for file in files if pages / "reference" not in file.parents]
 
 
-def built(folder: Path) -> None:
-    """Put the pages into a new folder; InputError where it is none, RobocovError where Sphinx complains."""
+def find_page_sources() -> Path:
+    """Find the folder of the handbook's pages as Markdown.
+
+    Returns
+    -------
+    Path
+    """
+    application = Path(__file__).resolve().parents[1]
+    candidates = (application / "handbook", application.parent / "handbook")
+    return next(folder for folder in candidates if folder.is_dir())
+
+
+def _build_pages(folder: Path) -> None:
+    """Write the handbook to a new folder.
+
+    Raises
+    ------
+    InputError
+        If the folder contains something.
+    OutputError
+        If it cannot be written.
+    RobocovError
+        If Sphinx is not installed, or fails.
+    """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; expected a new or an empty folder")
-    if _BROUGHT.is_dir():
-        shutil.copytree(_BROUGHT, folder, dirs_exist_ok=True)
+    if _BUNDLED_PAGES.is_dir():
+        shutil.copytree(_BUNDLED_PAGES, folder, dirs_exist_ok=True)
         return
-    needed = "sphinx", "furo", "myst_parser"
-    if missing := [name for name in needed if importlib.util.find_spec(name) is None]:
-        text = f"the pages can be read as text, too: {sources() / 'index.md'}"
-        raise RobocovError(f'{missing[0]} is not installed: pip install "robocov[docs]"; {text}')
+    missing_modules = [name for name in _REQUIRED_MODULES if importlib.util.find_spec(name) is None]
+    if missing_modules:
+        alternative = f"the pages can be read as text, too: {find_page_sources() / 'index.md'}"
+        raise RobocovError(
+            f'{missing_modules[0]} is not installed: pip install "robocov[docs]"; {alternative}'
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as work:
-            # a copy: the reference is written beside the other pages, and packages may be read-only
-            copy, pages = Path(work, "sources"), Path(work, "pages")
-            shutil.copytree(sources(), copy, ignore=shutil.ignore_patterns("reference", "__pycache__"))
-            call = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
-            call += ["-d", str(Path(work, "doctrees")), str(copy), str(pages)]
-            done = subprocess.run(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-            if done.returncode:
-                raise RobocovError(f"the handbook cannot be built: {done.stderr.strip()}")
-            pages.replace(folder)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as scratch:
+            _run_sphinx(Path(scratch)).replace(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {error.strerror}") from error
+
+
+def _run_sphinx(scratch: Path) -> Path:
+    """Build the pages in a scratch folder, and return their folder."""
+    # Sphinx writes the reference next to the other pages, and packages may be read-only: it gets a copy.
+    sources = scratch / "sources"
+    pages = scratch / "pages"
+    shutil.copytree(find_page_sources(), sources, ignore=shutil.ignore_patterns("reference", "__pycache__"))
+    arguments = ["-q", "-W", "--keep-going", "-b", "html", "-d", str(scratch / "doctrees")]
+    process = subprocess.run(
+        [sys.executable, "-m", "sphinx", *arguments, str(sources), str(pages)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    if process.returncode:
+        raise RobocovError(f"the handbook cannot be built: {process.stderr.strip()}")
+    return pages

@@ -9,25 +9,29 @@ import tyro
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import print_answer
 
+_NEVER_ENDS = 2
+"""Exit status if a chapter never ends."""
+
 
 @dataclass
 class Arguments(JsonOption):
-    """Check a lesson: a session file with chapters, which `robocov demo --lesson FILE` plays.
+    """Check a lesson: a session file with chapters, played by `robocov demo --lesson FILE`.
 
-    Play what a chapter is to show in the window, save the session (Ctrl S), and write "lesson" into the file:
-    a title and chapters, each with title, text, the touch at which it ends, and until when (robocov schema
-    session tells the rest); with a question or a task where that teaches. All chapters are simulated.
+    Play the contents of the chapters in the window, save the session (Ctrl S), and add "lesson" to the file:
+    a title and chapters, each with title, text, the edit at which it ends, and a time limit; add a question
+    or a task if it helps (see robocov schema session). All chapters are simulated.
 
     Example: robocov lesson check mine.robocov
     """
 
     action: tyro.conf.Positional[Literal["check"]]
-    """What to do."""
+    """Action."""
     file: tyro.conf.Positional[Path]
-    """The lesson."""
+    """Lesson file."""
 
 
 def command(options: Arguments) -> int:
+    """Run `robocov lesson`, and return its exit status."""
     from robocov.kernel_compilation import compile_kernels
     from robocov_app.viewer.lessons import checked, load_lesson
 
@@ -35,9 +39,11 @@ def command(options: Arguments) -> int:
     assert saved.lesson is not None
     compile_kernels()
     chapters = checked(saved)
-    rows, lines = [], [saved.lesson.title]
-    for k, (title, seconds, ends) in enumerate(chapters, 1):
+    rows = []
+    lines = [saved.lesson.title]
+    for number, (title, seconds, ends) in enumerate(chapters, start=1):
         rows.append({"title": title, "seconds": seconds, "ends": ends})
-        lines.append(f"  {k:2}  {title:44}  {f'ends after {seconds:.1f} s' if ends else 'never ends'}")
+        end = f"ends after {seconds:.1f} s" if ends else "never ends"
+        lines.append(f"  {number:2}  {title:44}  {end}")
     print_answer(options, {"title": saved.lesson.title, "chapters": rows}, *lines)
-    return 0 if all(ends for *_, ends in chapters) else 2
+    return 0 if all(row["ends"] for row in rows) else _NEVER_ENDS

@@ -1,9 +1,10 @@
 """`robocov metrics`."""
 
-from collections.abc import Iterator
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -12,22 +13,41 @@ from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import BOLD, RIGHT, print_answer, print_table, write_csv
 from robocov_app.terminal.progress import make_counter, show_progress
 
+if TYPE_CHECKING:
+    from robocov.metrics.run_metrics import RunMetrics
+    from robocov_app.figures.runs import Measured
+    from robocov_app.runs.saved_runs import SavedRun
+
+_COLUMNS = {
+    "": ("label", "{}"),
+    "sensed": ("sensed_area_m2", "{:.1%}"),
+    "visible": ("visible_area_m2", "{:.1%}"),
+    "work": ("work_J", "{:.1f} J"),
+    "effort": ("effort_N2_s", "{:.1f} N²s"),
+    "path length": ("path_length_m", "{:.2f} m"),
+    "within 5 %": ("near_final_s", "{:.1f} s"),
+    "components": ("components", "{:.0f}"),
+    "to walls": ("wall_clearance_m", "{:.3f} m"),
+    "to robots": ("robot_clearance_m", "{:.3f} m"),
+}
+"""Titles of the table's columns, with their keys and formats. Areas are fractions of the free area."""
+
 
 @dataclass
 class Arguments(FigureOptions):
-    """What the field measures of saved runs: covered and visible area, energy, ways, connectivity, clearance.
+    """Compute metrics of saved runs: sensed and visible area, energy, path length, connectivity, clearance.
 
-    Writes metrics.csv into the folder of each run, one row a moment. Areas: within the sensing range and in
-    line of sight, within it through walls, and in line of sight at any distance. Energy: the integrals of
-    |F v| and of |F|² of the forces that the controller asked for. --plot draws all against time.
+    Writes metrics.csv into the folder of each run, with one row per sample. Areas: within the sensing range
+    and in line of sight, within it through walls, and in line of sight at any distance. Energy: the integrals
+    of |F v| and of |F|² of the controller's forces. --plot draws all metrics against time.
 
     Example: robocov metrics museum --plot museum-metrics.png
     """
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """The folder of a run or a comparison."""
+    """Folder of a run or a comparison."""
     rate: float = 2.0
-    """Moments per simulated second."""
+    """Samples per simulated second."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -35,59 +55,79 @@ class Arguments(FigureOptions):
 
 
 def command(options: Arguments) -> None:
+    """Run `robocov metrics`."""
     from robocov.files.result_folder import extend_result
-    from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics, find_time_near_final
-    from robocov.record import select_nearest_moments
+    from robocov.metrics.run_metrics import COLUMNS
     from robocov_app.figures.runs import Measured
     from robocov_app.runs.saved_runs import load_saved_runs
 
-    measured, runs = [], load_saved_runs(options.folder)
-    answers: list[dict[str, Any]] = []
+    saved_runs = load_saved_runs(options.folder)
     folder = options.folder if options.folder.is_dir() else options.folder.parent
+    measured_runs: list[Measured] = []
+    rows: list[dict[str, Any]] = []
     with extend_result(folder) as result:
-        for saved in runs:
-            record, history = saved.record, saved.history
-            total = len(select_nearest_moments(record.time, options.rate))
-            with show_progress(f"measuring {record.label}", total, quiet=options.json) as update:
-                metrics = compute_run_metrics(record, options.rate, make_counter(update))
+        for saved in saved_runs:
+            metrics = _compute_metrics(options, saved)
             target = result.staging / saved.folder.relative_to(folder)
             target.mkdir(exist_ok=True)
             write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), metrics.rows())
-            measured.append(Measured(record.label, record.controller, metrics))
-            about = {"folder": str(saved.folder), "controller": record.controller, "label": record.label}
-            near = None if history is None or not len(history.time) else find_time_near_final(history)
-            figures = {"free_area_m2": metrics.free_area, **metrics.final(), "near_final_s": near}
-            answers.append(about | figures)
+            measured_runs.append(Measured(saved.record.label, saved.record.controller, metrics))
+            rows.append(_build_row(saved, metrics))
     if options.plot is not None:
-        from robocov_app.figures.files import save_figure
-        from robocov_app.figures.runs import plot_metrics
-
-        title = f"Metrics  ·  {options.folder.name}"
-        save_figure(plot_metrics(measured, options.theme, title=title), options.plot)
+        _save_figure(options, options.plot, measured_runs)
     if not options.json:
-        print_table([(title, RIGHT if title else BOLD) for title in _COLUMNS], map(_cells, answers))
-    folders = ", ".join(answer["folder"] for answer in answers)
-    print_answer(options, {"runs": answers}, f"written to metrics.csv in {folders}")
+        columns = [(title, RIGHT if title else BOLD) for title in _COLUMNS]
+        print_table(columns, [_format_cells(row) for row in rows])
+    folders = ", ".join(row["folder"] for row in rows)
+    print_answer(options, {"runs": rows}, f"written to metrics.csv in {folders}")
 
 
-_COLUMNS = {
-    # title: name and format of a figure; areas are told as parts of the free area
-    "": ("label", "{}"),
-    "sensed": ("sensed_area_m2", "{:.1%}"),
-    "visible": ("visible_area_m2", "{:.1%}"),
-    "work": ("work_J", "{:.1f} J"),
-    "effort": ("effort_N2_s", "{:.1f} N²s"),
-    "way": ("path_length_m", "{:.2f} m"),
-    "within 5 %": ("near_final_s", "{:.1f} s"),
-    "parts": ("components", "{:.0f}"),
-    "to walls": ("wall_clearance_m", "{:.3f} m"),
-    "to robots": ("robot_clearance_m", "{:.3f} m"),
-}
+def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:
+    from robocov.metrics.run_metrics import compute_run_metrics
+    from robocov.record import select_nearest_moments
+
+    record = saved.record
+    samples = len(select_nearest_moments(record.time, options.rate))
+    with show_progress(f"measuring {record.label}", samples, quiet=options.json) as update:
+        return compute_run_metrics(record, options.rate, make_counter(update))
 
 
-def _cells(answer: dict[str, Any]) -> Iterator[str]:
-    for name, template in _COLUMNS.values():
-        value = answer[name]
-        if value is not None and name.endswith("area_m2"):
-            value /= answer["free_area_m2"]
-        yield "–" if value is None else template.format(value)
+def _build_row(saved: SavedRun, metrics: RunMetrics) -> dict[str, Any]:
+    """Build the answer for programs about one run."""
+    from robocov.metrics.run_metrics import find_time_near_final
+
+    record = saved.record
+    near_final = None
+    if saved.history is not None and len(saved.history.time):
+        near_final = find_time_near_final(saved.history)
+    return {
+        "folder": str(saved.folder),
+        "controller": record.controller,
+        "label": record.label,
+        "free_area_m2": metrics.free_area,
+        **metrics.final(),
+        "near_final_s": near_final,
+    }
+
+
+def _save_figure(options: Arguments, path: Path, measured_runs: list[Measured]) -> None:
+    """Draw the metrics of all runs against time."""
+    from robocov_app.figures.files import save_figure
+    from robocov_app.figures.runs import plot_metrics
+
+    title = f"Metrics  ·  {options.folder.name}"
+    save_figure(plot_metrics(measured_runs, options.theme, title=title), path)
+
+
+def _format_cells(row: dict[str, Any]) -> list[str]:
+    """Return the cells of the table about one run."""
+    cells = []
+    for key, cell_format in _COLUMNS.values():
+        value = row[key]
+        if value is None:
+            cells.append("–")
+            continue
+        if key.endswith("area_m2"):
+            value /= row["free_area_m2"]
+        cells.append(cell_format.format(value))
+    return cells

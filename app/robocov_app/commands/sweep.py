@@ -158,7 +158,7 @@ def _describe_totals(totals: Totals, runs: int) -> list[str]:
 
 
 def _describe_interruption(totals: Totals, runs: int, out: Path) -> list[str]:
-    """Return what is left of an interrupted sweep as lines of text."""
+    """Return the remaining work of an interrupted sweep as lines of text."""
     left = runs - totals.done - totals.failed - totals.reused
     lines = [
         f"Interrupted with {left} runs left. Partial results are in {out}/. Run the same command to resume."

@@ -18,7 +18,7 @@ from PIL import Image
 from touched_run import begun
 
 from robocov_app.cli import main
-from robocov_app.commands.demo import Arguments, session_of
+from robocov_app.commands.demo import Arguments, build_session
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.viewer.launch import NO_DISPLAY, Launcher
@@ -154,10 +154,10 @@ def test_bad_options_are_told_in_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_options_are_what_the_session_begins_with() -> None:
+def test_the_session_starts_with_the_options() -> None:
     given = {"robots": 4, "start": "kitchen", "seed": 7, "dt": 0.05, "radius": 0.15, "speed": 2.0}
     options = Arguments(controllers=("rpf", "lloyd"), gains=("k_rep=2",), paused=True, **given)
-    session = session_of(options)
+    session = build_session(options)
     assert [pane.law.name for pane in session.panes] == ["rpf", "lloyd"]
     assert session.panes[0].law.value("k_rep") == 2.0
     scenario = session.scenario

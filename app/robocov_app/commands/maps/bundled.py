@@ -11,25 +11,46 @@ from robocov_app.terminal.output import BOLD, print_answer, print_table
 
 @dataclass
 class Arguments(JsonOption):
-    """List the bundled maps: name, size, starts, and a sentence each.
+    """List the bundled maps with size, starts and a description.
 
     Example: robocov maps
     """
 
 
 def command(options: Arguments) -> None:
-    rows, cells = [], []
-    for name in list_bundled_maps():
-        environment = load_map(name)
-        low_x, low_y, high_x, high_y = environment.region.bounds
-        width, height, starts = high_x - low_x, high_y - low_y, list(environment.starts)
-        description, density = environment.description, density_kind(environment)
-        row: dict[str, Any] = {"name": name, "title": environment.name, "description": description}
-        row |= {"width_m": width, "height_m": height, "free_area_m2": environment.free_area}
-        rows.append(row | {"starts": starts, "density": density})
-        told = f"{description} Density: {density}." if density else description
-        cells.append((name, f"{width:.3g} x {height:.3g}", ", ".join(starts), told))
+    """Run `robocov maps`."""
+    rows = [_build_row(name) for name in list_bundled_maps()]
     print_answer(options, {"maps": rows}, indent=1)
     if not options.json:
-        columns = [("map", BOLD), ("size in m", {"no_wrap": True}), ("starts, the default first", {})]
-        print_table([*columns, ("what it is", {})], cells)
+        columns = [
+            ("map", BOLD),
+            ("size in m", {"no_wrap": True}),
+            ("starts, the default first", {}),
+            ("description", {}),
+        ]
+        print_table(columns, [_format_cells(row) for row in rows])
+
+
+def _build_row(name: str) -> dict[str, Any]:
+    """Build the answer for programs about one map."""
+    environment = load_map(name)
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    return {
+        "name": name,
+        "title": environment.name,
+        "description": environment.description,
+        "width_m": high_x - low_x,
+        "height_m": high_y - low_y,
+        "free_area_m2": environment.free_area,
+        "starts": list(environment.starts),
+        "density": density_kind(environment),
+    }
+
+
+def _format_cells(row: dict[str, Any]) -> tuple[str, ...]:
+    """Return the cells of the table about one map."""
+    description = row["description"]
+    if row["density"]:
+        description = f"{description} Density: {row['density']}."
+    size = f"{row['width_m']:.3g} x {row['height_m']:.3g}"
+    return row["name"], size, ", ".join(row["starts"]), description

@@ -18,39 +18,39 @@ from robocov_app.terminal.progress import show_progress
 
 @dataclass
 class Arguments(JsonOption):
-    """Turn a foreign map file into a map JSON, and say what was dropped, repaired and changed.
+    """Convert a foreign map file to a map of robocov, and report what was dropped, repaired and changed.
 
-    The format is known from the content, or else the suffix. What an option has no meaning for is refused.
+    The format is detected from the content, otherwise from the suffix. Inapplicable options are rejected.
 
       ros        YAML of ROS map_server with its PGM or PNG: --unknown --threshold --anywhere
-      movingai   .map of Moving AI's benchmarks: --cell --trees --water
-      picture    PNG, JPEG, BMP, TIFF, PGM, PPM of a plan, dark is an obstacle: --cell --threshold
+      movingai   .map of the Moving AI benchmarks: --cell --trees --water
+      picture    PNG, JPEG, BMP, TIFF, PGM or PPM of a plan, dark pixels are obstacles: --cell --threshold
                  --invert --unknown --min-stroke --free-colour --solid-colour --ignore-colour
       stage, argos, irsim
-                 worlds of these simulators, robots as a start: --only --skip --anywhere
-      tmx        map of Tiled, --only LAYER says which tiles are solid: --cell --scale --skip --thickness
+                 worlds of these simulators, robots become a start: --only --skip --anywhere
+      tmx        map of Tiled, --only LAYER selects the solid tiles: --cell --scale --skip --thickness
       houseexpo  JSON with "verts" in metres
-      osm        OpenStreetMap's buildings, water and barriers, XML or the JSON of Overpass: --water
+      osm        buildings, water and barriers of OpenStreetMap, XML or JSON of Overpass: --water
                  --thickness --pillar --skip; or the rooms of a floor: --level
       imdf       a floor of an indoor map, zip or folder: --level --thickness --only --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
-                 a wrong one is answered with those that there are; svg also by colour, as a picture
+                 an unknown value is answered with the known ones; svg also by colour, as a picture
 
-    --ignore-layer (or --skip) and --only choose by the name of a layer, group, class or shape; options of
+    --ignore-layer (or --skip) and --only select by the name of a layer, group, class or shape. Options with
     several values can be repeated.
 
     Example: robocov import office.yaml -o office.json --preview office.png
     """
 
     file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
-    """The foreign map."""
+    """Foreign map file."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")] = None
-    """The map JSON to write; by default the name of FILE with .json, in this folder."""
+    """Map file to write; by default the name of FILE with .json, in the current folder."""
     format: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The format of FILE, where its content does not say it."""
+    """Format of FILE; by default detected."""
     preview: Annotated[Path | None, tyro.conf.arg(metavar="PICTURE")] = None
-    """A picture (.png, .svg or .pdf) of the map as it was read and as it became."""
+    """Figure (.png, .svg or .pdf) of the foreign map next to the converted one."""
     overwrite: bool = False
     """Replace existing files."""
     read: tyro.conf.OmitArgPrefixes[ReadOptions] = field(default_factory=ReadOptions)
@@ -58,29 +58,37 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
+    """Run `robocov import`."""
+    out = Path(f"{options.file.stem}.json") if options.out is None else options.out
+    _check_options(options, out)
+    is_quiet = options.json or not sys.stderr.isatty()
+    with show_progress("importing", 3, quiet=is_quiet) as update:
+        environment, report, foreign_map = import_map(
+            options.file, format=options.format, options=options.read, shaping=options.shaping
+        )
+        update(1)
+        save_map(environment, out)
+        update(2)
+        if options.preview is not None:
+            from robocov_app.formats.preview import preview
+
+            preview(foreign_map, environment, report, options.preview)
+        update(3)
+    files = {"out": str(out)}
+    if options.preview is not None:
+        files["preview"] = str(options.preview)
+    saved = f"saved in {' and '.join(files.values())}"
+    print_answer(options, {**files, **report.to_dict()}, *report.format_lines(), saved)
+
+
+def _check_options(options: Arguments, out: Path) -> None:
+    """Check the format and the files before the import, which may take long."""
     if options.format is not None and options.format not in IMPORTERS:
         known = ", ".join(IMPORTERS)
         raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
-    out = Path(f"{options.file.stem}.json") if options.out is None else options.out
     check_output_file(out, "another -o", overwrite=options.overwrite, source=options.file)
     if options.preview is not None:
         check_figure_path(options.preview)
         check_output_file(
             options.preview, "another --preview", overwrite=options.overwrite, source=options.file
         )
-    with show_progress("importing", 3, quiet=options.json or not sys.stderr.isatty()) as done:
-        environment, report, foreign = import_map(
-            options.file, format=options.format, options=options.read, shaping=options.shaping
-        )
-        done(1)
-        save_map(environment, out)
-        done(2)
-        if options.preview is not None:
-            from robocov_app.formats.preview import preview
-
-            preview(foreign, environment, report, options.preview)
-        done(3)
-    files = {"out": str(out)} | ({} if options.preview is None else {"preview": str(options.preview)})
-    print_answer(
-        options, files | report.to_dict(), *report.format_lines(), f"saved in {' and '.join(files.values())}"
-    )

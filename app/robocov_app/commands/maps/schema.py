@@ -12,18 +12,19 @@ from robocov_app.terminal.output import echo
 
 @dataclass
 class Arguments(JsonOption):
-    """Print the JSON Schema of map files, or of session files, for completion and checks in editors.
+    """Print the JSON Schema of map files or session files, for completion and validation in text editors.
 
     Example: robocov schema > robocov-map.schema.json
     """
 
     of: tyro.conf.Positional[Literal["map", "session"]] = "map"
-    """What kind of files."""
+    """Kind of files."""
 
 
 def command(options: Arguments) -> None:
+    """Run `robocov schema`."""
     if options.of == "map":
-        from robocov.mapfile import build_map_schema as schema
+        from robocov.mapfile import build_map_schema as build_schema
     else:
-        from robocov_app.viewer.session.file import session_schema as schema
-    echo(json.dumps(schema(), indent=1))
+        from robocov_app.viewer.session.file import session_schema as build_schema
+    echo(json.dumps(build_schema(), indent=1))
