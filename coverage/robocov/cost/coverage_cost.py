@@ -91,6 +91,7 @@ class CoverageCost:
         self.points = self.sites.points
         self.cells = self.sites.cells
         self.spacing = self.sites.spacing
+        # Each row describes the sites of one tile that are visible from one corner; see `build_corner_views`.
         numbers, lengths = geodesics.run_for_corners(
             partial(find_corner_views, geodesics.walls, tiles), progress
         )

@@ -28,7 +28,8 @@ from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue,
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 _MAX_SMALL_TEAM = 12
-"""Teams up to this size see without a limit: each of so few robots is tested with most sites anyway."""
+"""Size of the largest team for which walls are indexed at any distance: each of so few robots is tested with
+most sites anyway."""
 
 _REACH_PADDING = 1e-9
 """Relative margin added to the reach of a robot's view, far larger than rounding."""
@@ -210,17 +211,17 @@ def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
     for tile in range(len(tiles.boxes)):
         if tile % TILES_PER_GROUP == 0:
             group = tile // TILES_PER_GROUP
-            group_count = _list_possibly_nearest(
+            group_count = _list_nearest_candidates(
                 tiles.group_boxes, group, robots, search.all_robots, len(robots), search.group_robots
             )
-        count = _list_possibly_nearest(
+        count = _list_nearest_candidates(
             tiles.boxes, tile, robots, search.group_robots, group_count, search.tile_robots
         )
         _find_nearest_robots_of_tile(tiles, search, robots, tile, count)
 
 
 @kernel
-def _list_possibly_nearest(
+def _list_nearest_candidates(
     boxes: Array, box: int, robots: Array, candidates: IntArray, count: int, result: IntArray
 ) -> int:
     """List those of the first `count` candidates that may be nearest to a point of a box; return how many."""
@@ -231,11 +232,11 @@ def _list_possibly_nearest(
         dx = max(x - boxes[box, 0], boxes[box, 2] - x)
         dy = max(y - boxes[box, 1], boxes[box, 3] - y)
         bound2 = min(bound2, dx * dx + dy * dy)
-    return _list_within(boxes, box, robots, bound2, candidates, count, result)
+    return _list_robots_within(boxes, box, robots, bound2, candidates, count, result)
 
 
 @kernel
-def _list_within(
+def _list_robots_within(
     boxes: Array, box: int, robots: Array, bound2: float, candidates: IntArray, count: int, result: IntArray
 ) -> int:
     """List those of the first `count` candidates within a squared distance of a box; return how many."""
@@ -259,7 +260,7 @@ def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, ti
         i = search.tile_robots[k]
         x = robots[i, 0]
         y = robots[i, 1]
-        # The loop has no branches, so that the compiler can vectorize it. The lengths are squared up to here.
+        # The loop has no branches, so that the compiler can vectorize it. Lengths are squared until it ends.
         for slot in range(SLOTS):
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y
@@ -309,7 +310,7 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
     for corner in range(len(walls.corners)):
         if corner % LEAF_SIZE == 0:
             leaf = first_leaf + corner // LEAF_SIZE
-            count = _list_possibly_nearest(
+            count = _list_nearest_candidates(
                 boxes, leaf, robots, search.all_robots, len(robots), search.group_robots
             )
         paths.length[corner] = np.inf
@@ -328,7 +329,7 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
             bound = 0.0
             for corner_of_leaf in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
                 bound = max(bound, paths.length[corner_of_leaf])
-            count = _list_within(
+            count = _list_robots_within(
                 boxes, leaf, robots, bound * bound, search.all_robots, len(robots), search.group_robots
             )
         for k in range(count):
@@ -394,7 +395,7 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
         if bound < 0.0:
             continue
         # A site may see another robot, from which the path is shorter than via a corner.
-        group_count = _list_within(
+        group_count = _list_robots_within(
             tiles.group_boxes,
             group,
             robots,
@@ -406,7 +407,7 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
         for tile in range(first, end):
             if search.hidden[tile]:
                 bound = _find_longest_hidden(search, tile)
-                count = _list_within(
+                count = _list_robots_within(
                     tiles.boxes,
                     tile,
                     robots,

@@ -17,7 +17,7 @@ _MAX_CACHED_MAPS = 64
 
 
 class TimeVaryingCost:
-    """The coverage cost (22) at any time, over the robots that count.
+    """The coverage cost (22) at any time, computed from the robots that can move.
 
     Robots that have failed do not count, since they cannot go anywhere. Neither do robots that a moving
     obstacle has run over, until they are free again.
@@ -72,7 +72,7 @@ class TimeVaryingCost:
     def find_counted_robots(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> BoolArray:
-        """Find the robots that count at a time.
+        """Find the robots from which the coverage cost at a time is computed.
 
         Parameters
         ----------

@@ -121,7 +121,7 @@ def require_weight(name: str, value: float, *, above_zero: bool = False) -> None
 
 @dataclass(frozen=True)
 class Uniform(Density):
-    """The same weight everywhere. It differs from no density only in the unit of the cost.
+    """The same weight everywhere, which only scales the coverage cost.
 
     Parameters
     ----------

@@ -264,7 +264,7 @@ def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
     mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
     # At distance 0 the two terms cancel.
     mass[~has_distance] = 0.0
-    # Far from the center squares may overflow; the exponential is zero all the same.
+    # Far from the center, squares may overflow; the exponential is then still zero, as it should be.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))

@@ -35,11 +35,11 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     polygons = shapely.orient_polygons(polygons)
     rings, ring_owners = shapely.get_rings(polygons, return_index=True)
     origins = shapely.get_coordinates(shapely.centroid(polygons))
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    owners = ring_owners[ring]
+    points, ring_of_point = shapely.get_coordinates(rings, return_index=True)
+    owners = ring_owners[ring_of_point]
     points -= origins[owners]
     # No edge leads from the last point of a ring to the first point of the next one.
-    is_edge = ring[1:] == ring[:-1]
+    is_edge = ring_of_point[1:] == ring_of_point[:-1]
     edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], owners[:-1][is_edge])
     return np.maximum(density.compute_moments(edges, origins)[:, 0], 0.0)
 

@@ -111,7 +111,7 @@ class WeightedPolygons(Density):
 
     @cached_property
     def _jumps(self) -> Array:
-        """Edges across which φ jumps, (e, 5): lower end and upper end, m, and φ on the right minus left."""
+        """Edges across which φ jumps, (e, 5): lower end, upper end (m), and φ right minus φ left of it."""
         jumps = [np.empty((0, 5))]
         covered = shapely.MultiPolygon()
         # The last area is on top.
@@ -161,7 +161,7 @@ class WeightedPolygons(Density):
 
 
 def _build_jumps(points: Array, step: float) -> Array:
-    """Return the edges of a closed, counter-clockwise ring that encloses a φ larger by `step`."""
+    """Return the edges of a closed, counter-clockwise ring inside which φ is larger by `step`."""
     start = points[:-1]
     end = points[1:]
     falls = start[:, 1:] > end[:, 1:]
@@ -231,11 +231,11 @@ def _add_jumps(
 
 @inlined_kernel
 def _add_strip(moments: Array, c: int, strip: _Strip, jump: float) -> None:
-    """Add a strip to the moments of cell c. Where the jump is to the right of the edge, nothing counts."""
+    """Add a strip to the moments of cell c. The part where the jump is right of the edge is left out."""
     width_bottom = strip.right_bottom - strip.left_bottom
     width_top = strip.right_top - strip.left_top
     if width_bottom > 0.0 or width_top > 0.0:
-        # If the edge crosses the jump, only the heights on one side of the crossing count.
+        # If the edge crosses the jump, integrate only over the heights on one side of the crossing.
         first = 0.0
         last = 1.0
         if width_bottom < 0.0:
@@ -259,6 +259,6 @@ def _add_strip(moments: Array, c: int, strip: _Strip, jump: float) -> None:
 
 @kernel
 def _find_x(x: float, y: float, u: float, v: float, height: float) -> float:
-    """Return the x at which an edge from (x, y) to (u, v) has a height."""
+    """Return the x coordinate at a height on the edge from (x, y) to (u, v)."""
     fraction = min(max((height - y) / (v - y), 0.0), 1.0)
     return x + fraction * (u - x)

@@ -261,9 +261,10 @@ def _integrate_cells(
 ) -> Array:
     """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges.
 
-    With P(x, y) the integral of φ along the row from the left side of the image to x, the integral of φ
-    over a polygon is that of P dy along its edges. P is a prefix sum over squares and a polynomial within a
-    square. Therefore each edge is divided where it leaves a square, and Gauss's rule is exact on the parts.
+    All lengths are in grid steps, and `left` is that of `_Grid`. With P(x, y) the integral of φ along the row
+    from the left side of the image to x, the integral of φ over a polygon is that of P dy along its edges. P
+    is a prefix sum over squares and a polynomial within a square. Each edge is therefore split where it
+    crosses into another square, and Gauss's rule is exact on each part.
     """
     rows = coefficients.shape[1]
     columns = coefficients.shape[2]
@@ -290,11 +291,11 @@ def _integrate_cells(
             i = min(max(int(np.floor(u0 + middle * du)), 0), columns - 1)
             j = min(max(int(np.floor(v0 + middle * dv)), 0), rows - 1)
             for node in range(3):
-                position = t + (0.5 + _GAUSS_NODE * (node - 1)) * (stop - t)
+                node_t = t + (0.5 + _GAUSS_NODE * (node - 1)) * (stop - t)
                 node_weight = 8.0 if node == 1 else 5.0
                 weight = node_weight / 18.0 * (stop - t) * dv
-                v = v0 + position * dv
-                xi = u0 + position * du - i
+                v = v0 + node_t * dv
+                xi = u0 + node_t * du - i
                 eta = v - j
                 # Along the row, φ is p + q ξ.
                 p = coefficients[0, j, i] + coefficients[2, j, i] * eta

@@ -28,7 +28,7 @@ def build_box_tree(low: Array, high: Array) -> Array:
     Returns
     -------
     (2 k, 4) array
-        The tree; k is a power of two.
+        The tree, as described at the top of this module; k is a power of two.
     """
     leaves = 1
     while leaves * LEAF_SIZE < len(low):

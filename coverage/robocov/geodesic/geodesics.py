@@ -302,7 +302,7 @@ class Geodesics:
     def _compute_corner_distances(
         self, grid_positions: Array, *, must_be_straight: bool
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
-        """Return an index of grid points, their distances to corners, (n, k), and the last one's paths."""
+        """Return the index of n grid points, their distances to corners, (n, k), and the last one's paths."""
         corners = len(self.corners)
         distances = np.empty((len(grid_positions), corners))
         paths = CornerPaths.allocate(corners)
@@ -362,9 +362,10 @@ def _find_corner_distances(
     distances: Array,
     paths: CornerPaths,
 ) -> int:
-    """Write the distances from (n, 2) points to the corners, (n, k); `paths` are those from the last point.
+    """Write the distances from (n, 2) points to the corners, (n, k).
 
-    Return the number of index entries that are used, or -1 if there are too few.
+    `paths` is overwritten for each point, and finally contains the paths from the last one. Return the
+    number of index entries used, or -1 if there are too few.
     """
     corners = len(walls.corners)
     queue = CornerQueue(np.empty(corners + 1, np.int64), np.empty(corners, np.bool_))
@@ -405,8 +406,9 @@ def _combine_distances(
 ) -> None:
     """Write the distances from the sources of an index to (m, 2) targets, (n, m).
 
-    A path is straight, or it leads to a corner, over a distance in `from_sources`, (n, k), and from there
-    straight to the target, over a distance in `to_targets`, (m, k).
+    A path is either straight, or bends last at a corner. Its length is then the sum of the distance from the
+    source to that corner, in `from_sources`, (n, k), and the straight distance from there to the target, in
+    `to_targets`, (m, k).
     """
     corners = np.empty(to_targets.shape[1], np.int64)
     for j in range(len(targets)):

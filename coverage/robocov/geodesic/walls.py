@@ -156,7 +156,10 @@ def _compute_spatial_order(points: Array) -> IntArray:
 
 
 def _find_sectors(segments: _Segments) -> _Sectors:
-    """Find the pairs of incoming and outgoing walls that bound the same wedge of free space."""
+    """Find the pairs of incoming and outgoing walls that bound the same wedge of free space.
+
+    At a pinch, each outgoing wall is paired with the next incoming wall counter-clockwise; see `Walls`.
+    """
     vertices = segments.vertices
     leaving = np.argsort(segments.start, kind="stable")
     arriving = np.argsort(segments.end, kind="stable")

@@ -136,7 +136,8 @@ def compute_lower_bound(
     Raises
     ------
     ParameterError
-        If a parameter is out of range, or no robot of this radius fits where the positions are.
+        If a parameter is out of range, or no robot of this radius fits in the components that contain
+        positions.
     InputError
         If a position is outside the free space; the message names it.
 
@@ -269,7 +270,9 @@ class _Dual:
         # The arcs around corners become chords, which makes the area larger.
         area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
         if area.is_empty:
-            raise ParameterError(f"radius: expected one that fits where the positions are, got {radius:g} m")
+            raise ParameterError(
+                f"radius: expected one that fits in the components of the positions, got {radius:g} m"
+            )
         return area
 
     def _triangulate(self, area: shapely.Geometry) -> Array:
@@ -307,21 +310,21 @@ class _Dual:
             self._table = self._table.append(distances, self._max_prices)
 
     def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
-        """Search for prices, (m,) m, at which the dual on the table is higher.
+        """Search for prices, (m,) m, that raise the dual over the positions in the table.
 
-        Instead of the maximum of the worths, the search uses the smooth ``s log sum exp(worth / s)``.
+        In place of the maximum worth, the search uses the smooth function ``s log sum exp(worth / s)``.
         `smoothing` is s as a fraction of the cost per robot.
         """
         weights = self._weights
         scale = max(self.placement_cost, 1e-9 * self.total_weight * self._geodesics.size)
-        smooth = smoothing * scale / self._robots
+        s = smoothing * scale / self._robots
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
             heartbeat()
             worths = self._table.compute_worths(prices, weights)
             max_worth = worths.max()
-            shares = np.exp((worths - max_worth) / smooth)
-            smooth_max = max_worth + smooth * math.log(shares.sum())
+            shares = np.exp((worths - max_worth) / s)
+            smooth_max = max_worth + s * math.log(shares.sum())
             paid = np.zeros(len(prices))
             add_paid_shares(self._table, prices, shares * (self._robots / shares.sum()), paid)
             dual = float(weights @ prices) - self._robots * smooth_max
@@ -370,7 +373,7 @@ class _Dual:
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost.
 
-        It is below the best bound at these prices by at most the fraction `tolerance` of the cost.
+        The bound is at most `tolerance` times the placement's cost below the best one for these prices.
         """
         slack = tolerance * self.placement_cost / self._robots
         table_worth = self._table.compute_worths(prices, self._weights).max()
@@ -379,13 +382,13 @@ class _Dual:
         count = 0
         triangles = self._triangles
         leaves = []
-        better = [np.empty((0, 3))]
+        better_candidates = [np.empty((0, 3))]
         while len(triangles):
             heartbeat()
             centers, worths, bounds = self.bound_worths(prices, triangles)
             best_worth = max(best_worth, float(worths.max()))
             count += len(triangles)
-            better.append(np.column_stack([worths, centers])[worths > table_worth])
+            better_candidates.append(np.column_stack([worths, centers])[worths > table_worth])
             is_leaf = (bounds <= best_worth + slack) | (count >= _MAX_TRIANGLES)
             worth_bound = max(worth_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
@@ -394,7 +397,7 @@ class _Dual:
         self._triangles = np.concatenate(leaves)
         rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robots
         bound = float(self._weights @ prices) - self._robots * worth_bound - rounding
-        candidates = np.concatenate(better)
+        candidates = np.concatenate(better_candidates)
         by_worth = np.argsort(-candidates[:, 0], kind="stable")
         return _Proof(
             bound=bound,

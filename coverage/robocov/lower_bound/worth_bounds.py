@@ -70,7 +70,7 @@ def bound_worths(
     scratch: TriangleScratch,
     worths: Array,
 ) -> int:
-    """Compute the worths of the centers of triangles, and upper bounds on those of all their points.
+    """Compute the worth of the center of each triangle, and an upper bound on the worth of all its points.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float)
 def _lower_by_corners(
     site_data: SiteData, scratch: TriangleScratch, count: int, site: int, x: float, y: float, radius: float
 ) -> float:
-    """Lower the distance bounds of a site to the tangents of its paths via the first `count` visible corners.
+    """Lower the distance bounds of a site by the tangents of its paths via the first `count` visible corners.
 
     Return the length of the shortest of these paths from the center (x, y).
     """
@@ -163,9 +163,10 @@ def _lower_by_corners(
 def _lower_to_tangent(
     scratch: TriangleScratch, length: float, dx: float, dy: float, first_length: float
 ) -> None:
-    """Lower the distance bounds to the tangent of a path whose first segment points along -(dx, dy).
+    """Lower the distance bounds of the vertices where the tangent of a path length is below them.
 
-    `length` is that of the whole path from the center, `first_length` that of its first segment.
+    The path starts at the center, in the direction -(dx, dy). `length` is the length of the whole path, and
+    `first_length` that of its first segment.
     """
     for vertex in range(3):
         rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]

@@ -163,7 +163,7 @@ class Neighbors:
 
 
 class NeighborPositions(NamedTuple):
-    """The neighbors of each robot, and their positions as far as it knows, as plain arrays for kernels."""
+    """The neighbors of each robot and their positions as known to it, as plain arrays for kernels."""
 
     indptr: IntArray
     """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbors of robot i. Empty if all other

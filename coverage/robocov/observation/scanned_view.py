@@ -17,10 +17,10 @@ _MIN_DISTANCE_M = 1e-9
 """Lower limit of distances in divisions."""
 _MIN_CORNER_DISTANCE_M = 1e-3
 """Lower limit of the distances of corners in divisions."""
-_STEP_DECREASE = 0.5
-"""Factor by which the step changes if the gradient has turned by more than a right angle."""
-_STEP_INCREASE = 1.2
-"""Factor by which the step changes otherwise."""
+_DECREASE = 0.5
+"""Factor by which the fraction of full speed changes if the gradient turns by more than a right angle."""
+_INCREASE = 1.2
+"""Factor by which it changes otherwise, up to full speed."""
 
 
 class View(NamedTuple):
@@ -56,9 +56,9 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
     Parameters
     ----------
     seen : Observations
-        If they contain scans, these are the last ones.
+        If they contain scans, the view is taken from these.
     previous : View or None
-        The view at the previous step. None if there was no scan yet: everything in range is assumed free.
+        The view at the previous step. None before the first scan, when everything in range is assumed free.
     scanning : Scanning
         Settings of the scans.
     reach : (n,) array, m
@@ -178,11 +178,12 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
     return density.evaluate(points.reshape(-1, 2)).reshape(points.shape[:-1])
 
 
-def compute_step_fractions(gradient: Array, previous: Array | None, step: Array | None) -> Array:
+def compute_step_fractions(gradient: Array, previous: Array | None, fraction: Array | None) -> Array:
     """Compute the fraction of full speed with which robots follow discontinuous gradients.
 
-    The visible area has ridges, for example at doors, to which the gradient leads back from both sides. The
-    step is halved whenever the gradient turns by more than a right angle, and grows again otherwise.
+    The visible area has ridges, for example at doors. On both sides of a ridge the gradient points toward it,
+    so that a robot would oscillate. The fraction is halved whenever the gradient turns by more than a right
+    angle, and grows again otherwise.
 
     Parameters
     ----------
@@ -190,7 +191,7 @@ def compute_step_fractions(gradient: Array, previous: Array | None, step: Array 
         Gradients after this scan.
     previous : (n, 2) array or None
         Gradients after the previous scan; None if there was none.
-    step : (n,) array or None
+    fraction : (n,) array or None
         Fractions after the previous scan; None if there was none.
 
     Returns
@@ -198,10 +199,10 @@ def compute_step_fractions(gradient: Array, previous: Array | None, step: Array 
     (n,) array
         At most 1.
     """
-    if previous is None or step is None:
+    if previous is None or fraction is None:
         return np.ones(len(gradient))
     has_turned = (gradient * previous).sum(axis=1) < 0.0
-    return np.where(has_turned, _STEP_DECREASE * step, np.minimum(_STEP_INCREASE * step, 1.0))
+    return np.where(has_turned, _DECREASE * fraction, np.minimum(_INCREASE * fraction, 1.0))
 
 
 @kernel

@@ -121,7 +121,7 @@ def find_optimum(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> Optimum:
-    """Find the best positions of a team on a map that it knows.
+    """Find the best positions for a team that knows the whole map.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ class _Search:
         return self._outcome_by_sources[key]
 
     def _compute_table(self, site_component: IntArray, is_covered: BoolArray) -> Array:
-        """Compute the table. Its targets are one site per component and square block of cells."""
+        """Compute the distance table, with one site for each component in each square block of cells."""
         cost = self.cost
         side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_TARGETS)))
         row, column = np.divmod(cost.cells, cost.lattice)
@@ -305,7 +305,8 @@ class _Search:
     def _find_sources(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> IntArray:
         """Return the sources that one restart finds on the table, sorted, (n,).
 
-        Since the table only approximates the cost, an earlier stage is taken if its exact cost is lower.
+        Since the table only approximates the cost, the result of an earlier stage is used if its exact cost
+        is lower.
         """
         drawn = seed_sources(self.table, self.robots, rng)
         moved = run_lloyd(self.table, drawn, heartbeat=heartbeat)
@@ -315,7 +316,7 @@ class _Search:
 
 
 def _spread_points(area: BaseGeometry, spacing: float) -> Array:
-    """Return points in an area, (p, 2), at least `spacing` apart: a grid, and more points in its gaps."""
+    """Return points in an area, (p, 2), at least `spacing` apart: a coarse grid with its gaps filled."""
     low_x, low_y, high_x, high_y = area.bounds
     step = spacing / _STEPS_PER_SPACING
     step = max(step, math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS))
@@ -328,16 +329,16 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     y = (low_y + high_y) / 2.0 + row * step
     points = np.column_stack([x, y])
     is_inside = shapely.contains_xy(area, x, y)
-    is_on_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
-    chosen = points[is_on_grid]
+    is_on_coarse_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
+    chosen = points[is_on_coarse_grid]
     if len(chosen) == 0:
         point = area.representative_point()
         chosen = np.array([[point.x, point.y]])
-    return _fill_gaps(chosen, points[is_inside & ~is_on_grid], _STEPS_PER_SPACING * step)
+    return _fill_gaps(chosen, points[is_inside & ~is_on_coarse_grid], _STEPS_PER_SPACING * step)
 
 
 def _fill_gaps(points: Array, candidates: Array, spacing: float) -> Array:
-    """Add the candidate that is farthest from all points, again and again, while it is `spacing` away."""
+    """Repeatedly add the candidate farthest from all points, while it is at least `spacing` away."""
     if len(candidates) == 0:
         return points
     distance = np.asarray(cKDTree(points).query(candidates)[0])

@@ -4,7 +4,7 @@ All cells are *unknown* at first. A cell becomes *free* when a ray or a robot pa
 *wall* when a ray ends in it, and remains one until several rays have passed through it since a ray last ended
 there. If the ends of neighboring rays are close together, they belong to one surface: the cells between them
 are *presumed* to be wall until a ray passes through them. Routes may lead through unknown cells. In the
-coverage cost, these count by their `openness`.
+coverage cost, these are weighted by their `openness`.
 """
 
 from __future__ import annotations

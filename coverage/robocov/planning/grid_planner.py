@@ -100,7 +100,7 @@ class GridPlanner(MapWindow):
 
     @cached_property
     def _edges(self) -> Edges:
-        """Edges between nodes, which are longer through unknown cells."""
+        """Edges between nodes; those through unknown cells are longer."""
         return build_edges(
             cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.is_roomy),
             rows=self.window.rows,
@@ -134,7 +134,10 @@ class GridPlanner(MapWindow):
 
     @cached_property
     def sources(self) -> IntArray:
-        """The nodes among which a plan for a team chooses: every k-th one in both directions, (c,)."""
+        """Candidate goals for a team, (c,): the roomy nodes in every k-th row and column of the lattice.
+
+        The stride k is the smallest one that limits their number; see `_MAX_SOURCES`.
+        """
         max_sources = max(_MAX_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
         row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):

@@ -157,7 +157,7 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node = row * columns + column
                 other = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_cells)
-                # A node without room can be reached from one with room, but not the other way round.
+                # A node without room can be reached from one with room, but not the other way around.
                 is_roomy = cells.is_roomy[node]
                 is_other_roomy = cells.is_roomy[other]
                 if is_passable or (is_without_wall and is_roomy and not is_other_roomy):

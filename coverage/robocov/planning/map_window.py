@@ -116,7 +116,7 @@ class MapWindow:
 
     @cached_property
     def expected_free_cells(self) -> Array:
-        """Number of free cells that each node represents, (m,); unknown cells count by their openness."""
+        """Number of free cells that each node represents, (m,); unknown cells are weighted by openness."""
         return self.sum_by_node(self.is_free + self.openness)
 
     @cached_property

@@ -18,7 +18,7 @@ WALK_LENGTH_BLOCKS = 30.0
 MAX_BLOCKS = 1000
 """Default maximum number of blocks into which a map is divided."""
 
-_RELAXATION_FACTOR = 1.9  # the best factor for walks of that length
+_RELAXATION_FACTOR = 1.9  # converges fastest for walks of `WALK_LENGTH_BLOCKS`
 _MAX_ITERATIONS = 1000
 _TOLERANCE = 1e-5
 _OUTSIDE = 255
@@ -134,7 +134,7 @@ def _count_side(state: int, neighbor_state: int, i: int, j: int, blocks: _BlockG
 def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
     """Compute the openness of blocks, (rows + 1, columns + 1), by successive over-relaxation.
 
-    The last row and the last column are padding without links, to which the index -1 also leads.
+    The last row and the last column are padding without links; the index -1 also refers to them.
     """
     block_rows, block_columns = blocks.unknown_cells.shape
     up = blocks.links_up

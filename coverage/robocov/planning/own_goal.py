@@ -82,7 +82,7 @@ def find_own_goal(
 
 
 class _NodeSearch:
-    """Coverage costs with the robot at different nodes, computed as the search comes near them."""
+    """Coverage costs with the robot at different nodes, computed when the search gets close to them."""
 
     def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
         self._planner = planner

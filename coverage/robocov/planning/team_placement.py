@@ -4,7 +4,8 @@ The cost is (22) on the nodes of a `GridPlanner`, each weighted by its area (tim
 
     J(P) = sum over q of w_q min_j d(q, p_j)
 
-with geodesic distances d. An unknown cell counts by the probability that it is free (see `openness`).
+with geodesic distances d. An unknown cell is weighted by the probability that it is free (see
+`openness`).
 """
 
 from typing import NamedTuple
@@ -58,7 +59,7 @@ def compute_node_weights(
     density : Density or None
         It is evaluated at each node; None means 1 everywhere.
     only_known : bool
-        If true, unknown cells do not count. Otherwise, they count by their openness.
+        If true, unknown cells do not count. Otherwise, they are weighted by their openness.
 
     Returns
     -------

@@ -18,7 +18,7 @@ def find_viewpoint(
     min_stake: float,
     former_viewpoints: Sequence[Array],
 ) -> Array | None:
-    """Find a viewpoint for the unknown patch in a robot's own cell that may matter most.
+    """Find the most worthwhile viewpoint on an unknown patch of a robot's own cell.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def find_viewpoint(
     Notes
     -----
     The stake of a patch is its expected contribution to the cost; it is close to zero for the inside of an
-    obstacle. The viewpoint maximizes the stake divided by (1 m + path length).
+    obstacle. The viewpoint maximizes the stake of the patch, divided by (1 m + path length).
     """
     window = planner.window
     raster = planner.known_map.raster
@@ -62,12 +62,12 @@ def find_viewpoint(
     node = np.clip(node, 0, len(path_lengths) - 1)
     stake_per_length = frontier_stakes[is_worth_visiting, None] / (1.0 + path_lengths[node])
     value = frontier.is_side_free[is_worth_visiting] * stake_per_length
-    corner = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
+    first_center = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
-    for x, y in (np.array(former_viewpoints).reshape(-1, 2) - corner) / raster.cell_size:
+    for x, y in (np.array(former_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size:
         value[(x - column) ** 2 + (y - row) ** 2 < min_distance**2] = 0.0
     best = value.argmax()
     if not value.flat[best] > 0.0:
         return None
     cell = np.array([column.flat[best], row.flat[best]])
-    return np.asarray(corner + cell * raster.cell_size)
+    return np.asarray(first_center + cell * raster.cell_size)

@@ -108,7 +108,7 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
 
 @kernel
 def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbors: IntArray) -> None:
-    """Remove cells that no connection depends on, in the given order, until none is left to remove."""
+    """Remove cells that no connection depends on, in the given order, until no more can be removed."""
     columns = is_graph.shape[1]
     has_changed = True
     while has_changed:

@@ -50,7 +50,7 @@ class Comparison(Drawable):
 
     @cached_property
     def summaries(self) -> dict[str, dict[str, Any]]:
-        """Summaries of the runs by label, see `summarize`."""
+        """Summaries of the runs by label; see `summarize`."""
         return {label: summarize(record, self.histories[label]) for label, record in self.records.items()}
 
     def table(self) -> list[dict[str, Any]]:

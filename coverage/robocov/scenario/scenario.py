@@ -40,7 +40,7 @@ from robocov.simulation import Simulation, TeamState, check_dt, check_joins
 from robocov.team import PARAMETERS, Team
 
 MAX_RECORD_ROWS = 2e7
-"""Maximum number of moments times robots in a record: about 2 GB."""
+"""Maximum number of recorded steps times the number of robots: about 2 GB."""
 MAX_DURATION_S = 1e6
 
 
@@ -65,11 +65,11 @@ class Scenario:
     seed : int or None
         Seed of the starting positions, from 0. None if the positions were not sampled.
     starts : (n, 2) array_like or None, m
-        Starting positions, which are not sampled then.
+        Starting positions. By default they are sampled.
     velocities : (n, 2) array_like or None, m/s
         Initial velocities; by default robots are at rest.
     steering : (n, 2) array_like or None, rad and rad/s
-        Initial headings and turning rates of unicycles, see `TeamState`.
+        Initial headings and turning rates of unicycles; see `TeamState`.
     duration : float, s
         Simulated time.
     dt : float, s
@@ -77,7 +77,7 @@ class Scenario:
     conditions : Conditions or None
         Noise, message loss, and robots that fail or join; ideal by default.
     source : ControllerSource or None
-        The file of a controller, if it may no longer be where its name says.
+        The file of the controller, in case it is no longer at the path in the name.
 
     Attributes
     ----------
@@ -196,14 +196,14 @@ class Scenario:
         return round(self.duration / self.dt)
 
     def check(self) -> None:
-        """Check what only becomes known when a run starts.
+        """Check everything that is otherwise only checked when a run starts.
 
-        The code of a controller in a file is run.
+        This runs the code of a controller in a file.
 
         Raises
         ------
         ParameterError
-            If the controller cannot be made, or a robot cannot join where it should.
+            If the controller cannot be built, or a robot cannot join where it should.
         StartError
             If the start is unknown, or has no space for the team.
         """
@@ -217,7 +217,8 @@ class Scenario:
         Parameters
         ----------
         **changes
-            Parameters of `Scenario`. Another controller has its default gains, unless `gains` is given, too.
+            Parameters of `Scenario`. A new controller has its default gains unless `gains` is given
+            as well.
 
         Returns
         -------
@@ -251,7 +252,7 @@ class Scenario:
         return Scenario(**(arguments | changes))
 
     def build_controller(self) -> Controller:
-        """Make the controller; code outside robocov is run.
+        """Build the controller. If it is in a file, this runs the code of the file.
 
         Returns
         -------
@@ -274,11 +275,11 @@ class Scenario:
         Parameters
         ----------
         controller : Controller or None
-            By default that of the scenario.
+            By default the controller of the scenario.
         steps : int
             Number of control steps taken before.
         is_computed : bool
-            Whether a simulation computed the starting positions, see `TeamState`.
+            Whether a simulation computed the starting positions; see `TeamState`.
 
         Returns
         -------
@@ -307,7 +308,7 @@ class Scenario:
         ----------
         controller : Controller
         name : str or None
-            Name under which the controller was found; by default its own.
+            Name of the controller in the record; by default its own.
 
         Returns
         -------
@@ -465,7 +466,7 @@ class Scenario:
         if name not in CONTROLLERS and name not in controllers:
             raise InputError(
                 f"{where}: controller.name: expected a built-in controller, got {quote(name)}; "
-                "a file does not run code unless the user names the controller, too"
+                "a file does not run code unless the user also names the controller"
             )
         try:
             scenario = cls(
@@ -487,7 +488,7 @@ class Scenario:
         return scenario
 
     def save(self, path: Path | str) -> None:
-        """Write the scenario to a JSON file, completely or not at all.
+        """Write the scenario to a JSON file. If this fails, an existing file stays unchanged.
 
         Parameters
         ----------

@@ -177,7 +177,7 @@ class SimulationBatch:
 
     @property
     def working(self) -> BoolArray:
-        """Mask of robots present and not failed, (runs, n) bool; none fails in a batch."""
+        """Mask of the robots that have not failed, (runs, n) bool; in a batch, none fails."""
         return self._world.working.reshape(len(self), -1)
 
     def step(self, *, forces: Array | None = None) -> None:
@@ -186,8 +186,8 @@ class SimulationBatch:
         Parameters
         ----------
         forces : (runs, n, 2) array or None, N
-            Forces that replace the controller's, for example in reinforcement learning. The controller is
-            not called then.
+            Forces that replace the controller's, for example in reinforcement learning. In that case
+            the controller is not called.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class SimulationBatch:
         Returns
         -------
         Observations
-            Row ``r * n + i`` belongs to robot i of run r. Robots hear only those of their own run.
+            Row ``r * n + i`` belongs to robot i of run r. Robots communicate only within their own run.
         """
         if self._observations is None:
             scanning = self._caller.scanning
@@ -296,7 +296,7 @@ class SimulationBatch:
         return self._decision
 
     def restart(self, run: int, starts: Array) -> None:
-        """Restart one run; simulation time continues.
+        """Restart one run from other positions. The simulation time of the batch continues.
 
         Parameters
         ----------
@@ -354,7 +354,7 @@ class SimulationBatch:
         ]
 
     def _to_snapshot(self) -> Snapshot:
-        """Return the current step of all runs, as far as a record needs it."""
+        """Return a snapshot of all runs with everything that a record needs."""
         decision = self._observe_and_decide()
         return Snapshot(self.observe(), Decision(forces=decision.forces, goals=decision.goals))
 

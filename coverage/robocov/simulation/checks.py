@@ -84,7 +84,7 @@ def check_team(team: Any, robots: int) -> Team:
 
 
 def check_conditions(conditions: Any, robots: int) -> Conditions | None:
-    """Check conditions, and return them, or None if they are ideal.
+    """Check conditions. Return None if they are ideal, and otherwise the conditions.
 
     Parameters
     ----------

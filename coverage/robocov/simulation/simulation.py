@@ -201,7 +201,7 @@ class Simulation:
 
     @property
     def working(self) -> BoolArray:
-        """Mask of robots present and not failed, (n,) bool."""
+        """Mask of the robots that are present and have not failed, (n,) bool."""
         return self._world.working
 
     def step(self, external_forces: Array | None = None, *, forces: Array | None = None) -> None:
@@ -213,8 +213,8 @@ class Simulation:
             Forces that act in addition to the controller's, such as those of a pointer that drags a robot;
             see `World.step`. Records do not contain them.
         forces : (n, 2) array or None, N
-            Forces that replace the controller's, for example in reinforcement learning. The controller is
-            not called then.
+            Forces that replace the controller's, for example in reinforcement learning. In that case
+            the controller is not called.
 
         Raises
         ------
@@ -284,7 +284,7 @@ class Simulation:
         return self._snapshot
 
     def _get_knowledge(self) -> _Knowledge:
-        """Return observations and messages of this step, which are computed once."""
+        """Return the observations and messages of this step, computing them only once."""
         if self._knowledge is None:
             observations = self._sense()
             inbox = None

@@ -72,7 +72,7 @@ def _check_rows(name: str, rows: Array, shape: tuple[int, ...], columns: str) ->
 
 
 def to_team_state(starts: Any) -> TeamState:
-    """Return the state of robots at rest at given positions; a state is returned as it is.
+    """Return the state of robots at rest at given positions; return a state unchanged.
 
     Parameters
     ----------

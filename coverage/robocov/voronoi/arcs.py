@@ -28,7 +28,7 @@ CELL = 5
 BEYOND = 6
 """Column of a piece: the robot on the other side, or `robocov.density.cell_edges.REGION`."""
 
-_MAX_SERIES_SQUARE = 0.04
+_MAX_SERIES_SQUARED_SINE = 0.04
 """sin² of the half angle up to which the series is used: for small angles rounding spoils the closed form."""
 
 _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
@@ -72,19 +72,19 @@ def _compute_moments(pieces: Array, cells: int, series: Array) -> Array:
         # The normal points to the right of the chord, and is as long as it.
         normal_x = v - y
         normal_y = x - u
-        square = normal_x * normal_x + normal_y * normal_y
+        squared_length = normal_x * normal_x + normal_y * normal_y
         unit_area, unit_lever, unit_spread = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
-        area = unit_area * square
-        lever = unit_lever * square
-        spread = unit_spread * square * square
+        area = unit_area * squared_length
+        lever = unit_lever * squared_length
+        spread = unit_spread * squared_length * squared_length
         i = int(pieces[k, CELL])
         moments[i, 0] += 0.5 * cross + area
         moments[i, 1] += middle_x * (cross / 3.0 + area) + lever * normal_x
         moments[i, 2] += middle_y * (cross / 3.0 + area) + lever * normal_y
         squares = x * (x + u) + u * u + y * (y + v) + v * v
         shift = lever * (middle_x * normal_x + middle_y * normal_y)
-        middle_square = middle_x * middle_x + middle_y * middle_y
-        moments[i, 3] += cross * squares / 12.0 + spread + 2.0 * shift + area * middle_square
+        squared_middle = middle_x * middle_x + middle_y * middle_y
+        moments[i, 3] += cross * squares / 12.0 + spread + 2.0 * shift + area * squared_middle
     return moments
 
 
@@ -98,16 +98,16 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
     """
     s = np.sin(half_angle)
     c = np.cos(half_angle)
-    square = s * s
-    if square > _MAX_SERIES_SQUARE:
-        h = ((half_angle - s * c) / s**3 - 2.0 / 3.0) / square
+    squared_sine = s * s
+    if squared_sine > _MAX_SERIES_SQUARED_SINE:
+        h = ((half_angle - s * c) / s**3 - 2.0 / 3.0) / squared_sine
     else:
         h = 0.0
         for coefficient in series:
-            h = h * square + coefficient
-    area = s * (2.0 / 3.0 + square * h) / 4.0
-    lever = square * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
-    spread = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - square) * h) / 16.0
+            h = h * squared_sine + coefficient
+    area = s * (2.0 / 3.0 + squared_sine * h) / 4.0
+    lever = squared_sine * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
+    spread = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - squared_sine) * h) / 16.0
     return area, lever, spread
 
 

@@ -52,7 +52,7 @@ _EDGE_BEYOND = 5
 _FIRST_IS_OUTSIDE = 1
 _SECOND_IS_OUTSIDE = 2
 
-_MIN_SQUARE_SINE = 1e-29
+_MIN_SQUARED_SINE = 1e-29
 """sin² of the angle at which two curves meet, below which rounding alone decides whether and where they do.
 One of them then counts as within the other, which moves no boundary by more than rounding does."""
 
@@ -155,8 +155,8 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
             curves[count, _NORMAL_X] = pairs[k, PAIR_DX] / distance
             curves[count, _NORMAL_Y] = pairs[k, PAIR_DY] / distance
             curves[count, _DISTANCE] = nearest
-            squares = (other_speed - own_speed) * (own_speed + other_speed)
-            curves[count, _COEFFICIENT] = 0.5 * (squares / (own_speed * other_speed)) / distance
+            difference_of_squares = (other_speed - own_speed) * (own_speed + other_speed)
+            curves[count, _COEFFICIENT] = 0.5 * (difference_of_squares / (own_speed * other_speed)) / distance
             curves[count, _BEGIN] = -np.inf
             curves[count, _END] = np.inf
             curves[count, _CURVE_CELL] = pairs[k, PAIR_ROBOT]
@@ -194,6 +194,7 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
         normal_x = curves[e, _NORMAL_X]
         normal_y = curves[e, _NORMAL_Y]
         curves[e, _COEFFICIENT] = 0.0
+        # On a line, t is half the signed distance along it from the point nearest to the generator.
         curves[e, _BEGIN] = 0.5 * (normal_x * edges[e, 1] - normal_y * edges[e, 0])
         curves[e, _END] = 0.5 * (normal_x * edges[e, 3] - normal_y * edges[e, 2])
         curves[e, _CURVE_CELL] = edges[e, _EDGE_CELL]
@@ -297,12 +298,12 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
     # 1 - g² as a sum of minors: if the curves meet at a small angle, g itself would leave only rounding.
     b_cross = b1x * b2y - b1y * b2x
     across = a1 * c2 - a2 * c1
-    square_sine = b_cross * b_cross - 4.0 * across * across
-    square_sine += 4.0 * (
+    squared_sine = b_cross * b_cross - 4.0 * across * across
+    squared_sine += 4.0 * (
         (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
     )
-    if square_sine > _MIN_SQUARE_SINE:
-        large = -leftward - np.copysign(np.sqrt(square_sine), leftward)
+    if squared_sine > _MIN_SQUARED_SINE:
+        large = -leftward - np.copysign(np.sqrt(squared_sine), leftward)
         if leftward >= 0.0:
             return large / quadratic, constant / large, 0
         return constant / large, large / quadratic, 0

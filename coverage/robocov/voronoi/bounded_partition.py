@@ -63,8 +63,8 @@ def partition(
     Parameters
     ----------
     generators : (n, 2) array, m
-        They may lie on the region's boundary or outside. Generators at the same position
-        do not cut each other's cells.
+        They may lie on the region's boundary or outside. Generators at the same position do not cut
+        each other's cells.
     region : Region
     neighbors : Neighbors or None
         Communication graph. Cell i is cut only by the bisectors to the neighbors of robot i, and depends, to
@@ -201,7 +201,7 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
 
 
 def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
-    """Create the mesh from which the triangulation starts, without columns if cells are to be clipped."""
+    """Create the mesh from which the triangulation starts; it has no columns if cells must be clipped."""
     if not is_complete or robots < _MIN_TRIANGULATED_ROBOTS:
         return np.empty((2, 0), dtype=np.int32)
     size = 8 * robots + 4
@@ -211,7 +211,7 @@ def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Me
 
 
 def _find_edges(points: Array, sides: Array, known: NeighborPositions, mesh: Mesh, count: int) -> CellEdges:
-    """Compute all cells once more, now with their edges, whose number is known."""
+    """Compute the edges of all cells, by computing the cells again with room for `count` edges."""
     edges = np.empty((count, 6))
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
     # Copies, because read-only arrays are a different type to the compiler.

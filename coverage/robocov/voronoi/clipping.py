@@ -26,7 +26,7 @@ DX = 0
 """Column of a neighbor: its offset from the generator in x, m."""
 DY = 1
 """Column of a neighbor: its offset from the generator in y, m."""
-SQUARE = 2
+SQUARED_DISTANCE = 2
 """Column of a neighbor: its squared distance, m²."""
 ROBOT = 3
 """Column of a neighbor: its number."""
@@ -42,7 +42,7 @@ class Workspace(NamedTuple):
     rings: Array
     """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and one for cuts."""
     neighbors: Array
-    """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARE` and `ROBOT`."""
+    """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARED_DISTANCE`, `ROBOT`."""
 
 
 class CellPolygon(NamedTuple):
@@ -105,9 +105,9 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
     """
     neighbors[count, DX] = dx
     neighbors[count, DY] = dy
-    neighbors[count, SQUARE] = dx * dx + dy * dy
+    neighbors[count, SQUARED_DISTANCE] = dx * dx + dy * dy
     neighbors[count, ROBOT] = robot
-    return count + 1 if neighbors[count, SQUARE] > 0.0 else count
+    return count + 1 if neighbors[count, SQUARED_DISTANCE] > 0.0 else count
 
 
 @inlined_kernel
@@ -139,31 +139,31 @@ def clip_cell(workspace: Workspace, neighbors: int, points: Array, sides: Array,
         rings[ring, k, X] = sides[k, 0] - points[i, 0]
         rings[ring, k, Y] = sides[k, 1] - points[i, 1]
         rings[ring, k, BEYOND] = REGION
-    # A bisector lies half way to the neighbor: no farther neighbor can cut the cell.
-    max_square = _compute_max_square(rings, ring, count)
+    # A neighbor can only cut the cell if it is at most twice as far away as the farthest vertex.
+    squared_range = _compute_squared_range(rings, ring, count)
     for row in range(neighbors):
         if row < _SORTED_NEIGHBORS:
             _move_nearest(neighbor_rows, row, neighbors)
-        if neighbor_rows[row, SQUARE] <= max_square:
+        if neighbor_rows[row, SQUARED_DISTANCE] <= squared_range:
             new_count = _cut(rings, ring, count, neighbor_rows, row)
             if new_count >= 0:
                 ring = 1 - ring
                 count = new_count
-                max_square = _compute_max_square(rings, ring, count)
+                squared_range = _compute_squared_range(rings, ring, count)
         elif row < _SORTED_NEIGHBORS:
             break
     return CellPolygon(ring, count, 0)
 
 
 @inlined_kernel
-def _compute_max_square(rings: Array, ring: int, count: int) -> float:
-    """Return the square of twice the distance from the generator to the farthest vertex, m²."""
-    max_square = 0.0
+def _compute_squared_range(rings: Array, ring: int, count: int) -> float:
+    """Return the square of the largest distance at which a neighbor can cut the polygon, m²."""
+    squared_range = 0.0
     for k in range(count):
         x = rings[ring, k, X]
         y = rings[ring, k, Y]
-        max_square = max(max_square, 4.0 * (x * x + y * y))
-    return max_square
+        squared_range = max(squared_range, 4.0 * (x * x + y * y))
+    return squared_range
 
 
 @inlined_kernel
@@ -171,7 +171,7 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
     """Swap the nearest of the neighbors from `row` onwards into that row."""
     nearest = row
     for k in range(row + 1, count):
-        if neighbor_rows[k, SQUARE] < neighbor_rows[nearest, SQUARE]:
+        if neighbor_rows[k, SQUARED_DISTANCE] < neighbor_rows[nearest, SQUARED_DISTANCE]:
             nearest = k
     for column in range(_NEIGHBOR_COLUMNS):
         neighbor_rows[row, column], neighbor_rows[nearest, column] = (
@@ -184,7 +184,7 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 def _cut(rings: Array, old: int, count: int, neighbor_rows: Array, row: int) -> int:
     """Write the part of a polygon on the generator's side of a bisector to the other ring.
 
-    Return its number of vertices, or -1 if the bisector does not cut the polygon; nothing is written then.
+    Return its number of vertices, or -1, without writing anything, if the bisector does not cut the polygon.
     """
     farthest = _compute_excess(rings, old, count, neighbor_rows, row)
     if farthest < 0:
@@ -228,7 +228,7 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
     """Compute the excess of each vertex over a bisector; return the vertex farthest beyond it, or -1."""
     dx = neighbor_rows[row, DX]
     dy = neighbor_rows[row, DY]
-    level = 0.5 * neighbor_rows[row, SQUARE]
+    level = 0.5 * neighbor_rows[row, SQUARED_DISTANCE]
     farthest = -1
     max_excess = 0.0
     for k in range(count):

@@ -167,7 +167,7 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) ->
     """Compute the cotangents in a triangle with first half-edge h; return whether it is counter-clockwise.
 
     Each is computed from its own corner, so that its last bit does not depend on how the triangle is stored.
-    In a clockwise triangle the sign of the cross product is ignored, so that flips turn it round.
+    In a clockwise triangle the sign of the cross product is ignored, so that flips can correct it.
     """
     is_ccw = True
     for k in range(3):
@@ -216,7 +216,7 @@ def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, tr
 def _flip_from(
     mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flips: int
 ) -> tuple[int, bool]:
-    """Flip the edge of h, and those that are no longer Delaunay because of it, until all are.
+    """Flip the edge of h if it is not Delaunay, then the edges around it, until all of them are.
 
     Return the number of flips so far, -1 on failure, and whether all new triangles are counter-clockwise.
     """

@@ -51,9 +51,9 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
 
     Notes
     -----
-    By the divergence theorem each edge adds, with its sign, the part in the disc of the triangle that it
-    spans with the generator: a smaller triangle for the part of the edge inside the disc, sectors for the
-    rest.
+    By the divergence theorem, an integral over a cell is a sum of signed contributions of its edges. Each
+    edge contributes the triangle that it spans with the generator, clipped to the disc: a smaller triangle
+    for the part of the edge inside the disc, and circular sectors for the rest.
     """
     cells = len(radii)
     # A disc that contains the whole cell cuts nothing, however large it is.
@@ -122,12 +122,12 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
 def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
     """Cut edges by discs around their generators, of radius (e,) m for each edge."""
     step = edges.end - edges.start
-    square_length = np.maximum((step * step).sum(axis=1), 1e-300)
+    squared_length = np.maximum((step * step).sum(axis=1), 1e-300)
     # The edge is start + t step with t from 0 to 1; the disc contains it from middle - half to middle + half.
-    middle = -(edges.start * step).sum(axis=1) / square_length
+    middle = -(edges.start * step).sum(axis=1) / squared_length
     nearest = edges.start + middle[:, None] * step
-    half_square = (radius * radius - (nearest * nearest).sum(axis=1)) / square_length
-    half = np.sqrt(np.maximum(half_square, 0.0))
+    squared_half = (radius * radius - (nearest * nearest).sum(axis=1)) / squared_length
+    half = np.sqrt(np.maximum(squared_half, 0.0))
     first = edges.start + np.clip(middle - half, 0.0, 1.0)[:, None] * step
     last = edges.start + np.clip(middle + half, 0.0, 1.0)[:, None] * step
     return _CutEdges(

@@ -33,9 +33,10 @@ def find_own_samples(
             if is_own[i, k]:
                 x = samples[k, 0]
                 y = samples[k, 1]
-                square = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
+                squared_distance = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
                 is_own[i, k] = (
-                    square <= (x - neighbor_positions[m, 0]) ** 2 + (y - neighbor_positions[m, 1]) ** 2
+                    squared_distance
+                    <= (x - neighbor_positions[m, 0]) ** 2 + (y - neighbor_positions[m, 1]) ** 2
                 )
     return is_own
 

@@ -11,7 +11,7 @@ from robocov.voronoi.clipping import (
     DX,
     DY,
     ROBOT,
-    SQUARE,
+    SQUARED_DISTANCE,
     CellArrays,
     CellPolygon,
     Workspace,
@@ -24,8 +24,8 @@ from robocov.voronoi.clipping import (
 from robocov.voronoi.delaunay import CORNER, TWIN, Mesh, get_next, get_previous, update_triangulation
 
 _MASS_TOLERANCE = 1e-12
-"""Difference between the sum of masses and the area of the region, relative to the latter, that counts as
-rounding."""
+"""Difference between the total area of the cells and the area of the region, relative to the latter, that
+counts as rounding."""
 
 
 class Triangulation(NamedTuple):
@@ -44,11 +44,11 @@ class _Fan(NamedTuple):
 
     neighbors: int
     """Number of neighbors, and of Voronoi vertices."""
-    first: int
+    half_edge_to_lowest: int
     """Half-edge to the neighbor with the lowest number."""
-    start: int
+    lowest: int
     """Position of that neighbor among the neighbors."""
-    max_square: float
+    squared_reach: float
     """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
 
 
@@ -56,7 +56,7 @@ class _Fan(NamedTuple):
 def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: CellArrays) -> int:
     """Compute all cells from a Delaunay triangulation.
 
-    A cell that is clipped by too few robots is too large. Therefore the cells are correct if their masses add
+    A cell that was clipped by too few robots is too large. The cells are therefore correct if their areas add
     up to the area of the region.
 
     Parameters
@@ -154,11 +154,11 @@ def _find_cell(
     clearance = np.inf
     for k in range(len(sides)):
         clearance = min(clearance, sides[k, 4] - (sides[k, 2] * points[i, 0] + sides[k, 3] * points[i, 1]))
-    if clearance > 0.0 and fan.max_square < clearance * clearance:
-        return CellPolygon(0, fan.neighbors, fan.start)
+    if clearance > 0.0 and fan.squared_reach < clearance * clearance:
+        return CellPolygon(0, fan.neighbors, fan.lowest)
     # Start at the neighbor with the lowest number, so that the result does not depend on the order of the
     # triangles.
-    fan = _walk_around(workspace, triangulation, points, i, fan.first)
+    fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbors, points, sides, i)
 
 
@@ -166,42 +166,42 @@ def _find_cell(
 def _walk_around(
     workspace: Workspace, triangulation: Triangulation, points: Array, i: int, first_half_edge: int
 ) -> _Fan:
-    """Write neighbors and Voronoi vertices of robot i, counter-clockwise from a half-edge on."""
+    """Write the neighbors and Voronoi vertices of robot i, counter-clockwise from its first half-edge."""
     mesh = triangulation.mesh
     cotangents = triangulation.cotangents
     neighbor_rows = workspace.neighbors
     rings = workspace.rings
     n = len(points)
     count = 0
-    lowest = n
-    first = first_half_edge
-    start = 0
-    max_square = 0.0
+    lowest_robot = n
+    half_edge_to_lowest = first_half_edge
+    lowest = 0
+    squared_reach = 0.0
     h = first_half_edge
     while True:
         back = get_previous(h)
         j = mesh[CORNER, get_next(h)]
         if j < n:
-            if j < lowest:
-                lowest = j
-                first = h
-                start = count
+            if j < lowest_robot:
+                lowest_robot = j
+                half_edge_to_lowest = h
+                lowest = count
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
             # The vertex lies on the bisector, to its left by half the distance times the cotangent.
             x = 0.5 * (dx - cotangents[h] * dy)
             y = 0.5 * (dy + cotangents[h] * dx)
-            max_square = max(max_square, x * x + y * y)
+            squared_reach = max(squared_reach, x * x + y * y)
             neighbor_rows[count, DX] = dx
             neighbor_rows[count, DY] = dy
-            neighbor_rows[count, SQUARE] = dx * dx + dy * dy
+            neighbor_rows[count, SQUARED_DISTANCE] = dx * dx + dy * dy
             neighbor_rows[count, ROBOT] = j
             rings[0, count, X] = x
             rings[0, count, Y] = y
             rings[0, count, BEYOND] = mesh[CORNER, back]
             count += 1
         else:
-            max_square = np.inf
+            squared_reach = np.inf
         h = mesh[TWIN, back]
         if h == first_half_edge:
-            return _Fan(count, first, start, max_square)
+            return _Fan(count, half_edge_to_lowest, lowest, squared_reach)

@@ -73,10 +73,11 @@ class WeightedCells(Cells):
 
     @cached_property
     def outlines(self) -> tuple[list[Array], IntArray]:
-        """The outlines of the cells, (k, 2) m each, and the cell of each; arcs are replaced by chords.
+        """The outlines of the cells as polygons, (k, 2) m each, and the cell that each outline belongs to.
 
-        Outlines run counter-clockwise around a component of a cell, clockwise around a hole. The cells of
-        fast robots come first, so that painting the outlines in order shows the partition even without holes.
+        Chords replace the arcs. Outlines run counter-clockwise around a component of a cell, clockwise around
+        a hole. The cells of fast robots come first, so that painting the outlines in order shows the
+        partition even without holes.
         """
         outlines = []
         cells = []
@@ -212,5 +213,5 @@ def _convert_speeds(values: object, robots: int) -> Array:
 
 
 def _to_list(values: object) -> object:
-    """Return an array as a list, which messages can quote, and anything else as it is."""
+    """Convert an array to a list, which messages can quote; return anything else unchanged."""
     return values.tolist() if isinstance(values, np.ndarray) else values

@@ -3,8 +3,8 @@
 Besides positions and velocities, pymunk stores cached impulses, overlap corrections that it has yet to
 apply, and a search tree whose shape depends on the past. A step must depend on nothing but positions and
 velocities, so that a copy of a world continues identically, bit for bit. Therefore all robots are first moved
-as if nothing touched (`FreeSpace`), and those that pymunk reports in contact are moved again, from the same
-state, by a `ContactSolver`, which stores nothing between steps.
+as if there were no contacts (`FreeSpace`), and those that pymunk reports in contact are moved again, from the
+same state, by a `ContactSolver`, which stores nothing between steps.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ _COLLISION_SLOP_M = 1e-4
 _MIN_ITERATIONS = 20
 """Solver iterations for robots of equal mass."""
 _MAX_CORNER_WALLS = 3
-"""Walls that a pushed robot is moved out of, one after the other, in a corner."""
+"""Maximum number of walls in a corner that a pushed robot is moved out of, one after the other."""
 
 
 class FreeSpace:
-    """Moves robots as if nothing touched, and reports which of them did touch something.
+    """Moves robots as if there were no contacts, and reports which robots did touch something.
 
     Several teams may share the space; robots of different teams pass through each other.
 
@@ -201,8 +201,8 @@ class ContactSolver:
             self._space.remove(*discs)
             self._arrays.read_states()
             final = self._arrays.states[rows].copy()
-            for robot, (vx, vy) in enumerate(final[:, 2:].tolist()):
-                final[robot, 2:] *= compute_clip_factor(vx, vy, float(max_speed[robot]))
+            for row, (vx, vy) in enumerate(final[:, 2:].tolist()):
+                final[row, 2:] *= compute_clip_factor(vx, vy, float(max_speed[row]))
             self._finish_corrections(members, dt / substeps)
             final[:, :2] = self._arrays.states[rows, :2]
             return final
@@ -214,13 +214,15 @@ class ContactSolver:
 
     def _count_substeps(self, robots: IntArray, states: Array, net_forces: Array, dt: float) -> int:
         """Return the number of substeps in which no robot sinks into anything by more than allowed."""
-        max_square = 0.0
+        max_squared_speed = 0.0
         mass = self._team.mass[robots].tolist()
         for (_, _, vx, vy), (fx, fy), m in zip(states.tolist(), net_forces.tolist(), mass, strict=True):
             final_vx = vx + fx * (dt / m)
             final_vy = vy + fy * (dt / m)
-            max_square = max(max_square, vx * vx + vy * vy, final_vx * final_vx + final_vy * final_vy)
-        speed = math.sqrt(max_square) + self._max_mover_speed
+            max_squared_speed = max(
+                max_squared_speed, vx * vx + vy * vy, final_vx * final_vx + final_vy * final_vy
+            )
+        speed = math.sqrt(max_squared_speed) + self._max_mover_speed
         return min(_MAX_SUBSTEPS, max(1, math.ceil(speed * dt / self._max_travel)))
 
     def _run_substeps(

@@ -1,6 +1,6 @@
 """Free motion of robots: viscosity and kinematic limits, combined into one net force per robot.
 
-A controller returns a force. Equation (28) with the physical sign, m q'' = F - nu q', is solved exactly over
+A controller returns a force. Equation (28) with its sign corrected, m q'' = F - nu q', is solved exactly over
 a substep, so that viscosity is stable for any time step; then the change of velocity and the speed are
 limited. The net force takes a point mass from its velocity to the resulting one within the substep. It is
 what pymunk integrates.
@@ -76,9 +76,9 @@ def compute_clip_factor(x: float, y: float, limit: float) -> float:
     float
         At most 1; exactly 1 if the vector is short enough.
     """
-    square = x * x + y * y
-    if square > limit * limit:
-        return limit / math.sqrt(square)
+    squared_length = x * x + y * y
+    if squared_length > limit * limit:
+        return limit / math.sqrt(squared_length)
     return 1.0
 
 

@@ -14,7 +14,7 @@ from robocov.team import Team
 _CLEARANCE_M = 1e-3
 """Clearance that a robot keeps from walls and robots when it is moved away from them."""
 _MAX_ROUNDS = 300
-"""Maximum number of rounds; robots that still overlap then do not fit next to each other."""
+"""Maximum number of rounds, after which robots that still overlap are assumed not to fit."""
 _QUADRANT_SEGMENTS = 16
 """Edges per quadrant of the polygons that represent the discs of other robots."""
 

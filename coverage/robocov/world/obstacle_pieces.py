@@ -47,7 +47,7 @@ class Obstacles:
     Attributes
     ----------
     walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, see `build_solid_pieces`.
+        Convex polygons that tile everything that is not free; see `build_solid_pieces`.
     movers : tuple of Mover
         Moving obstacles.
     failed_robots : (w, 3) array or None, m
@@ -79,9 +79,9 @@ def build_obstacles(environment: Environment) -> Obstacles:
 
 
 def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
-    """Build convex polygons that tile all static obstacles and the outside of the map.
+    """Build convex polygons that tile the static obstacles and the surroundings of the map.
 
-    They cover the obstacles at rest, the area outside the boundary, and a frame around the region.
+    The surroundings extend `FRAME_WIDTH_M` beyond the bounding box of the region.
 
     Parameters
     ----------

@@ -10,9 +10,9 @@ and a turning rate ω. In every substep it turns that acceleration into
 - a speed, from the acceleration along the heading, a·h. The part of a across the heading that turning at v ω
   does not provide is replaced by braking: v* = v + dt (a·h - max(0, |a × h| - v ω)), and at least 0.
 
-So it turns in place if the point would move off in another direction, and drives once it nearly faces it.
-The wheels, v ∓ ω b / 2 with the track width b, approach these speeds as fast as `max_acceleration` allows.
-Braking comes first, then the turn, then speeding up; the turn takes its share of `max_speed` first.
+So it turns in place if the point would move off in another direction, and drives once it nearly faces that
+way. The wheels, v ∓ ω b / 2 with the track width b, approach these speeds as fast as `max_acceleration`
+allows. Braking comes first, then the turn, then speeding up; the turn takes its share of `max_speed` first.
 Such heading control (ω from e, speed from the projection on the heading) is that of Aicardi, Casalino, Bicchi
 and Balestrino (1995) and Astolfi (1999), as it is commonly described; their texts were not consulted.
 
@@ -26,7 +26,7 @@ Guarantees:
   velocity.
 
 Freedom from contact is not guaranteed. A point turns its velocity by up to max_acceleration / v, which at low
-speed is more than the turning rate; a unicycle brakes meanwhile, but it moves straight ahead while it does. A
+speed is more than the turning rate; a unicycle brakes instead, but keeps moving straight ahead meanwhile. A
 proof that a controller avoids all contact, such as that of safety barrier certificates, therefore holds for
 points alone. For unicycles it is tested on maps, not proven.
 """

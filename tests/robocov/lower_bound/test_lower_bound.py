@@ -188,7 +188,7 @@ def test_the_same_call_gives_the_same_bits():
         (
             {"radius": 3.0},
             ParameterError,
-            "radius: expected one that fits where the positions are, got 3 m",
+            "radius: expected one that fits in the components of the positions, got 3 m",
         ),
         ({"precision": 0.0}, ParameterError, "precision: expected a number from 1e-05 to 1, got 0.0"),
         ({"lattice": 0}, ParameterError, "lattice: expected a whole number from 1 to 4096, got 0"),

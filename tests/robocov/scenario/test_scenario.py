@@ -218,7 +218,7 @@ def test_a_document_runs_code_only_if_the_user_names_it_too(tmp_path: Path) -> N
     )
     name = f"{module}:Mine"
     content = {**MINIMAL, "controller": {"name": name}, "team": {"robots": 2}, "duration_s": 0.1}
-    with pytest.raises(InputError, match="does not run code unless the user names the controller, too"):
+    with pytest.raises(InputError, match="does not run code unless the user also names the controller"):
         rc.Scenario.from_json(content)
     assert not Path(f"{module}.ran").exists()
     scenario = rc.Scenario.from_json(content, controllers=[name])
