@@ -158,7 +158,7 @@ class ArrayCache:
 
     @staticmethod
     def compute_key(*parts: bytes | str | float) -> str:
-        """Compute the key of arrays from what they are computed from.
+        """Compute the key of arrays from the inputs that determine them.
 
         Parameters
         ----------

@@ -43,7 +43,7 @@ def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> I
         lock.acquire()
     except Timeout:
         raise OutputError(
-            f"{folder}: another process is at work in this folder; wait until it has ended"
+            f"{folder}: another process is using this folder; wait until it has ended"
         ) from None
     except OSError as error:
         if error.errno not in _UNSUPPORTED:

@@ -230,7 +230,7 @@ def require_json(value: object, where: str) -> None:
     Raises
     ------
     MapError
-        If the value contains anything other than finite numbers, texts, lists and objects, true, false and
+        If the value contains anything other than finite numbers, strings, lists and objects, true, false and
         null, or is nested too deeply.
     """
     mistake = _find_first_mistake(value, ())

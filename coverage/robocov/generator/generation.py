@@ -58,7 +58,7 @@ _CENTER_DISC_FRACTION = 0.8
 _CENTER_OFFSET_WEIGHT = 0.2
 """Clearance, m, that outweighs one meter of distance from the middle."""
 _SCORE_DIGITS = 9
-"""Scores are rounded so that rounding errors do not decide between equal ones."""
+"""Scores are rounded to this, so that rounding errors do not decide between equal scores."""
 _GAP_TOLERANCE_M = 1e-6
 
 
@@ -72,7 +72,7 @@ class MapKind:
         Builds the obstacles.
     description : str
     counted : str
-        Plural name of the objects that the number of obstacles counts.
+        Plural name of the objects that `obstacles` counts.
     obstacles : int
         Default number of them.
     area : float

@@ -33,7 +33,7 @@ def lock_in_another_process(folder: Path) -> str:
 def test_a_folder_is_locked_for_other_processes_until_the_block_ends(tmp_path: Path) -> None:
     with lock_folder(tmp_path):
         assert lock_in_another_process(tmp_path) == (
-            f"{tmp_path}: another process is at work in this folder; wait until it has ended"
+            f"{tmp_path}: another process is using this folder; wait until it has ended"
         )
     assert lock_in_another_process(tmp_path) == "locked"
 
@@ -41,7 +41,7 @@ def test_a_folder_is_locked_for_other_processes_until_the_block_ends(tmp_path: P
 def test_a_folder_is_locked_for_the_same_process_too(tmp_path: Path) -> None:
     with (
         lock_folder(tmp_path),
-        pytest.raises(OutputError, match="another process is at work"),
+        pytest.raises(OutputError, match="another process is using"),
         lock_folder(tmp_path),
     ):
         pass

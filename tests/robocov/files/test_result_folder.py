@@ -114,7 +114,7 @@ def test_a_second_process_is_told_that_the_folder_is_in_use(tmp_path: Path) -> N
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None and process.stdout is not None
         assert process.stdout.readline() == "started\n"
-        with pytest.raises(OutputError, match="another process is at work in this folder"):
+        with pytest.raises(OutputError, match="another process is using this folder"):
             saved(tmp_path / "x", NEW)
         process.stdin.write("\n")
     assert not (tmp_path / "x").exists()

@@ -312,7 +312,7 @@ def test_a_program_that_is_disturbed_while_it_begins_takes_another_folder(folder
     def disturbed(place):
         times.append(place)
         if len(times) == 1:
-            raise OutputError(f"{place}: another process is at work in this folder")
+            raise OutputError(f"{place}: another process is using this folder")
         return lock(place)
 
     monkeypatch.setattr(autosave, "lock_folder", disturbed)

@@ -262,7 +262,7 @@ def test_a_folder_that_cannot_be_written_to_is_said_so(tmp_path: Path) -> None:
 
 
 def test_one_process_is_at_work_in_a_folder(tmp_path: Path) -> None:
-    busy = pytest.raises(OutputError, match="another process is at work")
+    busy = pytest.raises(OutputError, match="another process is using")
     with opened(tmp_path, STUDY), busy, opened(tmp_path, STUDY):
         pass
     with opened(tmp_path, STUDY):
@@ -278,7 +278,7 @@ def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "locked\n"
-        with pytest.raises(OutputError, match="another process is at work"), opened(tmp_path, STUDY):
+        with pytest.raises(OutputError, match="another process is using"), opened(tmp_path, STUDY):
             pass
         process.kill()
         process.wait()

@@ -294,7 +294,7 @@ def test_where_nobody_does_runs_that_is_told_once(
 
 def test_two_sweeps_do_not_share_a_folder(study: Study, tmp_path: Path, here: Here) -> None:
     def another() -> None:
-        with pytest.raises(OutputError, match="another process is at work in this folder"):
+        with pytest.raises(OutputError, match="another process is using this folder"):
             sweep(study, tmp_path, quiet=True)
 
     here.before = another
