@@ -9,7 +9,7 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
-from robocov_app.editor.canvas import canvas
+from robocov_app.editor.canvas import layers
 from robocov_app.editor.edits.create import add_circle, add_polygon
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
@@ -429,7 +429,7 @@ def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path
     shapes = [CircleObstacle((k % 20 * 0.45 + 0.5, k // 20 * 0.8 + 0.5), 0.2) for k in range(210)]
     pictures = []
     for many in (200, 10_000):
-        monkeypatch.setattr(canvas, "MANY", many)
+        monkeypatch.setattr(layers, "MANY_OBJECTS", many)
         with opened_editor(tmp_path, sheet(*shapes)) as hands:
             hands.key("ctrl+a")
             hands.frames(2)

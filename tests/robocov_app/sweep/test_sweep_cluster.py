@@ -121,7 +121,7 @@ def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp
 def test_nobody_at_the_address_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster_module, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
     study = tmp_path / "study.toml"
     study.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
     with socket.socket() as silent:

@@ -209,9 +209,9 @@ def test_a_worker_ends_with_its_parent_also_in_the_midst_of_what_is_not_python(t
 def test_where_no_process_can_begin_it_is_said_why(
     tasks: list[Task], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    started = pool_module.started
+    start_process = pool_module.start_process
     monkeypatch.setattr(
-        pool_module, "started", lambda _, **said: started("robocov_app.sweep.nothing", **said)
+        pool_module, "start_process", lambda _, **said: start_process("robocov_app.sweep.nothing", **said)
     )
     with (
         LocalPool(1) as pool,
@@ -235,7 +235,7 @@ def test_a_worker_that_is_killed_while_it_starts_is_told(monkeypatch: pytest.Mon
         pipe = subprocess.PIPE
         return subprocess.Popen([sys.executable, "-c", dying], stdin=pipe, stdout=pipe)
 
-    monkeypatch.setattr(pool_module, "started", start)
+    monkeypatch.setattr(pool_module, "start_process", start)
     with LocalPool(1) as pool:
         pool.submit(next(iter(tasks_of(small_study()))))
         ending = r"worker killed by signal 9 \(SIGKILL\) while starting$"

@@ -169,7 +169,9 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
 def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Launcher:
     """Return how a window opens that somebody would watch, on a display that nobody sees."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(opening, "display", lambda headless, otherwise: open_display(headless=True))
+    monkeypatch.setattr(
+        opening, "open_display", lambda headless, missing_message: open_display(headless=True)
+    )
     return Launcher(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 
@@ -235,7 +237,7 @@ def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyP
 def test_a_scale_takes_the_window_that_it_needs_or_says_so(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(opening, "fitting", lambda size: (min(size[0], 1500), min(size[1], 1000)))
+    monkeypatch.setattr(opening, "fit_to_screen", lambda size: (min(size[0], 1500), min(size[1], 1000)))
     with opened_for_a_person(monkeypatch, tmp_path, scale=1.5).window() as window:
         assert window.layout.scale == 1.5 and window.screen.get_size() == (1350, 900)
     with opened_for_a_person(monkeypatch, tmp_path, scale=2.0).window() as window:
