@@ -21,9 +21,9 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError, format_count, quote
 from robocov_app.formats import files
 from robocov_app.formats.building_floor import (
-    DOOR_WIDTH_M,
+    DEFAULT_DOOR_WIDTH_M,
     MAX_FLOORS,
-    IndoorFigure,
+    FloorElement,
     Role,
     build_floor,
     choose_floor,
@@ -31,7 +31,7 @@ from robocov_app.formats.building_floor import (
 )
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
-from robocov_app.formats.georeference import DEGREES, in_metres
+from robocov_app.formats.georeference import DEGREES, convert_to_metres
 from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.osm_data import OsmData, OsmElement, is_osm, read_osm
 
@@ -82,7 +82,7 @@ def _read_outdoors(data: OsmData, shapes: Shapes, name: str) -> ForeignMap:
         origin = ((west + east) / 2, (south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
         figures.append(SourceGeometry("polygon", (corners,), (BOUNDARY,), "bounds"))
-    shapes.add_all(in_metres(figures, shapes, DEGREES, origin=origin))
+    shapes.add_all(convert_to_metres(figures, shapes, DEGREES, origin=origin))
     gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
     if gates:
         shapes.notes.append(f"{format_count(gates, 'gate')} taken as closed")
@@ -215,7 +215,7 @@ def _is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
     return max(floors.values()) >= _MIN_INDOOR_SHARE * covered
 
 
-def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigure]:
+def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[FloorElement]:
     """Return the parts of a level, in metres."""
     roles: list[Role] = []
     figures: list[SourceGeometry] = []
@@ -248,9 +248,9 @@ def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigu
     door_lines = _find_doors(data, doors, walls)
     if lost := len(doors) - len(door_lines):
         shapes.leave_out("door", "in no wall of this level", lost)
-    placed = in_metres([*figures, *door_lines], shapes, DEGREES)
-    floor_figures = [IndoorFigure(role, figure) for role, figure in zip(roles, placed, strict=False)]
-    return floor_figures + [IndoorFigure("opening", _span_door(figure)) for figure in placed[len(figures) :]]
+    placed = convert_to_metres([*figures, *door_lines], shapes, DEGREES)
+    floor_figures = [FloorElement(role, figure) for role, figure in zip(roles, placed, strict=False)]
+    return floor_figures + [FloorElement("opening", _span_door(figure)) for figure in placed[len(figures) :]]
 
 
 def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[SourceGeometry]:
@@ -283,5 +283,5 @@ def _span_door(figure: SourceGeometry) -> SourceGeometry:
     before, middle, after = figure.rings[0]
     along = after - before if (after != before).any() else after - middle
     length = float(np.hypot(*along))
-    half: Array = along * ((figure.width or DOOR_WIDTH_M) / 2 / max(length, 1e-9))
+    half: Array = along * ((figure.width or DEFAULT_DOOR_WIDTH_M) / 2 / max(length, 1e-9))
     return SourceGeometry("line", (np.array([middle - half, middle + half]),), figure.labels, figure.at)

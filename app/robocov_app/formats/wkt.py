@@ -39,7 +39,7 @@ from robocov_app.formats.geometry.polygons import (
 )
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import in_metres
+from robocov_app.formats.georeference import convert_to_metres
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.reports import ExportReport
 
@@ -230,7 +230,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
-    figures = in_metres(parsed.figures(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
+    figures = convert_to_metres(parsed.figures(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
     if options.outlines is None and any(figure.kind == "polygon" for figure in figures):
         shapes.options = replace(options, outlines="free")
         figures = _exclude_holes(figures, shapes)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import in_metres
+from robocov_app.formats.georeference import convert_to_metres
 
 PLAIN = ReadOptions()
 _GLOBE = pyproj.Geod(ellps="WGS84")
@@ -21,7 +21,7 @@ _GLOBE = pyproj.Geod(ellps="WGS84")
 def moved(points: Any, options: ReadOptions = PLAIN, **given: Any) -> tuple[np.ndarray, list[str]]:
     shapes = Shapes("plan", options)
     given = {"crs": None, **given}
-    (figure,) = in_metres([SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **given)
+    (figure,) = convert_to_metres([SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **given)
     return figure.rings[0], shapes.notes
 
 
@@ -35,7 +35,7 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
     narrow = max(np.cos(np.radians(latitude)), 0.05)
     degrees = np.array([(longitude + 0.02 / narrow * x, latitude + 0.02 * y) for x, y in places])
     degrees[:, 0] = (degrees[:, 0] + 180.0) % 360.0 - 180.0  # across the antimeridian as well
-    metres, (note,) = moved(degrees, globe=True)
+    metres, (note,) = moved(degrees, may_be_degrees=True)
     assert note.startswith("degrees projected to metres about longitude")
     azimuth, _, length = _GLOBE.inv(*degrees[:-1].T, *degrees[1:].T)
     step = np.diff(metres, axis=0)
@@ -47,14 +47,14 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
 
 
 def test_what_is_wide_is_metres() -> None:
-    metres, (note,) = moved([[0, 0], [20, 10]], globe=True)
+    metres, (note,) = moved([[0, 0], [20, 10]], may_be_degrees=True)
     assert metres.tolist() == [[0, 0], [20, 10]]
     assert "as degrees the map would be larger than 10 km" in note
-    assert moved([[500, 0], [520, 10]], globe=True)[0][0, 0] == 500.0
+    assert moved([[500, 0], [520, 10]], may_be_degrees=True)[0][0, 0] == 500.0
     assert moved([[0, 0], [20, 10]])[1] == []
     assert moved([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]
     # ten kilometres are more degrees near the pole
-    assert "degrees projected" in moved([[10, 85], [10.9, 85.05]], globe=True)[1][0]
+    assert "degrees projected" in moved([[10, 85], [10.9, 85.05]], may_be_degrees=True)[1][0]
     assert "degrees projected" in moved([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]
 
 
@@ -63,7 +63,7 @@ def test_a_system_is_obeyed() -> None:
     to_utm = pyproj.Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
     utm = np.column_stack(to_utm.transform(*degrees.T))
     here = {"origin": (8.4, 49.0)}
-    direct, _ = moved(degrees, globe=True, **here)
+    direct, _ = moved(degrees, may_be_degrees=True, **here)
     assert direct[0] == pytest.approx([0, 0], abs=1e-9)
     for name in ("EPSG:25832", "urn:ogc:def:crs:EPSG::25832", "http://www.opengis.net/def/crs/EPSG/0/25832"):
         metres, (note,) = moved(utm, crs=name, **here)
@@ -103,8 +103,8 @@ def test_what_no_place_is_is_refused(crs: str, points: Any, wanted: str) -> None
 def test_without_pyproj_there_is_one_line_with_the_way_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(MapError, match=r'^plan: coordinates in degrees: .*pip install "robocov\[geo\]"'):
-        moved([[8, 49], [8.001, 49.001]], globe=True)
-    assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="metres"), globe=True)[0][0, 0] == 8.0
+        moved([[8, 49], [8.001, 49.001]], may_be_degrees=True)
+    assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="metres"), may_be_degrees=True)[0][0, 0] == 8.0
 
 
 def test_figures_keep_their_rings() -> None:
@@ -112,7 +112,7 @@ def test_figures_keep_their_rings() -> None:
         SourceGeometry("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
         SourceGeometry("point", (np.full((1, 2), 5.0),)),
     ]
-    scaled = in_metres(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
+    scaled = convert_to_metres(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
     assert [[len(ring) for ring in figure.rings] for figure in scaled] == [[4, 3], [1]]
     assert (scaled[0].rings[1] == 2.0).all()
     assert (scaled[0].labels, scaled[0].at, scaled[1].rings[0].tolist()) == (
@@ -121,4 +121,4 @@ def test_figures_keep_their_rings() -> None:
         [[10.0, 10.0]],
     )
     nothing = Shapes("plan", ReadOptions(units="degrees"))
-    assert (in_metres([], nothing, None, globe=True), nothing.notes) == ([], [])
+    assert (convert_to_metres([], nothing, None, may_be_degrees=True), nothing.notes) == ([], [])
