@@ -1,4 +1,4 @@
-"""The application as the library's `robocov.drawing.DrawingBackend`: matplotlib, and what notebooks show."""
+"""The application's `robocov.drawing.DrawingBackend`: matplotlib figures, and HTML for notebooks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from robocov.controllers.gains import get_gain_values
 from robocov.controllers.individual import unwrap_controller
 from robocov.cost import CoverageResult
-from robocov.defaults import DEFAULT_LATTICE
+from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_LATTICE, DEFAULT_ROBOTS
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, format_count, quote
 from robocov.mapfile import save_map
@@ -38,16 +38,26 @@ from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost
 from robocov_app.web.live import LiveWindow
 
-if TYPE_CHECKING:  # pages of HTML need no matplotlib
+if TYPE_CHECKING:
+    # Pages of HTML need no matplotlib.
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COST_SAMPLES = 120  # at so many moments of the run it is evaluated, at the most
-COST_VERTICES = 2500  # of the free space, up to which it is shown: beyond, notebooks would wait for seconds
+MAX_COST_SAMPLES = 120
+"""Maximum number of times at which the cost of a displayed run is computed."""
+MAX_COST_RATE_HZ = 10.0
+"""Maximum number of these times per simulated second."""
+MAX_COST_VERTICES = 2500
+"""Maximum number of vertices of a map whose cost is displayed: larger maps would make notebooks slow."""
+FALLBACK_DURATION_S = 60.0
+"""Simulated time of the replay that stands in for the window."""
 
-_MAP_SIZE = 640.0, 420.0  # largest width and height of a map in a notebook, in pixels
-_REPLAY_SIZE = 760.0, 520.0  # the same of the map of a replay; the whole is not narrower than its controls
-_CONTROLS = 520.0  # width at which the controls of a replay are beside each other, in pixels
+_MAX_MAP_SIZE_PX = (640.0, 420.0)
+"""Maximum width and height of a map in a notebook."""
+_MAX_REPLAY_MAP_SIZE_PX = (760.0, 520.0)
+"""Maximum width and height of the map in a replay."""
+_MIN_REPLAY_WIDTH_PX = 520.0
+"""Minimum width of a replay: that of its controls next to each other."""
 
 _MAP_CSS = """
 .robocov-map { margin: 0; padding: 12px; box-sizing: border-box; border-radius: 6px;
@@ -63,14 +73,88 @@ _RUN_CSS = """
 """
 
 
-def plot_environment(environment: Environment, axes: Axes | None = None, **options: Any) -> Axes:
-    """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
-    return _plotted("plot_environment", environment, axes, options)
+def plot_environment(
+    environment: Environment,
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+) -> Axes:
+    """Plot a map.
+
+    Parameters
+    ----------
+    environment : Environment
+    axes : matplotlib.axes.Axes or None
+        By default the axes of a new page.
+    theme : {"light", "dark"}
+    size : (width, height) or None, px
+        Size of the page.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes with the plot.
+
+    Raises
+    ------
+    ParameterError
+        If the axes or the theme cannot be used.
+    """
+    from robocov_app.figures import runs
+
+    _check_axes(axes)
+    return _get_axes(runs.plot_environment(environment, axes, theme, size), axes)
 
 
-def plot_record(record: Record, axes: Axes | None = None, **options: Any) -> Axes:
-    """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
-    return _plotted("plot_trajectories", record, axes, options)
+def plot_record(
+    record: Record,
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    colours: str = "paper",
+    size: tuple[int, int] | None = None,
+    mean_distance: float | None = None,
+    mean_time: float | None = None,
+) -> Axes:
+    """Plot the trajectories of a run, and its final cells.
+
+    Parameters
+    ----------
+    record : Record
+    axes : matplotlib.axes.Axes or None
+        By default the axes of a new page.
+    theme : {"light", "dark"}
+    colours : {"paper", "robots"}
+        Colours of the paper, or a hue for each robot.
+    size : (width, height) or None, px
+        Size of the page.
+    mean_distance, mean_time : float or None, m, s
+        Of the final positions, for the title of the page.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes with the plot.
+
+    Raises
+    ------
+    ParameterError
+        If the axes or an option cannot be used.
+    """
+    from robocov_app.figures import runs
+
+    _check_axes(axes)
+    figure = runs.plot_trajectories(
+        record,
+        axes,
+        theme,
+        colours,
+        size=size,
+        mean_distance=mean_distance,
+        mean_time=mean_time,
+    )
+    return _get_axes(figure, axes)
 
 
 def plot_history(
@@ -79,10 +163,42 @@ def plot_history(
     *,
     label: str = "at the end",
     controller: str = "",
-    **options: Any,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "Coverage cost over time",
 ) -> Axes:
-    """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
-    return _plotted("plot_cost", [(label, controller, history.time, history.mean_distance)], axes, options)
+    """Plot the mean distance against time.
+
+    Parameters
+    ----------
+    history : CostHistory
+    axes : matplotlib.axes.Axes or None
+        By default the axes of a new page.
+    label : str
+        Label of the curve, at its end.
+    controller : str
+        Name of the controller, which decides the colour of the curve.
+    theme : {"light", "dark"}
+    size : (width, height) or None, px
+        Size of the page.
+    title : str
+        Title of the page.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes with the plot.
+
+    Raises
+    ------
+    ParameterError
+        If the axes or the theme cannot be used, or the history has no finite value.
+    """
+    from robocov_app.figures import runs
+
+    _check_axes(axes)
+    curve = (label, controller, history.time, history.mean_distance)
+    return _get_axes(runs.plot_cost([curve], axes, theme, size, title), axes)
 
 
 def plot_result(
@@ -93,24 +209,49 @@ def plot_result(
     size: tuple[int, int] | None = None,
     radius: ArrayLike | None = None,
 ) -> Axes:
-    """Plot the distance of every place to its nearest robot; see `robocov_app.figures.coverage`.
+    """Plot the distance of every point to its nearest robot.
 
-    A lattice too coarse for a picture is replaced by a finer one. Raises ParameterError without a map.
+    A lattice that is too coarse for an image is replaced by a finer one.
+
+    Parameters
+    ----------
+    result : CoverageResult
+    axes : matplotlib.axes.Axes or None
+        By default the axes of a new page.
+    theme : {"light", "dark"}
+    size : (width, height) or None, px
+        Size of the page.
+    radius : float or (n,) array or None, m
+        Radii of the robots.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes with the plot.
+
+    Raises
+    ------
+    ParameterError
+        If the axes or the theme cannot be used, or the result has no map.
     """
     from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
 
-    _checked(axes)
-    environment, sites, n = result.environment, result.sites, len(result.positions)
+    _check_axes(axes)
+    environment = result.environment
+    sites = result.sites
     if environment is None or sites is None:
         raise ParameterError("result: it does not know its map; expected one that a CoverageCost returned")
-    team = Team.homogeneous(n)
+    robots = len(result.positions)
+    team = Team.homogeneous(robots)
     if radius is not None:
-        team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
-    facts = f"{format_count(n, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
+        team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (robots,)))
+    facts = f"{format_count(robots, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
     if sites.lattice < MIN_FIGURE_LATTICE:
-        finer = build_cost(environment, MIN_FIGURE_LATTICE, quiet=True)
-        sites, result = finer.sites, finer(result.positions)
-    moment = Moment(environment, team, Field(FieldLattice(sites), result), environment.name, facts)
+        finer_cost = build_cost(environment, MIN_FIGURE_LATTICE, quiet=True)
+        sites = finer_cost.sites
+        result = finer_cost(result.positions)
+    field = Field(FieldLattice(sites), result)
+    moment = Moment(environment, team, field, environment.name, facts)
     if axes is None:
         return plot_coverage([], [moment], theme, size, "Coverage cost").axes[-1]
     plot_distances(moment, axes, theme)
@@ -151,25 +292,24 @@ def plot_comparison(
 
     if axes is not None:
         raise ParameterError("axes: expected None, because a comparison has one panel for each run")
-    figure = runs.plot_comparison(
-        list(comparison.records.values()),
-        theme,
-        colours,
-        size,
-        mean_distances=[float(history.mean_distance[-1]) for history in comparison.histories.values()],
-    )
+    mean_distances = [float(history.mean_distance[-1]) for history in comparison.histories.values()]
+    records = list(comparison.records.values())
+    figure = runs.plot_comparison(records, theme, colours, size, mean_distances=mean_distances)
     return figure.axes[-1]
 
 
 def environment_html(environment: Environment) -> str:
-    """Return a map with its facts and a scale bar, in light or dark as the notebook is."""
+    """Return the HTML of a map with its properties and a scale bar, in the theme of the notebook."""
     low_x, low_y, high_x, high_y = environment.region.bounds
-    width, height = high_x - low_x, high_y - low_y
-    frame, bar = Frame(environment, *_MAP_SIZE), round_length(width / 5)
-    left, right = frame.at(np.array([[low_x, low_y], [low_x + bar, low_y]]))[:, 0] / (frame.width / 100)
+    width = high_x - low_x
+    frame = Frame(environment, *_MAX_MAP_SIZE_PX)
+    bar_length = round_length(width / 5)
+    bar_ends = np.array([[low_x, low_y], [low_x + bar_length, low_y]])
+    # Percent of the width, so that the bar stays right when the page shrinks the map.
+    left, right = frame.at(bar_ends)[:, 0] / (frame.width / 100)
     starts = ", ".join(environment.starts) or "uniform"
     facts = (
-        f"{width:.4g} × {height:.4g} m, {environment.free_area:.4g} m² free, "
+        f"{width:.4g} × {high_y - low_y:.4g} m, {environment.free_area:.4g} m² free, "
         f"{format_count(len(environment.obstacles), 'obstacle')}; "
         f"start{'s' if len(environment.starts) > 1 else ''} {starts}"
     )
@@ -177,115 +317,147 @@ def environment_html(environment: Environment) -> str:
         f"<style>{theme_rules('.robocov-map')}{asset('picture.css')}{_MAP_CSS}</style>"
         f'<figure class="robocov-map" style="max-width:{frame.width + 24:.0f}px">'
         f"<figcaption><b>{escape(environment.name)}</b> {escape(facts)}</figcaption>"
-        f"{map_picture(environment, *_MAP_SIZE)}"
+        f"{map_picture(environment, *_MAX_MAP_SIZE_PX)}"
         f'<div class="robocov-scale"><i style="margin-left:{left:.2f}%;width:{right - left:.2f}%"></i>'
-        f"{length_label(bar)}</div>"
+        f"{length_label(bar_length)}</div>"
         f"</figure>"
     )
 
 
 def environment_png(environment: Environment) -> bytes:
-    return _page_png(plot_environment(environment))
+    """Return the image of a map, for notebooks that display no HTML."""
+    return _export_png(plot_environment(environment))
 
 
 def record_html(record: Record) -> str:
-    """Return a replay of a run, with its cost where that does not take long."""
-    run = ReplayRun(record, _history_to_show(record), f"{record.label} on {record.environment.name}")
-    width = max(Frame(record.environment, *_REPLAY_SIZE).width, _CONTROLS)
-    begin = f'<style>{_RUN_CSS}</style><div class="robocov-run" style="max-width:{width:.0f}px">'
-    return f"{begin}{replay_html([run])}</div>"
+    """Return the HTML of a replay of a run, with its cost if that can be computed quickly."""
+    run = ReplayRun(record, _compute_history(record), f"{record.label} on {record.environment.name}")
+    map_width = Frame(record.environment, *_MAX_REPLAY_MAP_SIZE_PX).width
+    width = max(map_width, _MIN_REPLAY_WIDTH_PX)
+    return (
+        f'<style>{_RUN_CSS}</style><div class="robocov-run" style="max-width:{width:.0f}px">'
+        f"{replay_html([run])}</div>"
+    )
+
+
+def record_png(record: Record) -> bytes:
+    """Return the image of a run, for notebooks that display no HTML."""
+    return _export_png(plot_record(record))
 
 
 def comparison_html(comparison: Comparison) -> str:
-    """Return a replay of the runs of a comparison, side by side, with their costs."""
+    """Return the HTML of a replay of the runs of a comparison, side by side, with their costs."""
     runs = []
     for label, record in comparison.records.items():
-        run = ReplayRun(
-            record, comparison.histories[label], f"{label} on {record.environment.name}", label=label
-        )
-        runs.append(run)
+        title = f"{label} on {record.environment.name}"
+        runs.append(ReplayRun(record, comparison.histories[label], title, label=label))
     return f'<style>{_RUN_CSS}</style><div class="robocov-run">{replay_html(runs)}</div>'
 
 
 def comparison_png(comparison: Comparison) -> bytes:
-    """Return the picture of a comparison for notebooks that display no HTML."""
-    return _page_png(plot_comparison(comparison))
+    """Return the image of a comparison, for notebooks that display no HTML."""
+    return _export_png(plot_comparison(comparison))
 
 
-def _history_to_show(record: Record) -> CostHistory | None:
-    if shapely.get_num_coordinates(record.environment.free) > COST_VERTICES:
+def _compute_history(record: Record) -> CostHistory | None:
+    """Compute the cost of a run; None if that would take long, or is not possible."""
+    if shapely.get_num_coordinates(record.environment.free) > MAX_COST_VERTICES:
         return None
-    span = float(record.time[-1] - record.time[0])
-    rate = min(COST_SAMPLES / span, 10.0) if span > 0.0 else 0.0
+    duration = float(record.time[-1] - record.time[0])
+    rate = min(MAX_COST_SAMPLES / duration, MAX_COST_RATE_HZ) if duration > 0.0 else 0.0
     try:
-        return compute_cost_history(record, build_cost(record.environment, DEFAULT_LATTICE, quiet=True), rate)
-    except RobocovError:  # a map without a free site, a robot in an obstacle
+        cost = build_cost(record.environment, DEFAULT_LATTICE, quiet=True)
+        return compute_cost_history(record, cost, rate)
+    except RobocovError:
+        # The lattice may have no free site, or a robot may be in an obstacle.
         return None
-
-
-def record_png(record: Record) -> bytes:
-    return _page_png(plot_record(record))
 
 
 def show(
-    map: str | Path | Environment | Simulation,  # noqa: A002 - as everywhere else
+    map: str | Path | Environment | Simulation,  # noqa: A002 - The parameter has this name in all functions.
     *,
-    robots: int = 6,
-    controllers: Sequence[str] = ("rapf",),
+    robots: int = DEFAULT_ROBOTS,
+    controllers: Sequence[str] = (DEFAULT_CONTROLLER,),
     seed: int = 0,
     height: int = 620,
 ) -> LiveWindow | Record:
-    """Return the interactive window of a map, live; without ``robocov[web]`` a replay of one minute.
+    """Show the interactive window of a map in a notebook.
 
-    Of a simulation, the others but `height` are as there: the team begins where it is, and goes on beside it.
+    Parameters
+    ----------
+    map : str, Path, Environment or Simulation
+        Name of a bundled map, a file, the map itself, or a simulation that the window continues, while the
+        simulation itself does not change.
+    robots : int
+        Number of robots; not for a simulation.
+    controllers : sequence of str
+        Names of the controllers; not for a simulation.
+    seed : int
+        Seed of the starting positions; not for a simulation.
+    height : int, px
+        Height of the window.
+
+    Returns
+    -------
+    LiveWindow or Record
+        The window; without ``robocov[web]`` the record of a run of one minute.
     """
-    here = find_spec("websockets") is not None
+    has_web = find_spec("websockets") is not None
     if isinstance(map, Simulation):
-        return _live(map, height) if here else map.copy().run(60.0)
-    if not here:
+        return _show_simulation(map, height) if has_web else map.copy().run(FALLBACK_DURATION_S)
+    if not has_web:
         return Scenario(map, controllers[0], robots=robots, seed=seed).run()
     options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
     if not isinstance(map, Environment):
         return LiveWindow(["demo", str(map), *options], height)
-    with TemporaryDirectory() as folder:  # the window has read it when it is there
+    # The window has read the file when it is open.
+    with TemporaryDirectory() as folder:
         file = Path(folder) / "map.json"
         save_map(map, file)
         return LiveWindow(["demo", str(file), *options], height)
 
 
-def _live(simulation: Simulation, height: int) -> LiveWindow:
+def _show_simulation(simulation: Simulation, height: int) -> LiveWindow:
+    """Show the window of a session that starts from the state of a simulation."""
+    from robocov_app.viewer.session import scenario as viewer_scenario
     from robocov_app.viewer.session.file import save_session
-    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
     from robocov_app.viewer.session.session import Session
 
-    law, team = simulation.controller, simulation.team
-    choice = (ControllerChoice(law.name, get_gain_values(unwrap_controller(law))),)
-    now = simulation.positions, simulation.velocities, simulation.conditions
-    given = simulation.environment, choice, len(team), None, 0, TeamSpec.of(team), simulation.dt
-    session = Session(Scenario(*given, *now))
+    controller = simulation.controller
+    gains = get_gain_values(unwrap_controller(controller))
+    session = Session(
+        viewer_scenario.Scenario(
+            simulation.environment,
+            (viewer_scenario.ControllerChoice(controller.name, gains),),
+            len(simulation.team),
+            limits=viewer_scenario.TeamSpec.of(simulation.team),
+            dt=simulation.dt,
+            given=simulation.positions,
+            moving=simulation.velocities,
+            conditions=simulation.conditions,
+        )
+    )
     with TemporaryDirectory() as folder:
         file = Path(folder) / "simulation.robocov"
         save_session(file, session.document, session.head, 0, {})
         return LiveWindow(["demo", str(file)], height)
 
 
-def _page_png(axes: Any) -> bytes:
-    return figure_png(axes.figure)
-
-
-def _checked(axes: Any) -> Any:
-    """Return axes on which a plot can be drawn, or None; raises ParameterError for any others."""
+def _check_axes(axes: Any) -> None:
+    """Raise a ParameterError unless a plot can be drawn on the axes, or they are None."""
     from matplotlib.axes import Axes
 
-    flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
-    if axes is not None and not flat:
+    if axes is None:
+        return
+    is_planar = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
+    if not is_planar:
         raise ParameterError(f"axes: expected one matplotlib Axes with straight x and y, got {quote(axes)}")
-    return axes
 
 
-def _plotted(function: str, thing: Any, axes: Axes | None, options: dict[str, Any]) -> Axes:
-    """Return the axes on which a function of `robocov_app.figures.runs` has drawn: the given ones, or new."""
-    from robocov_app.figures import runs
-
-    figure: Figure = getattr(runs, function)(thing, _checked(axes), **options)
+def _get_axes(figure: Figure, axes: Axes | None) -> Axes:
+    """Return the axes on which a plot was drawn: the given ones, or those of the new page."""
     return figure.axes[-1] if axes is None else axes
+
+
+def _export_png(axes: Any) -> bytes:
+    return figure_png(axes.figure)

@@ -289,7 +289,7 @@ class TestNotebook:
         assert "robocov-replay" in html and '"cost":null' in html
 
     def test_nobody_waits_for_the_cost_of_a_large_map(self, monkeypatch):
-        monkeypatch.setattr(drawing_backend, "COST_VERTICES", 10)
+        monkeypatch.setattr(drawing_backend, "MAX_COST_VERTICES", 10)
         assert "robocov-replay" in RUN._repr_html_() and '"cost":null' in RUN._repr_html_()
 
     def test_a_run_of_one_moment_is_shown(self):
