@@ -18,6 +18,7 @@ from robocov_app.formats import (
     rings,
     ros,
     stage,
+    svg,
     tmx,
     wkt,
 )
@@ -28,7 +29,6 @@ from robocov_app.formats.geometry.shaping import Shaping
 from robocov_app.formats.interface import Exporter, Importer
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.reports import ExportReport, ImportReport
-from robocov_app.formats.svg import drawing as svg
 from robocov_app.formats.unsupported import describe_head, describe_unsupported_file
 
 _DRAWING_OPTIONS = frozenset(

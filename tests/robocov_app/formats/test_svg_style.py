@@ -4,10 +4,10 @@ import pytest
 
 from robocov.errors import MapError
 from robocov_app.formats.files.xml_tree import Element
-from robocov_app.formats.svg.path import (
+from robocov_app.formats.svg.style import (
     INHERITED,
-    MAX_TEXT,
-    MAX_WORK,
+    MAX_RULE_CHECKS,
+    MAX_SHEET_CHARACTERS,
     StyleSheet,
     inherit_style,
     is_hidden,
@@ -34,19 +34,22 @@ def sheet(*texts: str) -> StyleSheet:
 
 def test_the_more_particular_rule_wins_wherever_it_stands() -> None:
     rules = sheet("#a{fill:red} .b{fill:green} rect{fill:blue} *{fill:white}")
-    assert rules.of(element(id="a", class_="b"))["fill"] == "red"
-    assert rules.of(element(class_="x b"))["fill"] == "green"
-    assert rules.of(element(class_="B"))["fill"] == "blue"
-    assert rules.of(element("path", fill="black"))["fill"] == "white"
-    assert rules.of(element(id="a", style="fill:none"))["fill"] == "none"
-    assert sheet("rect.b{fill:red} .b{fill:green}").of(element(class_="b"))["fill"] == "red"
-    assert sheet(".b{fill:red}", ".b{fill:green}").of(element(class_="b"))["fill"] == "green"
-    assert sheet(".b{fill:red !important}").of(element(class_="b", style="fill:green"))["fill"] == "red"
+    assert rules.get_properties(element(id="a", class_="b"))["fill"] == "red"
+    assert rules.get_properties(element(class_="x b"))["fill"] == "green"
+    assert rules.get_properties(element(class_="B"))["fill"] == "blue"
+    assert rules.get_properties(element("path", fill="black"))["fill"] == "white"
+    assert rules.get_properties(element(id="a", style="fill:none"))["fill"] == "none"
+    assert sheet("rect.b{fill:red} .b{fill:green}").get_properties(element(class_="b"))["fill"] == "red"
+    assert sheet(".b{fill:red}", ".b{fill:green}").get_properties(element(class_="b"))["fill"] == "green"
+    assert (
+        sheet(".b{fill:red !important}").get_properties(element(class_="b", style="fill:green"))["fill"]
+        == "red"
+    )
 
 
 def test_style_sheets_of_drawing_programs() -> None:
     text = "<!-- .cls-1,\n.cls-2{fill:none;stroke:#000;} /* a; {comment} */ .cls-2{stroke-width:2px} -->"
-    assert sheet(text).of(element(class_="cls-2")) == {
+    assert sheet(text).get_properties(element(class_="cls-2")) == {
         "fill": "none",
         "stroke": "#000",
         "stroke-width": "2px",
@@ -58,15 +61,15 @@ def test_what_is_beyond_is_counted() -> None:
         "@import url(http://example.org/x.css); @media print { rect { fill: none } }"
         "@supports (x:y) {rect{fill:none}} g > rect {fill:none} rect:hover{fill:none} rect{fill:red}"
     )
-    assert rules.of(element())["fill"] == "red"
-    assert rules.strange == 4
+    assert rules.get_properties(element())["fill"] == "red"
+    assert rules.unsupported == 4
 
 
 def test_unfinished_rules_are_left_out() -> None:
     assert (
-        sheet("@media {").of(element())
-        == sheet("rect{fill:red").of(element())
-        == sheet("}{").of(element())
+        sheet("@media {").get_properties(element())
+        == sheet("rect{fill:red").get_properties(element())
+        == sheet("}{").get_properties(element())
         == {}
     )
 
@@ -99,12 +102,14 @@ def test_declarations() -> None:
 
 @pytest.mark.slow
 def test_sheets_that_take_for_ever_are_refused() -> None:
-    with pytest.raises(MapError, match=rf"plan\.svg: expected style sheets of at most {MAX_TEXT} characters"):
-        sheet("*" * (MAX_TEXT + 1))
+    with pytest.raises(
+        MapError, match=rf"plan\.svg: expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
+    ):
+        sheet("*" * (MAX_SHEET_CHARACTERS + 1))
     rules = sheet("*{fill:red} " * 9000)
     with pytest.raises(MapError, match=r"plan\.svg: too many rules for too many elements"):
-        for _ in range(MAX_WORK // 9000 + 1):
-            rules.of(element())
+        for _ in range(MAX_RULE_CHECKS // 9000 + 1):
+            rules.get_properties(element())
     sheet("@" * 500_000)
     sheet("@media{" * 100_000)
     sheet("/* " * 300_000)

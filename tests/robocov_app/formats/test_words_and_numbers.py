@@ -19,7 +19,8 @@ from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
 from robocov_app.formats.geometry.vectorize import _format_share, trace_outline
 from robocov_app.formats.preview import _number
 from robocov_app.formats.reports import format_area
-from robocov_app.formats.svg.path import parse_declarations, parse_path
+from robocov_app.formats.svg.path_data import parse_path
+from robocov_app.formats.svg.style import parse_declarations
 from robocov_app.formats.unsupported import describe_unsupported_file
 
 

@@ -1,0 +1,260 @@
+"""Style of SVG elements: style sheets, inheritance, visibility and colors."""
+
+import re
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Literal, NamedTuple, TypeAlias
+
+from robocov.errors import MapError
+from robocov_app.formats.colours import Colour, mix_with_white, parse_css_colour
+from robocov_app.formats.files.xml_tree import Element
+
+Style: TypeAlias = Mapping[str, str]
+"""Properties by name, as they are written."""
+INHERITED = {
+    "color": "black",
+    "fill": "black",
+    "fill-opacity": "1",
+    "fill-rule": "nonzero",
+    "stroke": "none",
+    "stroke-opacity": "1",
+    "stroke-width": "1",
+    "stroke-dasharray": "none",
+    "stroke-linecap": "butt",
+    "stroke-linejoin": "miter",
+    "stroke-miterlimit": "4",
+    "visibility": "visible",
+}
+"""Properties that elements inherit from groups, with their defaults (SVG 2, section 13)."""
+MAX_SHEET_CHARACTERS = 1_000_000
+MAX_RULES = 10_000
+MAX_RULE_CHECKS = 500_000
+"""Maximum number of rules compared with elements."""
+_PROPERTIES = (*INHERITED, "display", "opacity", "transform", "clip-path", "mask")
+_SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
+_CLASS_OR_ID = re.compile(r"[.#][\w-]+")
+_IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
+_HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_AT_RULE_PARTS = re.compile(r"[{};]")
+_REFERENCE = re.compile(r"""\s*url\(\s*["']?#([^"')]*)["']?\s*\)""")
+
+
+class _Declarations(NamedTuple):
+    """Properties without and with the mark ``!important``."""
+
+    normal: dict[str, str]
+    important: dict[str, str]
+
+
+class _StyleRule(NamedTuple):
+    """A rule of a style sheet.
+
+    Attributes
+    ----------
+    marks : frozenset of str
+        Tag, classes and id that an element needs.
+    weight : tuple of int
+        Rules of a higher weight win.
+    declarations : _Declarations
+    """
+
+    marks: frozenset[str]
+    weight: tuple[int, int, int, int]
+    declarations: _Declarations
+
+
+class StyleSheet:
+    """The rules of a file for tags, classes and ids.
+
+    Parameters
+    ----------
+    where : str
+        The file, for messages.
+
+    Attributes
+    ----------
+    unsupported : int
+        Number of other rules, as in @supports.
+    """
+
+    def __init__(self, where: str) -> None:
+        self.unsupported = 0
+        self._where = where
+        self._rules_by_mark: dict[str, list[_StyleRule]] = {}
+        self._rule_count = 0
+        self._characters = 0
+        self._checks = 0
+
+    def add(self, text: str) -> None:
+        """Add the rules of a text. Raises MapError if there are too many."""
+        self._characters += len(text)
+        if self._characters > MAX_SHEET_CHARACTERS:
+            expected = f"expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
+            raise MapError(f"{self._where}: {expected}, got more")
+        text = text.replace("<!--", " ").replace("-->", " ")
+        # Only up to the last end of a comment: searching for one that does not exist takes forever.
+        commented, end, rest = text.rpartition("*/")
+        text = _COMMENT.sub(" ", commented + end) + rest
+        for rule in self._remove_at_rules(text).split("}")[:-1]:
+            before, brace, body = rule.rpartition("{")
+            if not brace:
+                continue
+            declarations = _split_by_importance(parse_declarations(body))
+            for selector in before.rpartition("{")[2].split(","):
+                self._add_rule(selector.strip(), declarations)
+
+    def get_properties(self, element: Element) -> dict[str, str]:
+        """Return the properties of an element itself. Raises MapError if there are too many rules."""
+        attributes = element.attributes
+        properties = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
+        marks = {element.tag, f"#{attributes.get('id', '')}"}
+        marks |= {f".{name}" for name in attributes.get("class", "").split()}
+        candidates = [rule for mark in ("", *marks) for rule in self._rules_by_mark.get(mark, ())]
+        self._checks += len(candidates)
+        if self._checks > MAX_RULE_CHECKS:
+            raise MapError(f"{self._where}: too many rules for too many elements")
+        rules = [rule for rule in candidates if rule.marks <= marks]
+        rules.sort(key=lambda rule: rule.weight)
+        declarations = [rule.declarations for rule in rules]
+        declarations.append(_split_by_importance(parse_declarations(attributes.get("style", ""))))
+        for declared in declarations:
+            properties |= declared.normal
+        for declared in declarations:
+            properties |= declared.important
+        return properties
+
+    def _remove_at_rules(self, text: str) -> str:
+        """Return a style sheet without its @ rules, which apply to other media, or name other files."""
+        kept = []
+        position = 0
+        while (start := text.find("@", position)) >= 0:
+            kept.append(text[position:start])
+            # Other media and fonts do not change shapes.
+            if not _HARMLESS.match(text, start):
+                self.unsupported += 1
+            position = _find_end_of_at_rule(text, start)
+        return "".join([*kept, text[position:]])
+
+    def _add_rule(self, selector: str, declarations: _Declarations) -> None:
+        match = _SELECTOR.fullmatch(selector)
+        if match is None or not selector or self._rule_count >= MAX_RULES:
+            self.unsupported += 1
+            return
+        tags = [match[1]] if match[1] not in (None, "*") else []
+        marks = _CLASS_OR_ID.findall(match[2])
+        id_count = sum(mark.startswith("#") for mark in marks)
+        self._rule_count += 1
+        weight = (id_count, len(marks) - id_count, len(tags), self._rule_count)
+        rule = _StyleRule(frozenset([*tags, *marks]), weight, declarations)
+        key = [*tags, *marks][-1] if tags or marks else ""
+        self._rules_by_mark.setdefault(key, []).append(rule)
+
+
+def _find_end_of_at_rule(text: str, start: int) -> int:
+    """Return the position after an @ rule, which ends with a semicolon or its last brace."""
+    depth = 0
+    for part in _AT_RULE_PARTS.finditer(text, start):
+        if part[0] == "{":
+            depth += 1
+            continue
+        if part[0] == "}":
+            depth -= 1
+        if depth <= 0:
+            return part.end()
+    return len(text)
+
+
+def parse_declarations(text: str) -> dict[str, str]:
+    """Return the declarations of a style attribute or rule, by the name of the property."""
+    pairs = [part.partition(":") for part in text.split(";") if ":" in part]
+    return {name.strip().lower(): value.strip() for name, _, value in pairs}
+
+
+def _split_by_importance(properties: dict[str, str]) -> _Declarations:
+    """Split properties by the mark ``!important``, which is removed."""
+    normal = {}
+    important = {}
+    for name, value in properties.items():
+        if _IMPORTANT.search(value):
+            important[name] = _IMPORTANT.sub("", value).rstrip()
+        else:
+            normal[name] = value
+    return _Declarations(normal, important)
+
+
+def inherit_style(parent: Style, own: Style) -> dict[str, str]:
+    """Return the style of an element from that of its parent and its own properties."""
+    style = {}
+    for name in INHERITED:
+        value = own.get(name, "inherit")
+        style[name] = parent[name] if value in ("inherit", "unset") else value
+    return style
+
+
+def is_painted(style: Style, what: Literal["fill", "stroke"]) -> bool:
+    """Return whether a fill or a stroke is visible."""
+    if style[what].lower() in ("none", "transparent") or _is_zero(style[f"{what}-opacity"]):
+        return False
+    paint = parse_css_colour(style[what])
+    return paint is None or paint[1] > 0.0
+
+
+def compute_visible_colour(
+    style: Style,
+    what: Literal["fill", "stroke"],
+    opacity: float,
+    get_gradient_colour: Callable[[str], str | None],
+) -> Colour | None:
+    """Return the color of a fill or a stroke, mixed with white where it is translucent.
+
+    Parameters
+    ----------
+    style : Style
+    what : "fill" or "stroke"
+    opacity : float
+        Opacity of the element and of the groups around it.
+    get_gradient_colour : callable
+        Returns the color of the gradient with a name, as it is written, or None.
+
+    Returns
+    -------
+    Colour or None
+        None where it is not known, as of a pattern.
+    """
+    written = style[what]
+    match = _REFERENCE.match(written)
+    if match:
+        written = get_gradient_colour(match[1]) or written[match.end() :].strip()
+    if written.casefold() == "currentcolor":
+        written = style["color"]
+    paint = parse_css_colour(written)
+    if paint is None:
+        return None
+    colour, alpha = paint
+    return mix_with_white(colour, alpha * opacity * parse_opacity(style[f"{what}-opacity"]))
+
+
+def parse_opacity(text: str) -> float:
+    """Return an opacity from 0 to 1; it is 1 if the text is no number."""
+    text = text.strip()
+    try:
+        value = float(text.rstrip("%"))
+    except ValueError:
+        return 1.0
+    if value != value:  # nan
+        return 1.0
+    if text.endswith("%"):
+        value /= 100.0
+    return min(max(value, 0.0), 1.0)
+
+
+def is_hidden(own: Style) -> bool:
+    """Return whether an element with these properties of its own is hidden, with all that it contains."""
+    return own.get("display", "").lower() == "none" or _is_zero(own.get("opacity", "1"))
+
+
+def _is_zero(text: str) -> bool:
+    with suppress(ValueError):
+        return float(text.strip().rstrip("%")) == 0.0
+    return False
