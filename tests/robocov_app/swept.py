@@ -7,7 +7,8 @@ from typing import Any
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart
 from robocov_app.sweep.executors import Executor, Returned
-from robocov_app.sweep.study import Study, StudyMap, Task
+from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import perform
 
 ROOM = Environment(

@@ -20,7 +20,8 @@ from robocov_app.report.groups import dependences, gain_text
 from robocov_app.report.plots import dependence_plots
 from robocov_app.report.results import gathered
 from robocov_app.report.tables import controllers_table
-from robocov_app.sweep.study import Gains, Range, Sampling
+from robocov_app.sweep.gains import build_gains
+from robocov_app.sweep.sampling import Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.viewer.session.scenario import ControllerChoice
@@ -70,9 +71,9 @@ def test_the_command_line_takes_words_and_the_record_keeps_them(
 
 def test_a_study_takes_lists_of_words(study: Path) -> None:
     read = read_study(study)
-    tried = [(choice["target"], choice["k_rep"]) for choice in read.gains_of("rapf").choices]
+    tried = [(choice["target"], choice["k_rep"]) for choice in read.get_gains("rapf").choices]
     assert tried == [("centroid", 0.3), ("centroid", 1.0), ("median", 0.3), ("median", 1.0)]
-    (lloyd,) = read.gains_of("lloyd").choices
+    (lloyd,) = read.get_gains("lloyd").choices
     assert (lloyd["target"], lloyd["height"]) == ("sensing", 0.5)
 
 
@@ -84,7 +85,10 @@ def test_a_study_takes_lists_of_words(study: Path) -> None:
             r"gains\.rapf\.target\[1\]: unknown choice 'mediam': did you mean",
         ),
         ("target = 3", r"gains\.rapf\.target: expected one of centroid, sensing, median, got 3\.0"),
-        ('target = ["median", "median"]', r"gains\.rapf\.target\[1\]: 'median' is given already at"),
+        (
+            'target = ["median", "median"]',
+            r"gains\.rapf\.target\[1\]: duplicate value 'median', given already at",
+        ),
         (
             "target = {low = 0, high = 1}",
             r"gains\.rapf\.target: expected one of centroid, sensing, median",
@@ -102,7 +106,7 @@ def test_words_go_with_samples_of_ranges() -> None:
     from robocov.controllers import Rapf
 
     wanted = {"target": ["centroid", "median"], "k_rep": Range(0.1, 1.0)}
-    gains = Gains.of(Rapf, wanted, Sampling(samples=4))
+    gains = build_gains(Rapf, wanted, Sampling(samples=4))
     assert [choice["target"] for choice in gains.choices] == ["centroid"] * 4 + ["median"] * 4
 
 

@@ -117,7 +117,7 @@ class RatedController:
             SHA-256 of its source code.
         """
         name = study.controllers[0]
-        controller_class = study.kind(name)
+        controller_class = study.load_controller_class(name)
         source = study.sources.get(name)
         source_hash = None
         if source is not None:
@@ -127,7 +127,7 @@ class RatedController:
             "controller": self.controller.rpartition("/")[2],
             "label": getattr(controller_class, "label", controller_class.__name__),
             "information": get_information(controller_class),
-            "gains": dict(study.gains_of(name).choices[0]),
+            "gains": dict(study.get_gains(name).choices[0]),
             "set": dict(self.gains),
             "source_sha256": source_hash,
         }

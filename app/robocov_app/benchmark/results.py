@@ -13,7 +13,7 @@ from robocov.errors import InputError, quote
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov_app.benchmark import suite
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.study import Task
+from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome
 
 RESULT_FILE = "result.json"

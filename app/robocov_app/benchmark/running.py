@@ -17,8 +17,9 @@ from robocov_app.benchmark.results import (
     identify_suite,
 )
 from robocov_app.sweep.ledger import RUNS, Ledger
-from robocov_app.sweep.study import Study, tasks_of
+from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import sweep
+from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import EFFORT, made_with
 from robocov_app.terminal.interruption import Interruption
 
@@ -101,7 +102,7 @@ def _check_folder(out: Path) -> None:
 def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:
     """Yield the rows of a finished sweep."""
     ledger = Ledger(folder)
-    for task in tasks_of(study):
+    for task in generate_tasks(study):
         entry = ledger.entry(task)
         if entry is None:
             raise OutputError(f"{folder}: {task.name} was removed by somebody else")

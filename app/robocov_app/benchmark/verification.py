@@ -11,8 +11,9 @@ from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Sele
 from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_result
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import difference_of
-from robocov_app.sweep.study import Study, Task, tasks_of
+from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Count, sweep_progress, worked_off
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import EFFORT, Outcome
 from robocov_app.terminal.interruption import Interruption
 
@@ -67,7 +68,9 @@ def verify_result(
     result = read_result(path)
     studies = _build_studies(result, path, controller)
     tasks = {
-        (track, task.map, task.seed): task for track, study in studies.items() for task in tasks_of(study)
+        (track, task.map, task.seed): task
+        for track, study in studies.items()
+        for task in generate_tasks(study)
     }
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
     differences = list(_compare_without_running(result, rows, tasks))

@@ -43,7 +43,7 @@ from robocov_app.replication.evidence import ranked_rows
 from robocov_app.replication.outcomes import FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import IDEAL, BeyondResults, Degradation, FigureRun, PaperResults
 from robocov_app.replication.studies import DISTURBED
-from robocov_app.sweep.study import UNITS
+from robocov_app.sweep.parameters import UNITS
 
 DOTS = 3.0  # scale of the pages: 300 dots an inch
 WIDE, NARROW = 2148, 1050  # pixels of two columns of a journal (7.16 inches) and of one (3.5 inches)

@@ -214,7 +214,7 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
 
 def read_gain_outcomes(folder: Path, study: Study, references: References) -> dict[str, GainOutcomes]:
     scenarios = scenarios_of(study)
-    choices = {name: study.gains_of(name).choices for name in study.controllers}
+    choices = {name: study.get_gains(name).choices for name in study.controllers}
     excess = {name: np.full((len(sets), len(scenarios)), np.nan) for name, sets in choices.items()}
     place = {_law(name, each): (name, k) for name, sets in choices.items() for k, each in enumerate(sets)}
     for at, row in _rows(folder, scenarios):
@@ -226,7 +226,7 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
 
 
 def scenarios_of(study: Study) -> tuple[Scenario, ...]:
-    begins = [(each.name, start) for each in study.maps for start in study.starts_on(each)]
+    begins = [(each.name, start) for each in study.maps for start in study.list_starts(each)]
     return tuple(Scenario(*begin, seed) for begin in begins for seed in study.seeds)
 
 

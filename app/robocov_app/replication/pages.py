@@ -29,7 +29,7 @@ from robocov_app.replication.results import BeyondResults, FigureRun, PaperResul
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules
-from robocov_app.sweep.study import UNITS
+from robocov_app.sweep.parameters import UNITS
 from robocov_app.terminal.output import replace_non_finite
 from robocov_app.terminal.progress import show_progress
 

@@ -33,8 +33,10 @@ from robocov_app.replication.studies import BASELINE_GAINS
 from robocov_app.sweep import worker
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import Ledger, opened
-from robocov_app.sweep.study import Study, StudyMap, Task, parameter_column, tasks_of
+from robocov_app.sweep.parameters import name_parameter_column
+from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.terminal.interruption import Interruption
 
 MARK = "paper.json"  # says that a folder is that of a study of the paper, and which
@@ -190,8 +192,8 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
     with ExitStack() as stack:
         for name, study in sweeps.items() if options.scheduler is None else ():
             ledger = stack.enter_context(opened(folder / "studies" / name, study.to_json()))
-            survey = ledger.survey(tasks_of(study), keep_versions=options.keep_versions)
-            for task in compress(tasks_of(study), survey.todo):
+            survey = ledger.survey(generate_tasks(study), keep_versions=options.keep_versions)
+            for task in compress(generate_tasks(study), survey.todo):
                 tasks[task.digest] = task
                 homes.setdefault(task.digest, []).append(ledger)
             notes += [f"{name}: {line}" for line in survey.words(keep_versions=options.keep_versions)]
@@ -242,7 +244,7 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
         return Forecast(runs, 0, 0.0, {})
     each: dict[str, float] = {}
     for probe in studies.probes(plan, beyond=beyond):
-        for task in tasks_of(probe):
+        for task in generate_tasks(probe):
             if not each:
                 worker.perform(task)  # what is loaded and built at first does not count
             begin = time.perf_counter()
@@ -250,7 +252,7 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
             each[task.controller] = (time.perf_counter() - begin) / probe.duration
     work = 0.0
     for name, study in sweeps.items():
-        mean = np.mean([each[law] for law in study.controllers for _ in study.gains_of(law).choices])
+        mean = np.mean([each[law] for law in study.controllers for _ in study.get_gains(law).choices])
         work += left[name] * float(mean) * study.duration
     seconds = {law: value * plan.duration for law, value in each.items()}
     return Forecast(runs, sum(left.values()), work / workers, seconds)
@@ -258,7 +260,7 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
 
 def grid_is_done(folder: Path, plan: Plan) -> bool:
     runs = folder / "studies" / "gains" / "runs"
-    return all((runs / task.name).exists() for task in tasks_of(studies.gains_study(plan)))
+    return all((runs / task.name).exists() for task in generate_tasks(studies.gains_study(plan)))
 
 
 def partition_record() -> Record:
@@ -366,7 +368,7 @@ def worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: in
             wanted.setdefault(there.scenarios[k].map, there.scenarios[k])
     environments = {each.name: each.environment for each in study.maps}
     records = {}
-    for task in tasks_of(study):
+    for task in generate_tasks(study):
         scenario = Scenario(task.map, task.start, task.seed)
         own = task.controller == contender.controller and dict(task.gains) == contender.all_gains
         if own and scenario in wanted.values():
@@ -392,7 +394,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
         for name in controllers:
             add(IDEAL, None, name, ideal.get((name, None), {}), ideal.get((RAPF_SHARED.controller, None), {}))
         for axis, (best, *bad) in axes.items():
-            costs = _finals(at / f"{part}-{axis.replace('_', '-')}", parameter_column(axis), bad[0])
+            costs = _finals(at / f"{part}-{axis.replace('_', '-')}", name_parameter_column(axis), bad[0])
             for value, name in product((best, *bad), controllers):
                 usual = ideal.get((name, None), {})
                 add(axis, value, name, usual if value == best else costs.get((name, value), {}), usual)

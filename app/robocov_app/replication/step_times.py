@@ -17,7 +17,7 @@ from robocov.record import list_versions
 from robocov.scenario import Scenario
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.plan import TEAM, Plan
-from robocov_app.sweep.study import team_of
+from robocov_app.sweep.parameters import build_swept_team
 
 YARDSTICK = "rapf"  # the controller whose steps the others' are measured by
 MAP = "campus"  # where steps are timed: the largest of the bundled maps has room for large teams
@@ -88,7 +88,7 @@ def step_times(
 def _timed(
     robots: int, names: Sequence[str], plan: Plan, stopped: Callable[[], bool], clock: Callable[[], float]
 ) -> dict[str, list[float]] | None:
-    scenario = Scenario(MAP, team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
+    scenario = Scenario(MAP, team=build_swept_team(robots, TEAM), start="uniform", dt=plan.dt)
     runs = {name: scenario.replace(controller=name).build_simulation() for name in names}
     for run in runs.values():
         for _ in range(plan.beyond.warm_up):

@@ -24,7 +24,7 @@ from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.replication import contenders as laws
 from robocov_app.replication.contenders import Contender
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, ROBOTS, TEAM, UNSEEN, Plan
-from robocov_app.sweep import study as sweep_study
+from robocov_app.sweep.parameters import TEAM_PARAMETERS
 from robocov_app.sweep.study import Study, StudyMap
 
 RADII = (0.8, 0.6, 0.45)  # m, of the discs of clustered starts; the first that fits is taken
@@ -267,7 +267,7 @@ def conditions_studies(plan: Plan) -> dict[str, Study]:
         common |= {"controllers": controllers, "seeds": range(seeds)}
         found[f"{part}-ideal"] = Study(**common)
         for name, (_, *bad) in axes.items():
-            changed = {name: bad} if name in sweep_study.TEAM else {"conditions": {**ALWAYS, name: bad}}
+            changed = {name: bad} if name in TEAM_PARAMETERS else {"conditions": {**ALWAYS, name: bad}}
             found[f"{part}-{name.replace('_', '-')}"] = Study(**{**common, **changed})
     return found
 

@@ -10,7 +10,7 @@ from robocov.errors import format_count
 from robocov_app.render.density import density_label
 from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, labels, setting_label
 from robocov_app.report.results import Entry, Result, printable
-from robocov_app.sweep.study import UNITS, parameter_text
+from robocov_app.sweep.parameters import UNITS, format_parameter
 
 
 def title_of(result: Result) -> str:
@@ -62,7 +62,7 @@ def facts(result: Result) -> list[tuple[str, str]]:
     team = result.facts.get("team")
     parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
     for name, _ in result.entries[0].team if result.entries else ():
-        values = dict.fromkeys(parameter_text(name, dict(entry.team)[name]) for entry in result.entries)
+        values = dict.fromkeys(format_parameter(name, dict(entry.team)[name]) for entry in result.entries)
         parts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
     versions = result.facts.get("versions")
     versions = versions if isinstance(versions, dict) else {}
@@ -179,7 +179,7 @@ def _parameter(key: str, value: Any) -> str:
     words, unit = name.replace("_", " "), UNITS[name]
     values = value if isinstance(value, list) else [value]
     if isinstance(value, str):
-        return f"{words} {parameter_text(name, value)}"
+        return f"{words} {format_parameter(name, value)}"
     if values and all(isinstance(each, int | float) for each in values):
         low, high = min(values), max(values)
         return f"{words} {low:.4g} {unit}" if low == high else f"{words} {low:.4g} to {high:.4g} {unit}"

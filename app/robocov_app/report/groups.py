@@ -21,7 +21,7 @@ from robocov_app.figures.statistics import (
 )
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Gains, Result, Setting
-from robocov_app.sweep.study import parameter_text
+from robocov_app.sweep.parameters import format_parameter
 
 MOST_GROUPS = 8  # controllers with their gains up to which each is shown apart; of more, by controller
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -110,7 +110,7 @@ def setting_label(result: Result, setting: Setting) -> str:
     parts = [name]
     if len({size for _, size, _ in settings(result)}) > 1:
         parts.append(f"{robots} robots")
-    parts += [f"{each.replace('_', ' ')} {parameter_text(each, value)}" for each, value in team]
+    parts += [f"{each.replace('_', ' ')} {format_parameter(each, value)}" for each, value in team]
     return ", ".join(parts)
 
 

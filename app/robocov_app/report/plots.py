@@ -23,7 +23,7 @@ from robocov_app.report.pictures import has_path
 from robocov_app.report.replay import ReplayRun
 from robocov_app.report.results import Entry, Result
 from robocov_app.report.svg import inline_svg
-from robocov_app.sweep.study import UNITS, WORDS
+from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
 
 Looks: TypeAlias = Mapping[str, CurveStyle]  # the styles of a result's groups by label (`groups.styles`)
 
@@ -193,7 +193,7 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
         yield from plotted(gains[name], some, by_setting, f"{key}-{k}")
     team = [_Parameter("robots", lambda entry: entry.robots)]
     for name, _ in result.fine[0].team if result.fine else ():
-        if name not in WORDS:
+        if name not in TEXT_PARAMETERS:
             title = f"{name.replace('_', ' ')} ({UNITS[name]})"
             team.append(_Parameter(title, partial(_named, "team", name)))
     # teams differ in their settings: by the medians of the maps alone

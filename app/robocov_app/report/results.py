@@ -26,7 +26,7 @@ from robocov.metrics.results import read_history, read_results
 from robocov.optimum import find_optimum
 from robocov.record import Record
 from robocov_app.runs.saved_runs import ComparisonDocument, SavedRun, build_roster, load_saved_runs
-from robocov_app.sweep.study import UNITS, parameter_column
+from robocov_app.sweep.parameters import UNITS, name_parameter_column
 from robocov_app.sweep.table import gain_column
 
 RESTARTS = 24  # searches of which the best counts
@@ -299,7 +299,7 @@ def _of_sweep(folder: Path) -> Result:
                 controller=controller,
                 label=printable(label),
                 robots=int(row["robots"]),
-                team=tuple((name, row.get(parameter_column(name))) for name in swept),
+                team=tuple((name, row.get(name_parameter_column(name))) for name in swept),
                 start=printable(str(row["start"])),
                 seed=row["seed"],
                 gains=_gains({name: row.get(gain_column(name)) for name in gains.get(controller, ())}),

@@ -21,7 +21,7 @@ from robocov.errors import InputError, OutputError
 from robocov.optional_imports import import_optional
 from robocov_app.jobs.messages import READY, receive
 from robocov_app.jobs.processes import ask_process, end_process, start_process
-from robocov_app.sweep.study import Task
+from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome, failed, perform
 from robocov_app.terminal.supervision import describe_status
 

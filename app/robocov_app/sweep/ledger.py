@@ -16,7 +16,7 @@ from robocov.errors import InputError, OutputError, format_count
 from robocov.files.folder_lock import lock_folder
 from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import flush_to_disk
-from robocov_app.sweep.study import Task
+from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
 

@@ -7,12 +7,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, get_args
 
-from robocov.errors import InputError, describe_unknown_name, format_path, quote, to_one_line
+from robocov.errors import InputError, JsonPath, describe_unknown_name, format_path, quote, to_one_line
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import list_bundled_maps, load_map
-from robocov_app.sweep import study
-from robocov_app.sweep.study import NO_LIMIT, Method, Place, Range, Sampling, Scale, Study, StudyMap, once
+from robocov_app.sweep.gains import NO_LIMIT
+from robocov_app.sweep.parameters import CONDITIONS, KINEMATIC_DEFAULTS, TEAM_PARAMETERS
+from robocov_app.sweep.paths import require_distinct
+from robocov_app.sweep.sampling import Range, Sampling, SamplingMethod, Scale
+from robocov_app.sweep.study import Study, StudyMap
 
+ALL_MAPS = "*"
+"""Stands for all bundled maps."""
 Check: TypeAlias = Callable[[Any], Any]  # returns a value as it is meant; ValueError for one of another kind
 
 
@@ -48,7 +53,7 @@ _TEXT, _WHOLE = _Value("a string", _of(str)), _Value("a whole number", _of(int))
 _NUMBER, _WORD = _Value("a number", _of(int, float)), _Value("a number or a string", _of(int, float, str))
 _LIMIT = _Value(f'a number, or "{NO_LIMIT}" for no limit', _of(int, float, words=(NO_LIMIT,)))
 _SCALE = _Value('"linear" or "log"', _of(words=get_args(Scale)))
-_METHOD = _Value('"sobol", "latin-hypercube" or "halton"', _of(words=get_args(Method)))
+_METHOD = _Value('"sobol", "latin-hypercube" or "halton"', _of(words=get_args(SamplingMethod)))
 
 
 def _several(wanted: str, item: _Value) -> _Value:
@@ -65,7 +70,10 @@ _GAIN = _Value(
     _Table("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, ("low", "high")),
 )
 _GROUPS = _Value("tables [[team.group]]", item=_Value("a table", _of(dict)))
-_OF_TEAM = dict.fromkeys((*study.TEAM, *study.UNICYCLES), _TEAM) | {"kinematics": _TEXTS, "group": _GROUPS}
+_OF_TEAM = dict.fromkeys((*TEAM_PARAMETERS, *KINEMATIC_DEFAULTS), _TEAM) | {
+    "kinematics": _TEXTS,
+    "group": _GROUPS,
+}
 _SAMPLING = {"method": _METHOD, "samples": _WHOLE, "seed": _WHOLE}
 _STUDY = _Table(
     "a table",
@@ -80,7 +88,7 @@ _STUDY = _Table(
         "metrics": _Value("true or false", _of(bool)),
         "max_runs": _WHOLE,
         "team": _Table("a table [team]", _OF_TEAM),
-        "conditions": _Table("a table [conditions]", dict.fromkeys(study.CONDITIONS, _CONDITION)),
+        "conditions": _Table("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
         "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
         "sampling": _Table("a table [sampling]", _SAMPLING, ("method", "samples")),
     },
@@ -89,7 +97,9 @@ _STUDY = _Table(
 """Schema of a study file. What is not given is as `Study` has it."""
 
 
-def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], mistakes: list[str]) -> Any:
+def _read(
+    given: Any, wanted: _Value | _Table, path: JsonPath, unknown: list[str], mistakes: list[str]
+) -> Any:
     """Return what is given as it is meant; `unknown` keys are told first: a misspelt one is also missing."""
     one, item, table = wanted[1:] if isinstance(wanted, _Value) else (None, None, wanted)
     if table is not None and isinstance(given, dict):
@@ -145,9 +155,9 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
 
 def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
     known = list_bundled_maps()
-    if entries == [study.ALL]:
+    if entries == [ALL_MAPS]:
         entries = list(known)
-    once(entries, ("maps",))
+    require_distinct(entries, ("maps",))
     maps: dict[str, StudyMap] = {}
     for k, entry in enumerate(entries):
         try:

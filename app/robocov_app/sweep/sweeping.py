@@ -17,8 +17,9 @@ from robocov.kernel_compilation import compile_kernels
 from robocov.text import escape_controls
 from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
 from robocov_app.sweep.ledger import Ledger, difference_of, opened
-from robocov_app.sweep.study import Study, Task, tasks_of
+from robocov_app.sweep.study import Study
 from robocov_app.sweep.table import Table, columns_of, row_of
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import Outcome, perform, prepared
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import echo, format_json
@@ -178,12 +179,12 @@ def sweep(
         table = stack.enter_context(Table(folder, columns, format_json(content).encode(), parquet=parquet))
         count = Count(len(study))
         tell = stack.enter_context(sweep_progress(title, count, quiet=quiet))
-        looked = takewhile(lambda _: not stopped.requested, tasks_of(study))
+        looked = takewhile(lambda _: not stopped.requested, generate_tasks(study))
         survey = ledger.survey(looked, retry_failed=retry_failed, keep_versions=keep_versions)
         count.reused = len(survey.todo) - sum(survey.todo)
         for line in survey.words(keep_versions=keep_versions):
             tell.say(line)
-        rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
+        rows = _Rows(ledger, table, zip(survey.todo, generate_tasks(study), strict=False))
 
         def open_executor() -> Executor:
             if scheduler is not None:
@@ -202,7 +203,9 @@ def sweep(
         failure: RobocovError | None = None
         try:
             rows.write()
-            for _ in worked_off(compress(tasks_of(study), survey.todo), open_executor, count, stopped, keep):
+            for _ in worked_off(
+                compress(generate_tasks(study), survey.todo), open_executor, count, stopped, keep
+            ):
                 tell(count)
         except RobocovError as error:  # what is done belongs into the table all the same
             failure = error
@@ -295,9 +298,9 @@ def rehearsed(
 ) -> Rehearsal:
     """Do the first run that is left, or else the first, and write nothing."""
     again = {"retry_failed": retry_failed, "keep_versions": keep_versions}
-    survey = Ledger(folder).survey(tasks_of(study), **again)
+    survey = Ledger(folder).survey(generate_tasks(study), **again)
     left = sum(survey.todo)
-    chosen = next(compress(tasks_of(study), survey.todo), None) or next(tasks_of(study))
+    chosen = next(compress(generate_tasks(study), survey.todo), None) or next(generate_tasks(study))
     prepared(chosen)  # once for all runs on a map
     began = time.perf_counter()
     outcome = perform(chosen)
@@ -309,6 +312,6 @@ def rehearsed(
 
 def axes_of(study: Study) -> dict[str, int]:
     sizes = {name: len(getattr(study, name)) for name in ("maps", "robots", "teams")}
-    sizes["starts"] = sum(len(study.starts_on(each)) for each in study.maps)
+    sizes["starts"] = sum(len(study.list_starts(each)) for each in study.maps)
     sizes |= {name: len(getattr(study, name)) for name in ("seeds", "controllers")}
-    return sizes | {f"gains of {name}": len(study.gains_of(name).choices) for name in study.controllers}
+    return sizes | {f"gains of {name}": len(study.get_gains(name).choices) for name in study.controllers}

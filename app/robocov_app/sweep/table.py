@@ -17,7 +17,9 @@ from robocov.files.writing import flush_to_disk, resolve_target
 from robocov.metrics.results import read_rows
 from robocov.optional_imports import import_optional
 from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
-from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
+from robocov_app.sweep.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, TIMED
 from robocov_app.terminal.output import format_csv_line
 
@@ -66,33 +68,33 @@ def columns_of(study: Study) -> tuple[Column, ...]:
     """Return the columns of a study's table: the gains and the teams that it tries among those of all."""
     gains: dict[str, Column] = {}
     for controller in study.controllers:
-        known = get_gains(study.kind(controller))
-        for name in study.gains_of(controller).choices[0]:
+        known = get_gains(study.load_controller_class(controller))
+        for name in study.get_gains(controller).choices[0]:
             kind = "string" if isinstance(known[name], Option) else "double"
             column = Column(gain_column(name), kind, known[name].unit, known[name].meaning)
             if gains.setdefault(name, column).kind != kind:
                 # a number here and a word there: both can be written as words
                 gains[name] = gains[name]._replace(kind="string")
     team = []
-    for name in study.swept:
+    for name in study.varied_parameters:
         meaning = f"{name.replace('_', ' ')} {'of the run' if name in CONDITIONS else 'of the robots'}"
-        kind = "string" if name in WORDS else "double"
-        team.append(Column(parameter_column(name), kind, UNITS[name], meaning))
-    figures = (*_FIGURES, *((_TIME,) if study.mixed_speeds else ()), *(_METRICS if study.metrics else ()))
+        kind = "string" if name in TEXT_PARAMETERS else "double"
+        team.append(Column(name_parameter_column(name), kind, UNITS[name], meaning))
+    figures = (*_FIGURES, *((_TIME,) if study.has_mixed_speeds else ()), *(_METRICS if study.metrics else ()))
     return (*_BEFORE, *gains.values(), *team, _DURATION, *figures, *_AFTER)
 
 
 def gain_column(name: str) -> str:
     """Return the name of the column of a gain: its own, unless another column has it."""
     taken = {column.name for column in (*_BEFORE, _DURATION, *_FIGURES, _TIME, *_METRICS, *_AFTER)}
-    taken |= {parameter_column(name) for name in UNITS}
+    taken |= {name_parameter_column(name) for name in UNITS}
     return f"gain_{name}" if name in taken else name
 
 
 def row_of(task: Task, entry: Entry) -> dict[str, Any]:
     row: dict[str, Any] = {column.name: getattr(task, column.name) for column in _BEFORE}
     row |= {gain_column(name): value for name, value in task.gains.items()}
-    row |= {parameter_column(name): value for name, value in task.team.items()}
+    row |= {name_parameter_column(name): value for name, value in task.team.items()}
     return {**row, "duration_s": task.duration, **entry.figures, "run": task.name, "error": entry.error}
 
 

@@ -26,7 +26,9 @@ from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.jobs.messages import Line
 from robocov_app.runs.execution import build_cost_table
-from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
+from robocov_app.sweep.controller_files import source_to_json
+from robocov_app.sweep.parameters import build_conditions, build_swept_team
+from robocov_app.sweep.tasks import Task
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
@@ -87,7 +89,7 @@ def perform(task: Task) -> Outcome:
             figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
             content = record.to_json(summary, lattice=task.lattice)
             content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
-            content["controller"] |= source_json(task.source)
+            content["controller"] |= source_to_json(task.source)
             kept, arrays = record.thin(task.record_hz), io.BytesIO()
             np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
             files = {"run.json": format_json(content).encode(), "record.npz": arrays.getvalue()}
@@ -133,12 +135,12 @@ def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, fl
         task.controller,
         task.gains,
         source=task.source,
-        team=team_of(task.robots, task.team),
+        team=build_swept_team(task.robots, task.team),
         start=task.start,
         seed=task.seed,
         duration=task.duration,
         dt=task.dt,
-        conditions=conditions_of(task.team, task.seed, task.robots),
+        conditions=build_conditions(task.team, task.seed, task.robots),
     )
     with provide_modules({} if task.source is None else task.source.modules):
         simulation = scenario.build_simulation()

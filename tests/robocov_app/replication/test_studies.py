@@ -26,8 +26,8 @@ from robocov_app.replication.contenders import (
 )
 from robocov_app.replication.evidence import account_of
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, FULL, KINDS, NON_CONVEX, QUICK, TEAM, UNSEEN
-from robocov_app.sweep.study import TEAM as TEAM_PARAMETERS
-from robocov_app.sweep.study import tasks_of
+from robocov_app.sweep.parameters import TEAM_PARAMETERS as TEAM_PARAMETERS
+from robocov_app.sweep.tasks import generate_tasks
 
 BEST = {
     "rapf": {"k_rep": 0.3, "rho_0": 3.0, "k_att": 30.0, "attraction_limit": None},
@@ -156,7 +156,7 @@ class TestPaper:
         assert len(studies.gains_study(FULL)) == 12 * 2 * (20 + 80)
 
     def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
-        tasks = list(tasks_of(studies.claims_contest(TINY, PAPERS).study))
+        tasks = list(generate_tasks(studies.claims_contest(TINY, PAPERS).study))
         assert len({(task.duration, task.dt, task.lattice, str(task.team)) for task in tasks}) == 1
         scenarios = {(task.map, task.start, task.seed) for task in tasks}
         for scenario in scenarios:
@@ -196,9 +196,9 @@ class TestPaper:
         shared, best = studies.figure_studies(TINY), studies.figure_studies(TINY, PAPERS)
         assert list(best) == ["figures-a-best", "figures-b-best"]
         for name, study in best.items():
-            tasks = list(tasks_of(study))
+            tasks = list(generate_tasks(study))
             assert all(BEST[task.controller].items() <= task.gains.items() for task in tasks)
-            beside = tasks_of(shared[name.removesuffix("-best")])
+            beside = generate_tasks(shared[name.removesuffix("-best")])
             places = [(task.document, task.start, task.seed, task.controller) for task in beside]
             assert [(task.document, task.start, task.seed, task.controller) for task in tasks] == places
 
@@ -226,11 +226,11 @@ class TestBeyond:
 
     @both
     def test_baselines_begin_where_the_papers_controllers_began(self, plan):
-        papers = list(tasks_of(studies.claims_contest(plan, PAPERS).study))
+        papers = list(generate_tasks(studies.claims_contest(plan, PAPERS).study))
         places = {(task.document, task.start, task.seed) for task in papers}
         limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
         for each in baseline_contests(plan).values():
-            for task in tasks_of(each.study):
+            for task in generate_tasks(each.study):
                 assert (task.document, task.start, task.seed) in places
                 assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
 
@@ -245,13 +245,13 @@ class TestBeyond:
 
     def test_who_knows_the_density_begins_where_the_other_does(self):
         contests = studies.beyond_contests(QUICK, {}, UNTUNED)
-        known, ignored = (tasks_of(contests[name].study) for name in ("density", "density-ignored"))
+        known, ignored = (generate_tasks(contests[name].study) for name in ("density", "density-ignored"))
         for with_, without in zip(known, ignored, strict=True):
             assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
             assert with_.document != without.document
 
     def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
-        tasks = list(tasks_of(studies.beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
+        tasks = list(generate_tasks(studies.beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
         by_distance, by_time = (
             [task for task in tasks if task.gains["cells"] == cells] for cells in ("distance", "time")
         )
@@ -261,7 +261,9 @@ class TestBeyond:
             assert (one.team, one.map, one.start) == (other.team, other.map, other.start)
 
     def test_each_disturbance_stands_alone(self):
-        found = {name: list(tasks_of(study)) for name, study in studies.conditions_studies(TINY).items()}
+        found = {
+            name: list(generate_tasks(study)) for name, study in studies.conditions_studies(TINY).items()
+        }
         names = "ideal", *(name.replace("_", "-") for name in studies.AXES)
         parts = "conditions", "conditions-others"
         assert set(found) == {f"{part}-{name}" for part in parts for name in names}

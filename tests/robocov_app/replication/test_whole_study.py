@@ -31,7 +31,8 @@ from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
 from robocov_app.replication.figures import CAPTIONS, arrival, beyond_plots, describe_figure, gap_samples
 from robocov_app.replication.pages import Image
 from robocov_app.replication.results import Interrupted, forecast, open_folder
-from robocov_app.sweep.study import Study, tasks_of
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.tasks import generate_tasks
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
@@ -112,7 +113,7 @@ class TestRuns:
     def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
         monkeypatch.setattr("robocov_app.sweep.worker.perform", lambda task: None)
         without = forecast(tmp_path, TINY, 2, claims=False, beyond=True)
-        for task in tasks_of(studies.gains_study(TINY)):
+        for task in generate_tasks(studies.gains_study(TINY)):
             (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)
         # what a former version has done lies there as well
         (tmp_path / "studies" / "gains" / "runs" / "of-a-former-version").mkdir()

@@ -19,8 +19,8 @@ from robocov.errors import OutputError, RobocovError
 from robocov_app.cli import main
 from robocov_app.sweep import executors as cluster_module
 from robocov_app.sweep.executors import Cluster
-from robocov_app.sweep.study import tasks_of
 from robocov_app.sweep.sweeping import Totals, sweep
+from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
 distributed = pytest.importorskip("distributed")
@@ -73,7 +73,7 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
 
 def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster_module, "_LOOK", 0.05)
-    task = next(tasks_of(small_study()))
+    task = next(generate_tasks(small_study()))
     with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         assert executor.next(0.1) is None
@@ -92,7 +92,7 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "weights_of_mine.py").write_text("PULL = 0.5\n")
     name = controller(tmp_path, "        from weights_of_mine import PULL\n        self = Mine(PULL)\n")
-    (task, *_) = tasks_of(small_study(controllers=(name,)))
+    (task, *_) = generate_tasks(small_study(controllers=(name,)))
     here = perform(task)
     for path in tmp_path.iterdir():
         path.unlink()
@@ -108,7 +108,7 @@ def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp
     name = controller(tmp_path, "        time.sleep(0.02)\n")
     study = small_study(controllers=(name,), seeds=range(12))
     with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
-        for task in tasks_of(study):
+        for task in generate_tasks(study):
             executor.submit(task)
         while executor.next(0.1) is None:
             pass
@@ -152,7 +152,7 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
     def unknown(task: object) -> None:
         raise ModuleNotFoundError("No module named 'robocov_app'")
 
-    task = next(tasks_of(small_study()))
+    task = next(generate_tasks(small_study()))
     monkeypatch.setattr(cluster_module, "perform", unknown)
     with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
@@ -164,7 +164,7 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
 def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:
     from concurrent.futures import ThreadPoolExecutor
 
-    tasks = list(tasks_of(small_study(seeds=range(8))))
+    tasks = list(generate_tasks(small_study(seeds=range(8))))
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(perform, tasks)) == [perform(task) for task in tasks]
 

@@ -8,37 +8,38 @@ from swept import small_study
 from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.study import CONDITIONS, condition_axes, conditions_of, tasks_of
+from robocov_app.sweep.parameters import CONDITIONS, build_conditions, parse_condition_axes
 from robocov_app.sweep.study_file import study_of
 from robocov_app.sweep.table import columns_of, row_of
+from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
 
 def test_every_combination_is_tried() -> None:
     study = small_study(conditions={"loss": [0.0, 0.5], "fail": ["", "1@0.2"], "delay": 0.1})
     assert len(study.teams) == 4
-    assert study.swept == ("loss", "fail")
-    assert len(list(tasks_of(study))) == len(study) == 16
+    assert study.varied_parameters == ("loss", "fail")
+    assert len(list(generate_tasks(study))) == len(study) == 16
     columns = [column.name for column in columns_of(study)]
     assert "loss" in columns
     assert "fail" in columns
     assert "delay_s" not in columns
-    row = row_of(list(tasks_of(study))[-1], Entry({}, None))
+    row = row_of(list(generate_tasks(study))[-1], Entry({}, None))
     assert (row["loss"], row["fail"], row["delay_s"]) == (0.5, "1@0.2", 0.1)
 
 
 def test_a_study_without_conditions_has_the_tasks_that_it_had() -> None:
     """What was done before there were conditions is not done again."""
-    assert [task.digest for task in tasks_of(small_study())] == [
-        task.digest for task in tasks_of(small_study(conditions={}))
+    assert [task.digest for task in generate_tasks(small_study())] == [
+        task.digest for task in generate_tasks(small_study(conditions={}))
     ]
-    assert "loss" not in next(tasks_of(small_study())).team
+    assert "loss" not in next(generate_tasks(small_study())).team
 
 
 def test_a_run_is_under_its_conditions() -> None:
     study = small_study(conditions={"loss": 0.5, "fail": "2@0.2"}, controllers=("rapf",), seeds=[3])
-    (task,) = tasks_of(study)
-    assert conditions_of(task.team, task.seed, task.robots) == Conditions(
+    (task,) = generate_tasks(study)
+    assert build_conditions(task.team, task.seed, task.robots) == Conditions(
         loss=0.5, failures=((2, 0.2),), seed=3
     )
     outcome = perform(task)
@@ -60,7 +61,7 @@ def test_a_run_is_under_its_conditions() -> None:
 )
 def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        condition_axes(given)
+        parse_condition_axes(given)
 
 
 def test_robots_that_are_not_there_cannot_fail() -> None:
@@ -92,4 +93,4 @@ def test_a_file_says_it_in_a_table() -> None:
 def test_all_conditions_can_be_swept() -> None:
     usual = {"fail": "1@1", "join": "2@1", "message_rate": 2.0}
     for name in CONDITIONS:
-        assert condition_axes({name: usual.get(name, 1.0)})[name] == [usual.get(name, 1.0)]
+        assert parse_condition_axes({name: usual.get(name, 1.0)})[name] == [usual.get(name, 1.0)]

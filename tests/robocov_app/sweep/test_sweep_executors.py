@@ -13,7 +13,7 @@ from swept import controller, small_study
 from robocov.errors import OutputError
 from robocov_app.sweep import executors as pool_module
 from robocov_app.sweep.executors import Executor, LocalPool, Lost, Returned, processors
-from robocov_app.sweep.study import Task, tasks_of
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import Outcome, perform
 
 PATIENCE = 60.0
@@ -67,7 +67,7 @@ class Scripted(Executor):
 
 @pytest.fixture
 def tasks() -> list[Task]:
-    return list(tasks_of(small_study(seeds=range(3))))
+    return list(generate_tasks(small_study(seeds=range(3))))
 
 
 def test_no_more_is_handed_out_than_is_wanted(tasks: list[Task]) -> None:
@@ -105,7 +105,7 @@ def test_a_task_that_is_to_blame_holds_nobody_up(tasks: list[Task]) -> None:
 
 
 def test_workers_that_end_again_and_again_end_the_sweep() -> None:
-    tasks = list(tasks_of(small_study(seeds=range(20))))
+    tasks = list(generate_tasks(small_study(seeds=range(20))))
     with Scripted(2, {task.name: [KILLED] * 9 for task in tasks}) as executor:
         told = pytest.raises(OutputError, match=r"workers have ended one after the other.*signal 9")
         with told:
@@ -135,10 +135,10 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
     names = {file: controller(tmp_path, law, file) for file, law in laws.items()}
     study = small_study(controllers=("rapf", *names.values()), seeds=(0,))
     with LocalPool(2) as pool:
-        outcomes = done_by(pool, list(tasks_of(study)))
+        outcomes = done_by(pool, list(generate_tasks(study)))
     errors = {
         task.controller.rpartition(":")[0].rpartition("/")[2]: outcomes[task.name].error
-        for task in tasks_of(study)
+        for task in generate_tasks(study)
     }
     assert errors == {
         "": None,
@@ -149,7 +149,7 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
         "crashes.py": f"controller {names['crashes.py']!r}: its process ended "
         "(killed by signal 11 (SIGSEGV))",
     }
-    (crashed,) = (task.name for task in tasks_of(study) if "crashes.py" in task.controller)
+    (crashed,) = (task.name for task in generate_tasks(study) if "crashes.py" in task.controller)
     assert b"crashes.py" in outcomes[crashed].files["error.json"], "its last words say where"
 
 
@@ -160,7 +160,7 @@ def test_nothing_is_left_of_a_pool(tmp_path: Path) -> None:
     name = controller(tmp_path, f"        time.sleep(60)\n        Path({str(awake)!r}).touch()\n")
     others = children()  # of tests before this one
     with LocalPool(2) as pool:
-        for task in tasks_of(small_study(controllers=(name,))):
+        for task in generate_tasks(small_study(controllers=(name,))):
             pool.submit(task)
         end = time.monotonic() + PATIENCE
         while len(children() - others) < 2 and time.monotonic() < end:
@@ -237,7 +237,7 @@ def test_a_worker_that_is_killed_while_it_starts_is_told(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(pool_module, "start_process", start)
     with LocalPool(1) as pool:
-        pool.submit(next(iter(tasks_of(small_study()))))
+        pool.submit(next(iter(generate_tasks(small_study()))))
         ending = r"worker killed by signal 9 \(SIGKILL\) while starting$"
         with pytest.raises(OutputError, match=ending):
             pool.next(PATIENCE)

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from robocov.controllers import Rapf, Rpf, get_gain_values, get_gains
 from robocov.errors import ParameterError
-from robocov_app.sweep.study import Gains, Method, Range, Sampling
+from robocov_app.sweep.gains import build_gains
+from robocov_app.sweep.sampling import Range, Sampling, SamplingMethod
 
 METHODS = ("sobol", "halton", "latin-hypercube")
 
@@ -20,12 +21,12 @@ class Still:
 
 
 def test_without_a_word_a_controller_has_its_defaults() -> None:
-    assert Gains.of(Rpf, {}, None).choices == ({"k_rep": 3.0, "rho_0": 4.0},)
-    assert Gains.of(Still, {}, None).choices == ({},)
+    assert build_gains(Rpf, {}, None).choices == ({"k_rep": 3.0, "rho_0": 4.0},)
+    assert build_gains(Still, {}, None).choices == ({},)
 
 
 def test_lists_are_combined_in_order() -> None:
-    gains = Gains.of(Rapf, {"k_rep": [0.1, 1], "attraction_limit": [2.0, None], "k_att": 3}, None)
+    gains = build_gains(Rapf, {"k_rep": [0.1, 1], "attraction_limit": [2.0, None], "k_att": 3}, None)
     tried = [(choice["k_rep"], choice["attraction_limit"]) for choice in gains.choices]
     assert tried == [(0.1, 2.0), (0.1, None), (1.0, 2.0), (1.0, None)]
     assert all(choice["k_att"] == 3.0 and choice["rho_0"] == Rapf().rho_0 for choice in gains.choices)
@@ -34,14 +35,14 @@ def test_lists_are_combined_in_order() -> None:
 
 def test_sets_of_gains_are_taken_one_by_one() -> None:
     paper = {"k_rep": 1, "rho_0": 2, "k_att": 3, "attraction_limit": None}
-    gains = Gains.of(Rapf, [paper, {}], None)
+    gains = build_gains(Rapf, [paper, {}], None)
     assert gains.choices == (get_gain_values(Rapf(**paper)), get_gain_values(Rapf()))
-    assert Gains.of(Rapf, gains, None) == gains
+    assert build_gains(Rapf, gains, None) == gains
 
 
 @pytest.mark.parametrize("word", ["null", float("inf")])
 def test_no_limit_has_words_where_a_file_has_none(word: object) -> None:
-    (choice,) = Gains.of(Rapf, {"attraction_limit": word}, None).choices
+    (choice,) = build_gains(Rapf, {"attraction_limit": word}, None).choices
     assert choice["attraction_limit"] is None
 
 
@@ -54,11 +55,11 @@ def test_no_limit_has_words_where_a_file_has_none(word: object) -> None:
     seed=st.integers(0, 10**6),
 )
 def test_samples_are_inside_their_ranges_and_always_the_same(
-    low: float, factor: float, scale: str, method: Method, samples: int, seed: int
+    low: float, factor: float, scale: str, method: SamplingMethod, samples: int, seed: int
 ) -> None:
     wanted = {"k_rep": Range(low, low * factor, scale), "rho_0": Range(0.5, 4.0)}
-    gains = Gains.of(Rpf, wanted, Sampling(method, samples, seed))
-    assert gains == Gains.of(Rpf, wanted, Sampling(method, samples, seed))
+    gains = build_gains(Rpf, wanted, Sampling(method, samples, seed))
+    assert gains == build_gains(Rpf, wanted, Sampling(method, samples, seed))
     assert gains.ranges == wanted
     assert len(gains.choices) == samples
     for name, each in wanted.items():
@@ -68,9 +69,9 @@ def test_samples_are_inside_their_ranges_and_always_the_same(
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_samples_fill_a_range_evenly_on_its_scale(method: Method) -> None:
+def test_samples_fill_a_range_evenly_on_its_scale(method: SamplingMethod) -> None:
     wanted = {"k_rep": Range(0.01, 100.0, "log"), "rho_0": Range(1.0, 3.0)}
-    gains = Gains.of(Rpf, wanted, Sampling(method, 64, 3))
+    gains = build_gains(Rpf, wanted, Sampling(method, 64, 3))
     decades = np.log10([choice["k_rep"] for choice in gains.choices])
     assert np.histogram(decades, bins=4, range=(-2, 2))[0] == pytest.approx(16, abs=2)
     reach = [choice["rho_0"] for choice in gains.choices]
@@ -78,28 +79,28 @@ def test_samples_fill_a_range_evenly_on_its_scale(method: Method) -> None:
 
 
 def test_rounding_leads_out_of_no_range() -> None:
-    assert Range(1 / 3, 2 / 3).values(np.array([0.0, 0.5, 1.0])) == [1 / 3, 0.5, 2 / 3]
+    assert Range(1 / 3, 2 / 3).interpolate(np.array([0.0, 0.5, 1.0])) == [1 / 3, 0.5, 2 / 3]
 
 
 @pytest.mark.parametrize(("method", "grows"), [("sobol", True), ("halton", True), ("latin-hypercube", False)])
-def test_more_samples_keep_the_first_ones(method: Method, grows: bool) -> None:
+def test_more_samples_keep_the_first_ones(method: SamplingMethod, grows: bool) -> None:
     wanted = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
-    few = Gains.of(Rpf, wanted, Sampling(method, 5)).choices
-    many = Gains.of(Rpf, wanted, Sampling(method, 40)).choices
+    few = build_gains(Rpf, wanted, Sampling(method, 5)).choices
+    many = build_gains(Rpf, wanted, Sampling(method, 40)).choices
     assert (many[:5] == few) is grows
 
 
 def test_controllers_with_the_same_ranges_get_the_same_samples() -> None:
     wanted, sampling = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}, Sampling(samples=7, seed=2)
     tried = [
-        [(choice["k_rep"], choice["rho_0"]) for choice in Gains.of(kind, wanted, sampling).choices]
+        [(choice["k_rep"], choice["rho_0"]) for choice in build_gains(kind, wanted, sampling).choices]
         for kind in (Rapf, Rpf)
     ]
     assert tried[0] == tried[1]
 
 
 def test_lists_are_combined_with_every_sample() -> None:
-    gains = Gains.of(Rapf, {"k_att": [3, 30], "k_rep": Range(0.1, 10.0)}, Sampling(samples=4))
+    gains = build_gains(Rapf, {"k_att": [3, 30], "k_rep": Range(0.1, 10.0)}, Sampling(samples=4))
     assert [choice["k_att"] for choice in gains.choices] == [3.0] * 4 + [30.0] * 4
     assert [choice["k_rep"] for choice in gains.choices[:4]] == [c["k_rep"] for c in gains.choices[4:]]
 
@@ -117,11 +118,15 @@ WRONG = [
     (Rapf, {"k_rap": 1}, "gains.x: unknown gain 'k_rap': did you mean 'k_rep'? (known: "),
     (Rapf, {"k_rep": -1}, "gains.x.k_rep: expected a number from 0 to 1e+06 N m³, got -1"),
     (Rapf, {"k_rep": [1, "big"]}, "gains.x.k_rep[1]: expected a number from "),
-    (Rapf, {"k_rep": [1, 2, 1.0]}, "gains.x.k_rep[2]: 1.0 is given already at gains.x.k_rep[0]; "),
+    (
+        Rapf,
+        {"k_rep": [1, 2, 1.0]},
+        "gains.x.k_rep[2]: duplicate value 1.0, given already at gains.x.k_rep[0]",
+    ),
     (Rapf, {"k_rep": []}, "gains.x.k_rep: expected at least one value, got none"),
     (Rapf, {"k_rep": None}, "gains.x.k_rep: expected a number from "),
     (Rapf, [], "gains.x: expected at least one set of gains, got none"),
-    (Rapf, [{"k_rep": 1}, {"k_rep": 1}], "gains.x[1]: {'k_rep': 1.0, "),
+    (Rapf, [{"k_rep": 1}, {"k_rep": 1}], "gains.x[1]: duplicate value {'k_rep': 1.0, "),
     (Rapf, [{"k_rep": -1}], "gains.x[0].k_rep: expected "),
     (Rapf, {"k_rep": Range(2, 1)}, "gains.x.k_rep.high: expected a number above 2, got 1"),
     (Rapf, {"k_rep": Range(-1, 1)}, "gains.x.k_rep.low: expected a number from 0 to "),
@@ -132,26 +137,26 @@ WRONG = [
         {"attraction_limit": Range(1, None)},
         "gains.x.attraction_limit.high: expected a number, got None",
     ),
-    (Rapf, {"k_rep": Range(1.0, 1.0000001)}, "gains.x.samples[1]: {'k_rep': 1.0, "),
+    (Rapf, {"k_rep": Range(1.0, 1.0000001)}, "gains.x.samples[1]: duplicate value {'k_rep': 1.0, "),
     (
         Picky,
         {"k": [1, 2]},
         "controller 'Picky' cannot be created: ValueError: not two (test_sweep_gains.py",
     ),
-    (object, {"k": 1}, "gains.x: 'k', but the controller has no gains"),
+    (object, {"k": 1}, "gains.x: expected no gains, as the controller has none, got 'k'"),
 ]
 
 
 @pytest.mark.parametrize(("kind", "wanted", "message"), WRONG)
 def test_what_cannot_be_tried_is_named_with_its_place(kind: type, wanted: object, message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        Gains.of(kind, wanted, Sampling(samples=8), ("gains", "x"))
+        build_gains(kind, wanted, Sampling(samples=8), ("gains", "x"))
     assert str(caught.value).startswith(message)
 
 
 def test_a_range_needs_a_way_to_sample_it() -> None:
-    with pytest.raises(ParameterError, match=r"^gains\.rpf\.k_rep: a range, but sampling says neither"):
-        Gains.of(Rpf, {"k_rep": Range(1, 2)}, None, ("gains", "rpf"))
+    with pytest.raises(ParameterError, match=r"^gains\.rpf\.k_rep: a range requires a table"):
+        build_gains(Rpf, {"k_rep": Range(1, 2)}, None, ("gains", "rpf"))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from robocov import __version__
 from robocov.errors import InputError, OutputError
 from robocov_app.sweep import ledger as ledger_module
 from robocov_app.sweep.ledger import Entry, Ledger, Survey, is_sweep, opened
-from robocov_app.sweep.study import Task, tasks_of
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import Outcome, perform
 
 STUDY = small_study().to_json()
@@ -27,7 +27,7 @@ FAILED = Outcome({"error.json": b"{}"}, {}, "it broke")
 
 @pytest.fixture
 def task() -> Task:
-    return next(tasks_of(small_study()))
+    return next(generate_tasks(small_study()))
 
 
 def test_a_run_is_kept_and_found_again(tmp_path: Path, task: Task) -> None:

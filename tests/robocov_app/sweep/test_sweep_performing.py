@@ -17,13 +17,14 @@ from robocov.cost import CoverageCost
 from robocov.metrics import compute_cost_history, summarize
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
-from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
+from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.table import columns_of
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepared, simulated
 
 
 def first(study: Study) -> Task:
-    return next(tasks_of(study))
+    return next(generate_tasks(study))
 
 
 def kept(outcome: Outcome, folder: Path) -> Record:
@@ -72,7 +73,7 @@ def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: P
 
 
 def test_the_same_task_gives_the_same_bytes() -> None:
-    for task in tasks_of(small_study()):
+    for task in generate_tasks(small_study()):
         assert perform(task) == perform(task)
 
 
@@ -127,7 +128,7 @@ def test_a_start_without_room_is_an_outcome() -> None:
 
 def test_costs_of_the_last_maps_are_remembered() -> None:
     maps = [StudyMap(f"room {k}", replace(ROOM, name=f"room {k}")) for k in range(6)]
-    tasks = list(tasks_of(small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
+    tasks = list(generate_tasks(small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
     costs = [prepared(task)[1] for task in tasks]
     assert prepared(tasks[-1])[1] is costs[-1]
     assert prepared(tasks[0])[1] is not costs[0], "memory does not grow with the number of maps"

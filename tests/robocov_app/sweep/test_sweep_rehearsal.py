@@ -7,8 +7,9 @@ from swept import HALL, ROOM, small_study
 
 from robocov_app.sweep import sweeping as rehearsal_module
 from robocov_app.sweep.ledger import opened
-from robocov_app.sweep.study import StudyMap, tasks_of
+from robocov_app.sweep.study import StudyMap
 from robocov_app.sweep.sweeping import axes_of, rehearsed
+from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
 
@@ -37,7 +38,7 @@ def test_time_and_space_are_those_of_one_run_times_their_number(
     moments = iter([10.0, 12.5])
     monkeypatch.setattr(rehearsal_module.time, "perf_counter", lambda: next(moments))
     found = rehearsed(study, tmp_path / "none", workers=4)
-    first = next(tasks_of(study))
+    first = next(generate_tasks(study))
     size = sum(map(len, perform(first).files.values()))
     assert (found.runs, found.left, found.run, found.error) == (10, 10, first.name, None)
     assert found.seconds_a_run == 2.5
@@ -48,7 +49,7 @@ def test_time_and_space_are_those_of_one_run_times_their_number(
 
 def test_what_is_done_already_is_not_counted(tmp_path: Path) -> None:
     study = small_study(seeds=range(3))
-    tasks = list(tasks_of(study))
+    tasks = list(generate_tasks(study))
     with opened(tmp_path, study.to_json()) as ledger:
         for task in tasks[:2]:
             ledger.keep(task, perform(task))

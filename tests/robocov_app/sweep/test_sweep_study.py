@@ -8,7 +8,10 @@ import pytest
 from swept import HALL, ROOM, controller, small_study
 
 from robocov.errors import InputError, ParameterError
-from robocov_app.sweep.study import Range, Sampling, Study, StudyMap, tasks_of, team_of
+from robocov_app.sweep.parameters import build_swept_team
+from robocov_app.sweep.sampling import Range, Sampling
+from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.tasks import generate_tasks
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
@@ -18,28 +21,28 @@ def test_a_study_takes_lists_and_single_values() -> None:
     assert study.robots == (1, 2)
     assert [team["max_speed"] for team in study.teams] == [0.5, 1.0]
     assert all(team["radius"] == 0.2 and team["communication_range"] is None for team in study.teams)
-    assert study.swept == ("max_speed",)
+    assert study.varied_parameters == ("max_speed",)
     assert len(study) == 2 * 2 * 2 * 2
 
 
 def test_the_number_of_runs_counts_starts_and_gains() -> None:
     study = small_study(maps=MAPS, starts="*", gains={"rapf": {"k_rep": [1, 2, 3]}}, seeds=range(5))
-    assert [study.starts_on(each) for each in study.maps] == [("corner", "spread"), ("door",)]
+    assert [study.list_starts(each) for each in study.maps] == [("corner", "spread"), ("door",)]
     assert len(study) == 3 * 5 * (3 + 1)
 
 
 def test_by_default_the_first_start_of_each_map_is_taken() -> None:
     study = small_study(maps=MAPS)
-    assert [study.starts_on(each) for each in study.maps] == [("corner",), ("door",)]
+    assert [study.list_starts(each) for each in study.maps] == [("corner",), ("door",)]
     bare = StudyMap("bare", replace(ROOM, starts={}))
     for starts in ((), ("*",)):
-        assert small_study(maps=(bare,), starts=starts).starts_on(bare) == ("uniform",)
-    assert small_study(maps=MAPS, starts=("uniform",)).starts_on(MAPS[1]) == ("uniform",)
+        assert small_study(maps=(bare,), starts=starts).list_starts(bare) == ("uniform",)
+    assert small_study(maps=MAPS, starts=("uniform",)).list_starts(MAPS[1]) == ("uniform",)
 
 
 def test_a_team_is_what_the_study_says() -> None:
     (said,) = small_study(sensing_range=float("inf"), communication_range=2).teams
-    team = team_of(3, said)
+    team = build_swept_team(3, said)
     assert len(team) == 3
     assert team.sensing_range.tolist() == [float("inf")] * 3
     assert team.communication_range.tolist() == [2.0] * 3
@@ -53,7 +56,7 @@ def test_a_controller_of_ones_own_is_read_when_the_study_is_made(tmp_path: Path)
     source = study.sources["mine.py:Mine"]
     assert source.text == (tmp_path / "mine.py").read_text()
     (tmp_path / "mine.py").unlink()
-    assert study.kind("mine.py:Mine")().pull == 1.0
+    assert study.load_controller_class("mine.py:Mine")().pull == 1.0
     assert len(study) == 4
 
 
@@ -78,14 +81,17 @@ def test_the_study_is_written_whole(tmp_path: Path) -> None:
 
 WRONG = [
     ({"maps": ()}, "maps: expected at least one, got none"),
-    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: 'room' is given already at maps[0]; duplicate value"),
+    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: duplicate value 'room', given already at maps[0]"),
     (
         {"maps": (StudyMap("a\nb", ROOM),)},
         "maps[0]: expected a string of 1 to 100 characters on one line",
     ),
     ({"controllers": ()}, "controllers: expected at least one, got none"),
     ({"controllers": ("rapf", "rapff")}, "controllers[1]: unknown controller 'rapff': did you mean 'rapf'?"),
-    ({"controllers": ("rapf", "rapf")}, "controllers[1]: 'rapf' is given already at controllers[0]"),
+    (
+        {"controllers": ("rapf", "rapf")},
+        "controllers[1]: duplicate value 'rapf', given already at controllers[0]",
+    ),
     ({"controllers": (3,)}, "controllers[0]: expected a string, got 3"),
     ({"controllers": ("none.py:Mine",)}, "controllers[0]: 'none.py:Mine': "),
     ({"controllers": ("none.py",)}, "controllers[0]: controller 'none.py': expected a file and a class, "),
@@ -93,13 +99,13 @@ WRONG = [
     ({"robots": (True,)}, "robots[0]: expected a whole number"),
     ({"robots": ()}, "robots: expected at least one, got none"),
     ({"seeds": (1, -2)}, "seeds[1]: expected a whole number from 0 to "),
-    ({"seeds": (1, 2, 1)}, "seeds[2]: 1 is given already at seeds[0]"),
+    ({"seeds": (1, 2, 1)}, "seeds[2]: duplicate value 1, given already at seeds[0]"),
     (
         {"starts": ("corner", "conrer")},
         "starts[1]: map 'A room': unknown start 'conrer': did you mean 'corner'?",
     ),
-    ({"starts": ("corner", "*")}, "starts[1]: '*' is all of them, "),
-    ({"starts": ("corner", "corner")}, "starts[1]: 'corner' is given already at starts[0]"),
+    ({"starts": ("corner", "*")}, "starts[1]: '*' stands for all starts. "),
+    ({"starts": ("corner", "corner")}, "starts[1]: duplicate value 'corner', given already at starts[0]"),
     ({"duration": -1}, "duration: expected a number from 0 to 1e+06, got -1"),
     ({"duration": float("nan")}, "duration: expected a number"),
     (
@@ -112,7 +118,7 @@ WRONG = [
     ({"record_hz": "often"}, "record_hz: expected a number"),
     ({"max_speed": -1}, "team.max_speed: expected a number from 1e-06 to 1000, got -1.0 m/s"),
     ({"max_speed": (1, -1)}, "team.max_speed[1]: expected a number from 1e-06 to 1000, got -1.0 m/s"),
-    ({"max_speed": (1, 1.0)}, "team.max_speed[1]: 1.0 is given already at team.max_speed[0]"),
+    ({"max_speed": (1, 1.0)}, "team.max_speed[1]: duplicate value 1.0, given already at team.max_speed[0]"),
     ({"max_speed": None}, "team.max_speed: expected a number, got None"),
     ({"max_speed": 10**400}, "team.max_speed: expected a number, got 1000"),
     ({"radius": ()}, "team.radius: expected at least one value, got none"),
@@ -152,14 +158,14 @@ GROUPS = ({"count": 1, "max_speed": 1.0, "radius": 0.15}, {"count": 2, "max_spee
 def test_a_team_of_groups() -> None:
     study = small_study(group=GROUPS, robots=(6,), viscosity=(1.0, 2.0))
     assert study.robots == (3,)
-    assert study.mixed_speeds
-    assert study.swept == ("viscosity",)
-    task = next(tasks_of(study))
-    team = team_of(task.robots, task.team)
+    assert study.has_mixed_speeds
+    assert study.varied_parameters == ("viscosity",)
+    task = next(generate_tasks(study))
+    team = build_swept_team(task.robots, task.team)
     assert team.max_speed.tolist() == [1.0, 0.4, 0.4]
     assert team.radius.tolist() == [0.15, 0.1, 0.1]
     assert team.viscosity.tolist() == [1.0, 1.0, 1.0]
-    assert not small_study().mixed_speeds
+    assert not small_study().has_mixed_speeds
     with pytest.raises(
         ParameterError, match=r"robots: expected 3 as in the groups of the team, got \[2, 4\]"
     ):
@@ -169,7 +175,7 @@ def test_a_team_of_groups() -> None:
 
 
 def test_metrics_are_another_task() -> None:
-    tasks = [next(tasks_of(small_study(metrics=value))) for value in (False, True)]
+    tasks = [next(generate_tasks(small_study(metrics=value))) for value in (False, True)]
     assert [task.metrics for task in tasks] == [False, True]
     assert tasks[0].digest != tasks[1].digest
     with pytest.raises(ParameterError, match="metrics: expected true or false, got 1"):
@@ -178,9 +184,9 @@ def test_metrics_are_another_task() -> None:
 
 def test_kinematics_are_swept_as_words() -> None:
     study = small_study(kinematics=["point", "unicycle"], turning_rate=2.0)
-    assert study.swept == ("kinematics",)
-    assert [team_of(2, team).track_width[1] for team in study.teams] == [0.0, pytest.approx(0.16)]
-    assert all(team_of(1, team).turning_rate[0] == 2.0 for team in study.teams)
+    assert study.varied_parameters == ("kinematics",)
+    assert [build_swept_team(2, team).track_width[1] for team in study.teams] == [0.0, pytest.approx(0.16)]
+    assert all(build_swept_team(1, team).turning_rate[0] == 2.0 for team in study.teams)
     assert not {"kinematics", "track_width", "turning_rate"} & set(small_study().teams[0])
     with pytest.raises(ParameterError, match=r"team.kinematics: expected point or unicycle, got 'car'"):
         small_study(kinematics="car")

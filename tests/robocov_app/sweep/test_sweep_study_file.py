@@ -9,7 +9,7 @@ from swept import HALL, controller
 
 from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, save_map
-from robocov_app.sweep.study import team_of
+from robocov_app.sweep.parameters import build_swept_team
 from robocov_app.sweep.study_file import read_study
 
 STUDY = """
@@ -78,13 +78,13 @@ def test_a_study_file_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(study.teams) == 4
     assert [team["communication_range"] for team in study.teams] == [4.0, None, 4.0, None]
     assert all(team["sensing_range"] is None and team["radius"] == 0.15 for team in study.teams)
-    tried = study.gains_of("rapf").choices
+    tried = study.get_gains("rapf").choices
     assert len(tried) == 2 * 5
     assert {choice["attraction_limit"] for choice in tried} == {2.0, None}
     assert {choice["k_att"] for choice in tried} == {3.0}
-    assert len(study.gains_of("rpf").choices) == 1
-    assert [choice["pull"] for choice in study.gains_of("mine.py:Mine").choices] == [1.0, 2.0]
-    starts = sum(len(study.starts_on(each)) for each in study.maps)
+    assert len(study.get_gains("rpf").choices) == 1
+    assert [choice["pull"] for choice in study.get_gains("mine.py:Mine").choices] == [1.0, 2.0]
+    starts = sum(len(study.list_starts(each)) for each in study.maps)
     assert len(study) == starts * 2 * 4 * 4 * (10 + 1 + 2)
 
 
@@ -111,7 +111,7 @@ WRONG = [
     (
         "robots = [3, 6]",
         "robots = [3, 3]",
-        "robots[1]: 3 is given already at robots[0]; duplicate value",
+        "robots[1]: duplicate value 3, given already at robots[0]",
     ),
     ("robots = [3, 6]", "robots = [0]", "robots[0]: expected a whole number from 1 to 10000, got 0"),
     ("robots = [3, 6]", "robots = [1.5]", "robots[0]: expected a whole number, got 1.5"),
@@ -135,10 +135,10 @@ WRONG = [
     (
         'starts = "*"',
         'starts = ["*", "door"]',
-        "starts[0]: '*' is all of them, so nothing next to it is possible",
+        "starts[0]: '*' stands for all starts. Remove the other starts.",
     ),
     ('starts = "*"', "starts = 3", "starts: expected a string, or a list of strings, got 3"),
-    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: 1 is given already at seeds[0]; duplicate value"),
+    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: duplicate value 1, given already at seeds[0]"),
     ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: expected a whole number from 0 to "),
     ("seeds = 4", "seeds = 1e3", "seeds: expected how many seeds, or a list of seeds, got 1000.0"),
@@ -172,7 +172,7 @@ WRONG = [
     (
         "max_speed = [0.5, 1]",
         "max_speed = [1, 1.0]",
-        "team.max_speed[1]: 1.0 is given already at team.max_speed[0]",
+        "team.max_speed[1]: duplicate value 1.0, given already at team.max_speed[0]",
     ),
     (
         "low = 0.1",
@@ -184,7 +184,7 @@ WRONG = [
     (
         "low = 0.1",
         "low = 0",
-        "gains.rapf.k_rep.low: expected a number above 0, as the scale is that of logarithms, ",
+        "gains.rapf.k_rep.low: expected a number above 0 for a logarithmic scale, ",
     ),
     ("low = 0.1", "low = 10", "gains.rapf.k_rep.high: expected a number above 10, got 10"),
     (
@@ -200,7 +200,11 @@ WRONG = [
         "k_att = [[3]]",
         'gains.rapf.k_att[0]: expected a number, "null" for no limit, or a word, got [3]',
     ),
-    ("k_att = 3", "k_att = [3, 3.0]", "gains.rapf.k_att[1]: 3.0 is given already at gains.rapf.k_att[0]"),
+    (
+        "k_att = 3",
+        "k_att = [3, 3.0]",
+        "gains.rapf.k_att[1]: duplicate value 3.0, given already at gains.rapf.k_att[0]",
+    ),
     ("k_att = 3", 'k_att = "null"', "gains.rapf.k_att: expected a number from "),
     ("k_att = 3", "k_att = inf", "gains.rapf.k_att: expected a number from "),
     (
@@ -229,7 +233,11 @@ WRONG = [
         '["roms"]',
         "maps[0]: unknown map 'roms': did you mean 'rooms'? (known: ",
     ),
-    ('["rooms", "plans/hall.json"]', '["rooms", "rooms"]', "maps[1]: 'rooms' is given already at maps[0]"),
+    (
+        '["rooms", "plans/hall.json"]',
+        '["rooms", "rooms"]',
+        "maps[1]: duplicate value 'rooms', given already at maps[0]",
+    ),
     ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: expected a string, got 3"),
     ('["rooms", "plans/hall.json"]', "[]", "maps: expected at least one, got none"),
     (
@@ -325,7 +333,7 @@ def test_a_team_of_groups(folder: Path) -> None:
     study = read_study(written(folder, GROUPS))
     assert study.robots == (3,)
     assert study.metrics
-    team = team_of(3, study.teams[0])
+    team = build_swept_team(3, study.teams[0])
     assert team.max_speed.tolist() == [1.0, 1.0, 0.3]
     assert team.sensing_range.tolist() == [4.0, 4.0, math.inf]
 

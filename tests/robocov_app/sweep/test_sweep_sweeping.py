@@ -23,8 +23,9 @@ from robocov_app.cli import main
 from robocov_app.sweep import sweeping
 from robocov_app.sweep.executors import Executor, Returned
 from robocov_app.sweep.ledger import opened
-from robocov_app.sweep.study import Study, Task, tasks_of
+from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Totals, sweep
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import made_with, perform
 from robocov_app.terminal.interruption import Interruption
 
@@ -104,7 +105,7 @@ def test_the_number_of_workers_changes_nothing(
 ) -> None:
     assert sweep(study, tmp_path, workers=2, quiet=True) == Totals(18, 0, 0, False)
     assert tables(tmp_path) == undisturbed
-    assert run_folders(tmp_path) == sorted(task.name for task in tasks_of(study))
+    assert run_folders(tmp_path) == sorted(task.name for task in generate_tasks(study))
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         ".lock",
         "results.csv",
@@ -118,7 +119,7 @@ def test_rows_stand_in_the_order_of_the_study_whatever_the_order_of_runs(
 ) -> None:
     sweep(study, tmp_path, quiet=True)
     assert tables(tmp_path) == undisturbed
-    assert [row["run"] for row in rows(tmp_path)] == [task.name for task in tasks_of(study)]
+    assert [row["run"] for row in rows(tmp_path)] == [task.name for task in generate_tasks(study)]
     assert here.longest == 5, "tasks are made when somebody can do them"
 
 
@@ -147,7 +148,7 @@ def test_a_run_that_was_damaged_or_removed_is_done_again_and_that_is_told(
     study: Study, undisturbed: list[bytes], tmp_path: Path, here: Here, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sweep(study, tmp_path, quiet=True)
-    first, second, *_ = (tmp_path / "runs" / task.name for task in tasks_of(study))
+    first, second, *_ = (tmp_path / "runs" / task.name for task in generate_tasks(study))
     (first / "cost.csv").write_bytes((first / "cost.csv").read_bytes().replace(b"1", b"2", 1))
     for path in second.iterdir():
         path.unlink()
@@ -162,7 +163,7 @@ def test_a_finished_table_stays_until_all_is_done_again(
     study: Study, undisturbed: list[bytes], tmp_path: Path, here: Here
 ) -> None:
     sweep(study, tmp_path, quiet=True)
-    for task in tasks_of(study):
+    for task in generate_tasks(study):
         (tmp_path / "runs" / task.name / "row.json").unlink()
     stop = Interruption()
     looks = 0
@@ -188,7 +189,7 @@ def test_after_an_upgrade_all_is_done_again_and_a_mixed_table_is_told(
     study = small_study()
     old = {**made_with(), "pymunk": "6.0"}
     with opened(tmp_path, study.to_json()) as ledger:
-        for task in tasks_of(study):
+        for task in generate_tasks(study):
             ledger.keep(task, replace(perform(task), versions=old))
     more = small_study(seeds=range(3))
     totals = sweep(more, tmp_path, quiet=True, keep_versions=True)
@@ -218,7 +219,7 @@ def test_a_stop_keeps_what_is_done_in_the_table(
     assert sweep(study, tmp_path, quiet=True, stop=stop) == Totals(7, 0, 1, True)
     here.before = lambda: None
     # rapf with k_rep 0.3 is not in the study
-    done = [task.name for task in tasks_of(study) if task.name in run_folders(tmp_path)]
+    done = [task.name for task in generate_tasks(study) if task.name in run_folders(tmp_path)]
     assert len(done) == 7 + 1
     assert [row["run"] for row in rows(tmp_path)] == done
     here._stack.clear()

@@ -20,8 +20,9 @@ from robocov.metrics.results import read_results
 from robocov_app.cli import main
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.study import Study, tasks_of
+from robocov_app.sweep.study import Study
 from robocov_app.sweep.table import Table, columns_of, gain_column, row_of
+from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import FIGURES
 
 FIGURED = Entry(
@@ -46,7 +47,7 @@ def study_json(study: Study) -> bytes:
 
 def written(folder: Path, study: Study, entries: list[Entry], *, parquet: bool = False) -> None:
     with Table(folder, columns_of(study), study_json(study), parquet=parquet) as table:
-        for task, entry in zip(tasks_of(study), entries, strict=True):
+        for task, entry in zip(generate_tasks(study), entries, strict=True):
             table.add(row_of(task, entry))
 
 
@@ -78,7 +79,7 @@ def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
     with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
         lines = list(csv.DictReader(file))
     assert len(rows) == len(lines) == 4
-    for row, line, task in zip(rows, lines, tasks_of(study), strict=True):
+    for row, line, task in zip(rows, lines, generate_tasks(study), strict=True):
         assert list(row) == list(line)
         for name, value in row.items():
             if value is None:
@@ -98,7 +99,7 @@ def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
 
 def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: Path) -> None:
     study = small_study()
-    task = replace(next(iter(tasks_of(study))), map="=1+1", start="-1")
+    task = replace(next(iter(generate_tasks(study))), map="=1+1", start="-1")
     with Table(tmp_path, columns_of(study), study_json(study), parquet=True) as table:
         table.add(row_of(task, FAILED._replace(error="+ of 'two'")))
     line = (tmp_path / "results.csv").read_text().splitlines()[1]
@@ -185,7 +186,7 @@ def test_a_table_without_rows_has_columns(tmp_path: Path) -> None:
 def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     study = small_study()
-    tasks = list(tasks_of(study))
+    tasks = list(generate_tasks(study))
     with Table(tmp_path, columns_of(study), b"{}", parquet=True) as table:
         for k, task in enumerate(tasks):
             table.add(row_of(task, FIGURED))
@@ -209,7 +210,7 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
         (tmp_path / "study.json").write_bytes(study_json(small_study(seeds=range(5))))
     before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
     with Table(tmp_path, columns_of(study), b"{}") as table:
-        for k, task in enumerate(list(tasks_of(study))[:rows]):
+        for k, task in enumerate(list(generate_tasks(study))[:rows]):
             table.add(row_of(task, FAILED))
             if k == 3 and not finished:
                 break  # it has grown as long, and may be seen
@@ -229,7 +230,7 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
     (tmp_path / "study.json").unlink()
     lengths = []
     with Table(tmp_path, columns_of(study)) as table:
-        for task in [*tasks_of(study)] * 2:
+        for task in [*generate_tasks(study)] * 2:
             table.add(row_of(task, FAILED))
             text = (tmp_path / "results.csv").read_text()
             lengths.append(text.count("\n") - 1 if "no room" in text else None)
@@ -247,7 +248,7 @@ def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
 def test_an_error_leaves_no_half_of_a_table(tmp_path: Path) -> None:
     study = small_study()
     with pytest.raises(ZeroDivisionError), Table(tmp_path, columns_of(study)) as table:
-        table.add(row_of(next(tasks_of(study)), FIGURED))
+        table.add(row_of(next(generate_tasks(study)), FIGURED))
         raise ZeroDivisionError
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
@@ -271,7 +272,7 @@ class Full:
 
 def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
     study = small_study()
-    row = row_of(next(tasks_of(study)), FIGURED)
+    row = row_of(next(generate_tasks(study)), FIGURED)
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
     with full, Table(tmp_path, columns_of(study)) as table:
         table.add(row)
@@ -299,7 +300,7 @@ def test_a_full_disk_leaves_no_half_of_parquet(
     told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
     with told, Table(tmp_path, columns_of(study), parquet=True) as table:
         monkeypatch.setattr(pq.ParquetWriter, broken, full)
-        table.add(row_of(next(tasks_of(study)), FIGURED))
+        table.add(row_of(next(generate_tasks(study)), FIGURED))
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
@@ -323,6 +324,6 @@ def test_columns_have_different_names_whatever_gains_are_called(tmp_path: Path) 
     study = small_study(controllers=("rapf", "rpf", "lloyd", "odd.py:Odd"), folder=tmp_path)
     names = [column.name for column in columns_of(study)]
     assert len(set(names)) == len(names)
-    rows = [row_of(task, FIGURED) for task in tasks_of(study) if task.seed == 1]
+    rows = [row_of(task, FIGURED) for task in generate_tasks(study) if task.seed == 1]
     assert [(row["seed"], row.get("gain_seed")) for row in rows] == [(1, None)] * 3 + [(1, 1.0)]
     assert rows[-1]["k_rep"] == 2.0

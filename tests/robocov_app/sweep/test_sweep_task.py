@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from swept import HALL, ROOM, controller, small_study
 
 from robocov.mapfile import load_map
-from robocov_app.sweep.study import StudyMap, tasks_of
+from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import simulated
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
@@ -49,7 +50,7 @@ def test_tasks_come_in_the_order_of_the_table(
     expected = [
         (each.name, n, speed, start, seed, *law)
         for each in MAPS[:maps]
-        for n, speed, start, seed, law in product(robots, speeds, study.starts_on(each), seeds, laws)
+        for n, speed, start, seed, law in product(robots, speeds, study.list_starts(each), seeds, laws)
     ]
     found = [
         (
@@ -61,11 +62,11 @@ def test_tasks_come_in_the_order_of_the_table(
             task.controller,
             task.gains["k_rep"] if task.controller == "rpf" else None,
         )
-        for task in tasks_of(study)
+        for task in generate_tasks(study)
     ]
     assert found == expected
     assert len(study) == len(found)
-    assert len({task.name for task in tasks_of(study)}) == len(found)
+    assert len({task.name for task in generate_tasks(study)}) == len(found)
 
 
 def test_every_controller_begins_in_the_same_places() -> None:
@@ -73,7 +74,7 @@ def test_every_controller_begins_in_the_same_places() -> None:
         controllers=("rapf", "rpf", "lloyd"), gains={"rapf": {"k_rep": [0.1, 1.0]}}, duration=0.0
     )
     starts: dict[int, set[bytes]] = {}
-    for task in tasks_of(study):
+    for task in generate_tasks(study):
         record = simulated(task, ROOM)
         starts.setdefault(task.seed, set()).add(record.positions[0].tobytes())
         assert np.array_equal(record.positions[0], ROOM.start("corner").sample(2, seed=task.seed))
@@ -84,15 +85,15 @@ def test_every_controller_begins_in_the_same_places() -> None:
 def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
     study = small_study(controllers=(controller(tmp_path, ""),))
     (tmp_path / "mine.py").unlink()
-    task = next(tasks_of(study))
+    task = next(generate_tasks(study))
     assert pickle.loads(pickle.dumps(task)) == task
     assert task.source is not None and "class Mine" in task.source.text
     assert len(simulated(task, ROOM)) == 11
 
 
 def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) -> None:
-    tasks = {task.name: task for task in tasks_of(small_study())}
-    assert set(tasks) == {task.name for task in tasks_of(small_study())}
+    tasks = {task.name: task for task in generate_tasks(small_study())}
+    assert set(tasks) == {task.name for task in generate_tasks(small_study())}
     for changes in (
         {"maps": (StudyMap("room", replace(ROOM, description="another")),)},
         {"duration": 0.6},
@@ -107,7 +108,7 @@ def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) 
         {"starts": ("spread",)},
         {"gains": {"rapf": {"k_rep": 1.5}, "rpf": {"k_rep": 1.5}}},
     ):
-        others = {task.name for task in tasks_of(small_study(**changes))}
+        others = {task.name for task in generate_tasks(small_study(**changes))}
         assert not others & set(tasks), changes
 
 
@@ -117,7 +118,7 @@ def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path
         (tmp_path / folder).mkdir()
         controller(tmp_path / folder, law)
         study = small_study(controllers=("mine.py:Mine",), folder=tmp_path / folder)
-        names.append([task.name for task in tasks_of(study)])
+        names.append([task.name for task in generate_tasks(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
 
@@ -132,7 +133,7 @@ def test_the_text_of_what_a_controller_imports_counts(
     for text in ("PULL = 1.0\n", "PULL = 1.0\n", "PULL = 2.0\n"):
         (tmp_path / "rest_of_mine.py").write_text(text)
         study = small_study(controllers=(name,))
-        names.append([task.name for task in tasks_of(study)])
+        names.append([task.name for task in generate_tasks(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
     (said,) = study.to_json()["controllers"]
@@ -141,12 +142,14 @@ def test_the_text_of_what_a_controller_imports_counts(
 
 def test_a_default_that_is_stated_is_the_same_run() -> None:
     said = small_study(gains={"rapf": {"k_rep": 0.3}})
-    assert [task.name for task in tasks_of(said)] == [task.name for task in tasks_of(small_study())]
+    assert [task.name for task in generate_tasks(said)] == [
+        task.name for task in generate_tasks(small_study())
+    ]
 
 
 def test_names_of_folders_are_fit_for_any_system() -> None:
     odd = StudyMap("Büro/2: *?<>|" + "x" * 60, ROOM)
-    for task in tasks_of(small_study(maps=(odd,))):
+    for task in generate_tasks(small_study(maps=(odd,))):
         assert task.name.isascii()
         assert not set(task.name) & set('/\\:*?"<>| ')
         assert len(task.name) < 120
@@ -155,5 +158,5 @@ def test_names_of_folders_are_fit_for_any_system() -> None:
 
 def test_a_bundled_map_is_carried_whole() -> None:
     rooms = load_map("rooms")
-    (task, *_) = tasks_of(small_study(maps=(StudyMap("rooms", rooms),)))
+    (task, *_) = generate_tasks(small_study(maps=(StudyMap("rooms", rooms),)))
     assert '"corridor"' in task.document

@@ -1,0 +1,72 @@
+"""Controllers in files of the user: a study contains their text, so that workers need no such files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from robocov.controllers import load_controller_class
+from robocov.controllers.user_modules import ControllerSource, find_own_modules
+from robocov.errors import ParameterError, quote
+
+
+def load_study_controller(name: str, folder: Path) -> tuple[type[Any], ControllerSource | None]:
+    """Load the class of a controller, and the text of its file.
+
+    Parameters
+    ----------
+    name : str
+        Name of a bundled controller, or ``file.py:Class``.
+    folder : Path
+        Folder to which relative paths refer.
+
+    Returns
+    -------
+    controller_class : type
+    source : ControllerSource or None
+        The text of the file and of the modules that it imports; None if the controller is bundled.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such controller, or its file cannot be used.
+    """
+    source = _read_source(name, folder)
+    controller_class = load_controller_class(name, source=source)
+    if source is not None:
+        # Loading the class may have added folders to sys.path, where its modules are.
+        source = source._replace(modules=find_own_modules(source.text))
+    return controller_class, source
+
+
+def _read_source(name: str, folder: Path) -> ControllerSource | None:
+    """Read the file of a controller; None if the name is not that of a file."""
+    file_name, _, class_name = name.rpartition(":")
+    if not class_name or not file_name.endswith(".py"):
+        return None
+    path = (folder / file_name).resolve()
+    try:
+        return ControllerSource(str(path), path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
+        raise ParameterError(f"{quote(name)}: {path}: {reason}") from None
+
+
+def source_to_json(source: ControllerSource | None) -> dict[str, Any]:
+    """Return the entries of a JSON file that contain the text of a controller.
+
+    Parameters
+    ----------
+    source : ControllerSource or None
+
+    Returns
+    -------
+    dict
+        ``source``, and ``modules`` if its file imports other files of the user. Empty without a source.
+    """
+    if source is None:
+        return {}
+    entries: dict[str, Any] = {"source": source.text}
+    if source.modules:
+        entries["modules"] = {name: module.text for name, module in source.modules.items()}
+    return entries

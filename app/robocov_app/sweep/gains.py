@@ -1,0 +1,178 @@
+"""Gains in a study: every combination that is tried of one controller."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
+from typing import Any, TypeAlias, get_args
+
+from robocov.controllers import get_gain_values, get_gains
+from robocov.controllers.gains import Gain, Option, Value, instantiate_controller
+from robocov.errors import JsonPath, ParameterError, describe_unknown_name, format_path, quote
+from robocov_app.sweep.paths import parse_values, require_distinct, validate_at
+from robocov_app.sweep.sampling import Range, Sampling, Scale
+
+NO_LIMIT = "null"
+"""Stands for None in study files, because TOML has no null."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The gains of one controller in a study.
+
+    Attributes
+    ----------
+    choices : tuple of dict of str to float, str or None
+        The sets of gains that are tried, each with a value for every gain.
+    ranges : mapping of str to Range
+        The ranges that were sampled.
+    """
+
+    choices: tuple[Mapping[str, Value], ...]
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+
+
+GainsSpecification: TypeAlias = Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]
+"""Gains of a controller as a study defines them; see `build_gains`."""
+
+
+def build_gains(
+    controller_class: type[Any],
+    specification: GainsSpecification,
+    sampling: Sampling | None,
+    path: JsonPath = (),
+) -> Gains:
+    """Build the sets of gains that a study tries of one controller.
+
+    Parameters
+    ----------
+    controller_class : type
+    specification : mapping, sequence of mapping, or Gains
+        A mapping of each gain to a value, to a list of values, or to a `Range`: every combination is tried.
+        Or a list of sets of gains. Gains that are not named have their defaults.
+    sampling : Sampling or None
+        How ranges are sampled.
+    path : tuple of str and int
+        Where the gains are in the study, for messages.
+
+    Returns
+    -------
+    Gains
+
+    Raises
+    ------
+    ParameterError
+        If a gain is unknown or out of range, or a combination occurs twice.
+    """
+    if isinstance(specification, Gains):
+        checked = build_gains(controller_class, specification.choices, None, path)
+        return Gains(checked.choices, specification.ranges)
+    if isinstance(specification, Mapping):
+        return _combine_gains(controller_class, specification, sampling, path)
+    if not specification:
+        raise ParameterError(f"{format_path(path)}: expected at least one set of gains, got none")
+    known = get_gains(controller_class)
+    choices = []
+    for index, gains in enumerate(specification):
+        values = {
+            name: _parse_value(known, name, value, (*path, index, name)) for name, value in gains.items()
+        }
+        choices.append(_complete_gains(controller_class, values))
+    require_distinct(choices, path)
+    return Gains(tuple(choices))
+
+
+def _combine_gains(
+    controller_class: type[Any], axes: Mapping[str, Any], sampling: Sampling | None, path: JsonPath
+) -> Gains:
+    """Combine all values of the lists with all samples of the ranges; samples vary fastest."""
+    known = get_gains(controller_class)
+    lists: dict[str, list[Value]] = {}
+    ranges: dict[str, Range] = {}
+    for name, axis in axes.items():
+        axis_path = (*path, name)
+        if isinstance(axis, Range):
+            ranges[name] = _parse_range(known, name, axis, axis_path)
+        else:
+            lists[name] = parse_values(axis, axis_path, partial(_parse_value, known, name))
+    samples = _draw_samples(ranges, sampling, path)
+    names = [*lists, *ranges]
+    choices = []
+    for listed_values, sampled_values in product(product(*lists.values()), samples):
+        values = dict(zip(names, (*listed_values, *sampled_values), strict=True))
+        choices.append(_complete_gains(controller_class, values))
+    # Samples of a range that is narrower than their digits are equal.
+    require_distinct(choices, (*path, "samples"))
+    return Gains(tuple(choices), ranges)
+
+
+def _draw_samples(
+    ranges: Mapping[str, Range], sampling: Sampling | None, path: JsonPath
+) -> list[tuple[float, ...]]:
+    """Draw joint samples of ranges; a single empty one if there are no ranges."""
+    if not ranges:
+        return [()]
+    if sampling is None:
+        range_path = format_path((*path, next(iter(ranges))))
+        raise ParameterError(f"{range_path}: a range requires a table [sampling] with method and samples")
+    points = sampling.draw_points(len(ranges))
+    columns = [gain_range.interpolate(points[:, k]) for k, gain_range in enumerate(ranges.values())]
+    return list(zip(*columns, strict=True))
+
+
+def _complete_gains(controller_class: type[Any], values: Mapping[str, Value]) -> Mapping[str, Value]:
+    """Return a value for every gain of a controller, after the controller itself has checked them."""
+    return get_gain_values(instantiate_controller(controller_class, values))
+
+
+def _parse_value(known: Mapping[str, Gain | Option], name: str, value: object, path: JsonPath) -> Value:
+    """Parse one value of a gain; both ``inf`` and ``"null"`` mean no limit."""
+    gain = _find_gain(known, name, path)
+    if gain.optional and value in (NO_LIMIT, math.inf):
+        return None
+    return validate_at(path, partial(gain.validate, value, ""))
+
+
+def _find_gain(known: Mapping[str, Gain | Option], name: str, path: JsonPath) -> Gain | Option:
+    """Return a gain by its name."""
+    if name in known:
+        return known[name]
+    # The path leads to the value of the gain, or to an item in a list of values.
+    is_list_item = isinstance(path[-1], int)
+    controller_path = path[:-2] if is_list_item else path[:-1]
+    place = format_path(controller_path)
+    if not known:
+        raise ParameterError(f"{place}: expected no gains, as the controller has none, got {quote(name)}")
+    raise ParameterError(f"{place}: {describe_unknown_name('gain', name, known)}")
+
+
+def _parse_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: JsonPath) -> Range:
+    """Check a range against the limits of its gain."""
+    gain = _find_gain(known, name, path)
+    if isinstance(gain, Option):
+        choices = ", ".join(gain.choices)
+        raise ParameterError(
+            f"{format_path(path)}: expected one of {choices}, or a list of them, got a range"
+        )
+    low = _parse_range_end(gain, given.low, (*path, "low"))
+    high = _parse_range_end(gain, given.high, (*path, "high"))
+    scales = get_args(Scale)
+    if given.scale not in scales:
+        unknown = describe_unknown_name("scale", given.scale, scales)
+        raise ParameterError(f"{format_path((*path, 'scale'))}: {unknown}")
+    if not low < high:
+        raise ParameterError(f"{format_path((*path, 'high'))}: expected a number above {low:g}, got {high:g}")
+    if given.scale == "log" and low <= 0.0:
+        low_path = format_path((*path, "low"))
+        raise ParameterError(f"{low_path}: expected a number above 0 for a logarithmic scale, got {low:g}")
+    return Range(low, high, given.scale)
+
+
+def _parse_range_end(gain: Gain, value: float | None, path: JsonPath) -> float:
+    """Check one end of a range, which needs a limit also if the gain may have none."""
+    if value is None:
+        raise ParameterError(f"{format_path(path)}: expected a number, got {quote(None)}")
+    return validate_at(path, partial(gain.validate, value, "")) or 0.0

@@ -1,0 +1,86 @@
+"""Values of a study at their paths, which begin every message, as in ``gains.rapf.k_rep[1]: ...``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from robocov.errors import JsonPath, ParameterError, format_path, quote
+
+T = TypeVar("T")
+
+
+def validate_at(path: JsonPath, validate: Callable[[], T]) -> T:
+    """Validate a value, and report errors with the path of the value.
+
+    Parameters
+    ----------
+    path : tuple of str and int
+    validate : callable
+        Returns the valid value. Raises ParameterError with a message that begins with a name and a colon,
+        which the path replaces.
+
+    Returns
+    -------
+    object
+        The result of `validate`.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        return validate()
+    except ParameterError as error:
+        description = str(error).partition(": ")[2]
+        raise ParameterError(f"{format_path(path)}: {description}") from None
+
+
+def parse_values(given: Any, path: JsonPath, parse: Callable[[Any, JsonPath], T]) -> list[T]:
+    """Parse a single value, or a list of values.
+
+    Parameters
+    ----------
+    given : object
+        A value, or a list of at least one value.
+    path : tuple of str and int
+    parse : callable
+        Called with each value and its path.
+
+    Returns
+    -------
+    list
+        The parsed values; one if a single value was given.
+
+    Raises
+    ------
+    ParameterError
+        If there is no value, or a value occurs twice.
+    """
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        return [parse(given, path)]
+    values = [parse(value, (*path, index)) for index, value in enumerate(given)]
+    if not values:
+        raise ParameterError(f"{format_path(path)}: expected at least one value, got none")
+    require_distinct(values, path)
+    return values
+
+
+def require_distinct(values: Sequence[object], path: JsonPath) -> None:
+    """Raise ParameterError if a list contains a value twice.
+
+    Parameters
+    ----------
+    values : sequence
+        Hashable values, or dicts of them.
+    path : tuple of str and int
+        Path of the list.
+    """
+    first_indices: dict[object, int] = {}
+    for index, value in enumerate(values):
+        key = tuple(value.items()) if isinstance(value, Mapping) else value
+        first_index = first_indices.setdefault(key, index)
+        if first_index < index:
+            place = format_path((*path, index))
+            first_place = format_path((*path, first_index))
+            raise ParameterError(f"{place}: duplicate value {quote(value)}, given already at {first_place}")

@@ -1,0 +1,116 @@
+"""Ranges of gains, and quasi-random samples of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import ParameterError, describe_unknown_name, require_number
+
+Scale: TypeAlias = Literal["linear", "log"]
+SamplingMethod: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
+MAX_SAMPLES = 100_000
+MAX_SEED = 2**63 - 1
+_SAMPLE_DIGITS = 6
+"""Significant digits of a sampled gain. Further digits would differ between processors."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Range of a gain.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of the range, both included, in the unit of the gain.
+    scale : {"linear", "log"}
+        Whether samples are evenly distributed by value, or by logarithm.
+    """
+
+    low: float
+    high: float
+    scale: Scale = "linear"
+
+    def interpolate(self, fractions: Array) -> list[float]:
+        """Return the values at fractions of the range.
+
+        Parameters
+        ----------
+        fractions : (m,) array
+            From 0, the lower end, to 1, the upper end.
+
+        Returns
+        -------
+        list of float
+            m values, rounded to six significant digits.
+        """
+        if self.scale == "log":
+            low, high = math.log(self.low), math.log(self.high)
+            exact = np.exp(low + (high - low) * fractions)
+        else:
+            exact = self.low + (self.high - self.low) * fractions
+        values = []
+        for value in exact.tolist():
+            rounded = float(f"{value:.{_SAMPLE_DIGITS}g}")
+            # Rounding may lead out of the range.
+            values.append(min(max(rounded, self.low), self.high))
+        return values
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Joint sampling of the ranges of a controller, by a scrambled sequence of `scipy.stats.qmc`.
+
+    Attributes
+    ----------
+    method : {"sobol", "latin-hypercube", "halton"}
+    samples : int
+        Number of samples.
+    seed : int
+        Seed of the scrambling.
+
+    Raises
+    ------
+    ParameterError
+        If a value cannot be used.
+    """
+
+    method: SamplingMethod = "sobol"
+    samples: int = 16
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        methods = get_args(SamplingMethod)
+        if self.method not in methods:
+            raise ParameterError(f"sampling.method: {describe_unknown_name('method', self.method, methods)}")
+        require_number("sampling.samples", self.samples, 1, MAX_SAMPLES, whole=True)
+        require_number("sampling.seed", self.seed, 0, MAX_SEED, whole=True)
+
+    def draw_points(self, dimensions: int) -> Array:
+        """Draw points in the unit cube.
+
+        Parameters
+        ----------
+        dimensions : int
+
+        Returns
+        -------
+        (samples, dimensions) array
+            Each coordinate from 0 to 1.
+        """
+        from scipy.stats import qmc
+
+        rng = np.random.default_rng(self.seed)
+        if self.method == "sobol":
+            # Sobol sequences are balanced if their length is a power of two.
+            exponent = (self.samples - 1).bit_length()
+            points = qmc.Sobol(dimensions, seed=rng).random_base2(exponent)[: self.samples]
+        elif self.method == "halton":
+            points = qmc.Halton(dimensions, seed=rng).random(self.samples)
+        else:
+            points = qmc.LatinHypercube(dimensions, seed=rng).random(self.samples)
+        return np.asarray(points)

@@ -1,0 +1,86 @@
+"""The number of runs of a study, counted before anything is combined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from robocov.errors import ParameterError
+from robocov_app.sweep.gains import Gains
+from robocov_app.sweep.sampling import Range, Sampling
+
+DEFAULT_MAX_RUNS = 100_000
+"""Maximum number of runs, unless the study allows more. On ten cores they take some days."""
+MAX_MAX_RUNS = 10_000_000
+"""Maximum number of runs that a study may allow, because they are listed in memory."""
+_MAX_LISTED_FACTORS = 5
+
+
+def require_few_runs(
+    counts: Mapping[str, int],
+    controllers: Sequence[str],
+    gains: Mapping[str, Any],
+    sampling: Sampling | None,
+    max_runs: int,
+) -> None:
+    """Raise ParameterError if a study has more than `max_runs` runs.
+
+    The combinations are only counted: a small file may define more of them than fit into memory.
+
+    Parameters
+    ----------
+    counts : mapping of str to int
+        Number of values of each varied quantity, except for gains.
+    controllers, gains, sampling
+        As in `Study`.
+    max_runs : int
+    """
+    sets_of_gains = sum(_count_gains(gains.get(name, {}), sampling) for name in controllers)
+    runs = math.prod(max(count, 1) for count in counts.values()) * sets_of_gains
+    if runs <= max_runs:
+        return
+    varied = [name for name, count in counts.items() if count > 1]
+    varied.sort(key=lambda name: counts[name], reverse=True)
+    factors = [f"{_format_number(counts[name])} {name}" for name in varied[:_MAX_LISTED_FACTORS]]
+    if sets_of_gains > 1:
+        factors.append(f"{_format_number(sets_of_gains)} sets of gains")
+    breakdown = f" ({' x '.join(factors)})" if factors else ""
+    raise ParameterError(
+        f"runs: expected at most {max_runs}, got {_format_number(runs)}{breakdown}. "
+        f"max_runs in the study allows more, up to {MAX_MAX_RUNS}."
+    )
+
+
+def count_values(values: object) -> int:
+    """Return the number of values in a list, 1 for a single value."""
+    if isinstance(values, range):
+        # It may be too long for `len`.
+        return max(-(-(values.stop - values.start) // values.step), 0)
+    is_list = isinstance(values, Sequence) and not isinstance(values, str)
+    return len(cast("Sequence[object]", values)) if is_list else 1
+
+
+def _count_gains(specification: Any, sampling: Sampling | None) -> int:
+    """Return the number of sets of gains that are tried of a controller."""
+    if isinstance(specification, Gains):
+        return len(specification.choices)
+    if not isinstance(specification, Mapping):
+        return count_values(specification)
+    combinations = 1
+    has_range = False
+    for axis in specification.values():
+        if isinstance(axis, Range):
+            has_range = True
+        else:
+            combinations *= max(count_values(axis), 1)
+    if has_range and sampling is not None:
+        combinations *= sampling.samples
+    return combinations
+
+
+def _format_number(count: int) -> str:
+    """Format a number, which may be too large for a float."""
+    if count < 10**9:
+        return str(count)
+    return f"{count:.3g}" if count < 10**300 else "more than 1e300"
