@@ -130,7 +130,7 @@ WRONG = [
     (Rapf, [{"k_rep": -1}], "gains.x[0].k_rep: expected "),
     (Rapf, {"k_rep": Range(2, 1)}, "gains.x.k_rep.high: expected a number above 2, got 1"),
     (Rapf, {"k_rep": Range(-1, 1)}, "gains.x.k_rep.low: expected a number from 0 to "),
-    (Rapf, {"k_rep": Range(0, 1, "log")}, "gains.x.k_rep.low: expected a number above 0, "),
+    (Rapf, {"k_rep": Range(0, 1, "log")}, "gains.x.k_rep.low: expected a number above 0 for "),
     (Rapf, {"k_rep": Range(0, 1, "lag")}, "gains.x.k_rep.scale: unknown scale 'lag': did you mean 'log'?"),
     (
         Rapf,
