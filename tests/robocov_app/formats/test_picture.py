@@ -11,7 +11,7 @@ from raster_files import pgm
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
-from robocov_app.formats.picture import CHUNK
+from robocov_app.formats.picture import GEOREFERENCE_CHUNK
 
 IMPORTER = IMPORTERS["picture"]
 
@@ -21,7 +21,7 @@ LEVELS = np.array([[0, 127, 128, 255], [255, 255, 255, 255]], dtype=np.uint8)
 def saved(folder: Path, pixels: np.ndarray, chunk: str | None = None, title: str | None = None) -> Path:
     texts = PngImagePlugin.PngInfo()
     if chunk is not None:
-        texts.add_text(CHUNK, chunk)
+        texts.add_text(GEOREFERENCE_CHUNK, chunk)
     if title is not None:
         texts.add_text("Title", title)
     path = folder / "plan.png"

@@ -1,0 +1,172 @@
+"""The data of OpenStreetMap: nodes, ways and relations, without their meaning."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import to_one_line
+from robocov_app.formats import files
+
+USED_TAGS = {
+    "area", "barrier", "building", "door", "entrance", "highway", "indoor", "layer", "level", "location",
+    "name", "natural", "repeat_on", "room", "stairs", "tunnel", "type", "water", "waterway", "width",
+}  # fmt: skip
+_LABEL_TAGS = ("name", "room", "indoor", "barrier", "building", "natural")
+_MAX_READINGS = 4
+"""Number of times that all vertices are used: areas are measured, doors found, shapes drawn."""
+_FIRST_UNNUMBERED = 2**64
+"""First number of nodes that the file does not number: those of the data have at most 64 bits."""
+
+
+@dataclass(eq=False, slots=True)
+class OsmElement:
+    """A node, a way or a relation.
+
+    Attributes
+    ----------
+    kind : str
+        ``node``, ``way`` or ``relation``.
+    number : int
+    tags : dict of str to str
+        Only those in `USED_TAGS`.
+    members : list of int
+        Numbers of the nodes of a way, or of the ways of a relation.
+    """
+
+    kind: str
+    number: int
+    tags: dict[str, str] = field(default_factory=dict)
+    members: list[int] = field(default_factory=list)
+
+    @property
+    def place(self) -> str:
+        """Kind and number, for messages."""
+        return f"{self.kind} {self.number}"
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the element: its name, the values of its main tags, and their keys."""
+        values = [self.tags[key] for key in _LABEL_TAGS if key in self.tags]
+        keys = [key for key in (*_LABEL_TAGS[1:], "waterway") if key in self.tags]
+        labels = [to_one_line(label) for label in (*values, *keys) if label not in ("yes", "no")]
+        return tuple(dict.fromkeys(labels))
+
+    @property
+    def is_building(self) -> bool:
+        """Whether the element is a building that robots cannot pass; a roof stands on posts."""
+        return self.tags.get("building", "no") not in ("no", "roof")
+
+
+class OsmData:
+    """The content of a file of OpenStreetMap.
+
+    Parameters
+    ----------
+    where : str
+        Name of the file for messages.
+
+    Attributes
+    ----------
+    nodes, ways, relations : dict
+        Elements by number: only nodes with tags, and only relations that are areas (multipolygons).
+    bounds : list of (west, south, east, north), degrees
+    notes : list of str
+        Lines for the report.
+    """
+
+    def __init__(self, where: str) -> None:
+        self.where = where
+        self.bounds: list[tuple[float, float, float, float]] = []
+        self.nodes: dict[int, OsmElement] = {}
+        self.ways: dict[int, OsmElement] = {}
+        self.relations: dict[int, OsmElement] = {}
+        self.notes: list[str] = []
+        self._node_rows: dict[int, int] = {}
+        self._coordinates = array("d")
+        self._points: Array | None = None
+        self._vertices_used = 0
+
+    @property
+    def elements(self) -> list[OsmElement]:
+        """All elements: nodes, ways, relations."""
+        return [*self.nodes.values(), *self.ways.values(), *self.relations.values()]
+
+    def add_node(self, number: int, longitude: float, latitude: float) -> None:
+        """Add the position of a node, degrees."""
+        self._node_rows[number] = len(self._coordinates) // 2
+        self._coordinates.extend((longitude, latitude))
+        self._points = None
+
+    def has_node(self, number: int) -> bool:
+        """Return whether the position of a node is known."""
+        return number in self._node_rows
+
+    def add_line(self, line: list[tuple[float, float] | None]) -> list[int]:
+        """Add nodes that the file does not number, and return numbers for them.
+
+        Parameters
+        ----------
+        line : list of (longitude, latitude) or None
+            None stands for a node that the file does not contain.
+        """
+        numbers = []
+        for point in line:
+            if point is None:
+                numbers.append(-_FIRST_UNNUMBERED)
+                continue
+            number = _FIRST_UNNUMBERED + len(self._coordinates) // 2
+            longitude, latitude = point
+            self.add_node(number, longitude, latitude)
+            numbers.append(number)
+        return numbers
+
+    def add_element(self, element: OsmElement) -> None:
+        """Add an element, if it can be a part of a map."""
+        if element.kind == "node" and element.tags and self.has_node(element.number):
+            self.nodes[element.number] = element
+        elif element.kind == "way":
+            self.ways[element.number] = element
+        elif element.kind == "relation" and element.tags.get("type") == "multipolygon":
+            self.relations[element.number] = element
+
+    def get_point(self, node: OsmElement) -> Array:
+        """Return the (2,) longitude and latitude of a node."""
+        point: Array = self._get_points()[self._node_rows[node.number]]
+        return point
+
+    def get_ways(self, element: OsmElement) -> list[OsmElement | None]:
+        """Return the ways of a relation, or a way itself; None stands for one that the file lacks."""
+        if element.kind == "relation":
+            return [self.ways.get(number) for number in element.members]
+        return [element]
+
+    def get_lines(self, element: OsmElement) -> list[Array] | None:
+        """Return the (k, 2) longitudes and latitudes of each way of an element, or None if nodes are missing.
+
+        Raises
+        ------
+        MapError
+            If vertices are used too often, because a way may be a part of many relations.
+        """
+        ways = self.get_ways(element)
+        self._vertices_used += sum(len(way.members) for way in ways if way is not None)
+        if self._vertices_used > _MAX_READINGS * files.MAX_VERTICES:
+            files.require_vertices(self._vertices_used, self.where)
+        lines = []
+        for way in ways:
+            members = [] if way is None else way.members
+            rows = [self._node_rows.get(number, -1) for number in members]
+            if len(rows) < 2 or min(rows) < 0:
+                return None
+            lines.append(self._get_points()[rows])
+        return lines or None
+
+    def _get_points(self) -> Array:
+        """Return the positions of all nodes, (n, 2) degrees."""
+        if self._points is None:
+            self._points = np.array(self._coordinates).reshape(-1, 2)
+        return self._points

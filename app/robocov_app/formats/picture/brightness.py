@@ -1,0 +1,76 @@
+"""The brightness of a picture, and strips and thumbnails of its pixels."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+OPAQUE_ALPHA = 128
+"""Pixels with a smaller alpha, of 255, count as transparent."""
+STRIP_ROWS = 512
+"""Number of rows that are converted at a time, which bounds the memory."""
+_MAX_THUMBNAIL_PX = 640
+"""Longer side of a thumbnail, unless a picture is enormous."""
+
+
+@dataclass(frozen=True, eq=False)
+class Brightness:
+    """A picture without its colours, the top row first.
+
+    Attributes
+    ----------
+    level : (rows, columns) array of unsigned integers
+        The sum of red, green and blue, from 0 (black) to `full` (white).
+    full : int
+    alpha : (rows, columns) array of uint8 or None
+        Opacity, from 0 to 255 (opaque).
+    texts : mapping of str to str
+        Text chunks of a PNG.
+    lossy : bool
+        Whether saving may change pixels, as in a JPEG.
+    roles : (rows, columns) array of uint8 or None
+        Roles of declared colours, as of `ColourKey.classify`.
+    thumbnail : (h, w, 3) array of uint8 or None
+        The picture in its colours, reduced.
+    """
+
+    level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
+    full: int
+    alpha: NDArray[np.uint8] | None = None
+    texts: Mapping[str, str] = field(default_factory=dict)
+    lossy: bool = False
+    roles: NDArray[np.uint8] | None = None
+    thumbnail: NDArray[np.uint8] | None = None
+
+
+def to_rgb(pixels: Any, maximum: int) -> NDArray[np.uint8]:
+    """Return pixels as red, green and blue from 0 to 255.
+
+    Parameters
+    ----------
+    pixels : (rows, columns, 1 or 3) array
+    maximum : int
+        Largest level.
+    """
+    levels = pixels if maximum == 255 else pixels.astype(np.uint32) * 255 // maximum
+    return np.broadcast_to(levels.astype(np.uint8), (*pixels.shape[:2], 3))
+
+
+def choose_thumbnail_step(width: int, height: int) -> int:
+    """Return the reduction of the thumbnail: a power of 2, so that it divides strips of rows."""
+    step = 1
+    while max(width, height) > step * _MAX_THUMBNAIL_PX and step < STRIP_ROWS:
+        step *= 2
+    return step
+
+
+def describe_transparency(picture: Brightness) -> str:
+    """Return the share of transparent pixels as text, for formats that ignore transparency; or nothing."""
+    if picture.alpha is None:
+        return ""
+    percentage = 100 * np.count_nonzero(picture.alpha < OPAQUE_ALPHA) / picture.alpha.size
+    if percentage == 0.0:
+        return ""
+    return f"{percentage:.3g} % of the pixels are transparent, and count by the colour that is hidden in them"
