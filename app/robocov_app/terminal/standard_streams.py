@@ -8,51 +8,60 @@ from contextlib import suppress
 from typing import IO
 
 _DESCRIPTORS = {"stdout": 1, "stderr": 2}
-_NAMES = {"stdout": "standard output", "stderr": "standard error"}
+_LABELS = {"stdout": "standard output", "stderr": "standard error"}
 
 
 class StandardStreams:
-    """Standard output and standard error as they are now, with spare descriptors to restore them."""
+    """Standard output and standard error at the start, with duplicated descriptors to restore them."""
 
     def __init__(self) -> None:
         self._streams: dict[str, IO[str]] = {}
-        self._spares: dict[str, int] = {}
+        self._duplicates: dict[str, int] = {}
         for name, descriptor in _DESCRIPTORS.items():
             self._streams[name] = getattr(sys, name)
             with suppress(OSError):
-                self._spares[name] = os.dup(descriptor)
+                self._duplicates[name] = os.dup(descriptor)
 
     def close(self) -> None:
-        """Give the spare descriptors back."""
-        while self._spares:
-            os.close(self._spares.popitem()[1])
+        """Close the duplicated descriptors."""
+        for descriptor in self._duplicates.values():
+            os.close(descriptor)
+        self._duplicates.clear()
 
     def find_closed(self) -> list[str]:
-        """Return the names of the streams that cannot be written to any more, as messages call them."""
-        return [_NAMES[name] for name in self._streams if self._is_closed(name)]
+        """Return the labels of the closed streams, as "standard output"."""
+        return [_LABELS[name] for name in self._streams if self._is_closed(name)]
 
     def restore(self) -> list[str]:
-        """Open what was closed, put back what was replaced, and return what `find_closed` does."""
-        closed = self.find_closed()
-        for name, stream in self._streams.items():
-            descriptor, spare = _DESCRIPTORS[name], self._spares.get(name)
-            if self._is_closed(name) and spare is not None:
-                os.dup2(spare, descriptor)
-            if stream.closed:
-                stream = open(  # noqa: SIM115 - it stays open to the end
-                    descriptor, "w", encoding="utf-8", errors="replace", closefd=False
-                )
-                self._streams[name] = stream
-            setattr(sys, name, stream)
-        return closed
+        """Restore closed and replaced streams.
+
+        Returns
+        -------
+        list of str
+            Labels of the streams that were closed, see `find_closed`.
+        """
+        closed_labels = self.find_closed()
+        for name in _DESCRIPTORS:
+            if self._is_closed(name) and name in self._duplicates:
+                os.dup2(self._duplicates[name], _DESCRIPTORS[name])
+            if self._streams[name].closed:
+                self._streams[name] = _open_stream(_DESCRIPTORS[name])
+            setattr(sys, name, self._streams[name])
+        return closed_labels
 
     def _is_closed(self, name: str) -> bool:
+        """Return whether a stream or its descriptor was closed."""
         if self._streams[name].closed:
             return True
-        if name not in self._spares:
+        if name not in self._duplicates:
             return False
         try:
             os.fstat(_DESCRIPTORS[name])
         except OSError:
             return True
         return False
+
+
+def _open_stream(descriptor: int) -> IO[str]:
+    """Open a stream on a descriptor, until the process ends."""
+    return open(descriptor, "w", encoding="utf-8", errors="replace", closefd=False)

@@ -1,12 +1,13 @@
-"""A process that watches over a command which runs a user's controllers.
+"""A process that supervises a command which runs a user's controllers.
 
-`os._exit`, a signal or a crash of the interpreter end a process without a word, and cannot be caught in it:
-the status could be 0 though nothing was done. So a command that names controllers of the user runs in a
-second process, started before anything large is imported, while the first one only waits; it costs some
-hundredths of a second. The second one sends its status through a pipe when it ends properly. Without that
-message, the first one names the controllers, and the status is 1. All other commands run as they are.
+`os._exit`, a signal or a crash of the interpreter end a process without a message, and the process cannot
+catch them: its status could be 0 although nothing was done. A command that names controllers of the user
+therefore runs in a second process, which is started before anything large is imported, while the first one
+only waits; this costs some hundredths of a second. The second process sends its status through a pipe when it
+ends properly. Without that message, the first process names the controllers and ends with status 1. All other
+commands run in the first process.
 
-Where descriptors cannot be handed on (Windows), such commands are not watched.
+Where descriptors cannot be inherited (Windows), such commands are not supervised.
 """
 
 from __future__ import annotations
@@ -17,92 +18,130 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-_DESCRIPTOR = (
-    "_ROBOCOV_SUPERVISOR"  # environment variable, for this module alone, with the descriptor of the pipe
-)
+_DESCRIPTOR_VARIABLE = "_ROBOCOV_SUPERVISOR"
+"""Private environment variable with the descriptor of the pipe."""
 _CONTROLLER = re.compile(r"[^\s,\"'\[\]]+\.py:[^\W\d]\w*")
 _MAX_STUDY_BYTES = 1_000_000
-_FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP")
+_FORWARDED_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+_PARENT_POLL_S = 1.0
 
 
 def find_own_controllers(words: Sequence[str]) -> list[str]:
-    """Return the controllers of the user, ``file.py:ClassName``, that a command line or its study names."""
-    found: list[str] = []
+    """Find the controllers of the user in a command line, and in the study that it names.
+
+    Parameters
+    ----------
+    words : sequence of str
+        The command line.
+
+    Returns
+    -------
+    list of str
+        ``file.py:ClassName``, each once.
+    """
+    controllers: list[str] = []
     for word in words:
-        found += _CONTROLLER.findall(word)
+        controllers += _CONTROLLER.findall(word)
         if word.lower().endswith(".toml"):
             with suppress(OSError, ValueError):
                 content = Path(word).read_bytes()[:_MAX_STUDY_BYTES]
-                found += _CONTROLLER.findall(content.decode("utf-8", "replace"))
-    return list(dict.fromkeys(found))
+                controllers += _CONTROLLER.findall(content.decode("utf-8", "replace"))
+    return list(dict.fromkeys(controllers))
 
 
 def can_supervise() -> bool:
-    """Return whether this process may run the command in another one: not if it is that one already."""
-    return os.name == "posix" and _DESCRIPTOR not in os.environ
+    """Return whether this process may run the command in another one: it is not such a process itself."""
+    return os.name == "posix" and _DESCRIPTOR_VARIABLE not in os.environ
 
 
 def supervise(controllers: Sequence[str]) -> tuple[int, str]:
     """Run this command again in a process of its own and wait for it.
+
+    Parameters
+    ----------
+    controllers : sequence of str
+        The user's controllers, for the message.
 
     Returns
     -------
     status : int
         The exit status of the command, 1 if it did not end properly.
     complaint : str
-        What ended it, naming the controllers; empty if it ended properly, or was stopped by a signal that
-        this process was sent.
+        The reason for its end, naming the controllers; empty if it ended properly, or was stopped by a signal
+        to this process.
     """
-    ours, theirs = os.pipe()
-    stopped: list[int] = []
-    environment = {**os.environ, _DESCRIPTOR: str(theirs)}
+    reader, writer = os.pipe()
+    environment = {**os.environ, _DESCRIPTOR_VARIABLE: str(writer)}
     command = [sys.executable, *sys.orig_argv[1:]]
-    child = subprocess.Popen(command, env=environment, pass_fds=(theirs,))
-    os.close(theirs)
-
-    def forward(number: int, frame: FrameType | None) -> None:
-        stopped.append(number)
-        # a terminal sends Ctrl-C to both
-        if number != signal.SIGINT or not _is_in_foreground():
-            with suppress(OSError):
-                child.send_signal(number)
-
-    former = {}
-    for name in _FORWARDED:
-        number = getattr(signal, name)
-        former[number] = signal.signal(number, forward)
-    try:
+    child = subprocess.Popen(command, env=environment, pass_fds=(writer,))
+    os.close(writer)
+    with _forward_signals(child) as received_signals:
         status = child.wait()
-    finally:
-        for number, handler in former.items():
-            signal.signal(number, handler)
-    with open(ours, "rb") as pipe:  # noqa: PTH123 - a descriptor
-        os.set_blocking(ours, False)
-        message = pipe.read() or b""
+    message = _read_message(reader)
     if message:
         return int(message), ""
-    if stopped:
-        return (128 - status if status < 0 else status) or 1, ""
+    if received_signals:
+        # A process that a signal has ended has a negative status in Python, and 128 + signal in shells.
+        exit_status = 128 - status if status < 0 else status
+        return exit_status or 1, ""
     names = ", ".join(controllers)
     return 1, f"controller {names}: it ended Python ({describe_status(status)}) before the command was done"
 
 
+@contextmanager
+def _forward_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
+    """Forward signals to a child process, and yield the list of those that are received."""
+    received_signals: list[int] = []
+
+    def forward(number: int, frame: FrameType | None) -> None:
+        received_signals.append(number)
+        # A terminal sends Ctrl-C to both processes.
+        if number != signal.SIGINT or not _is_in_foreground():
+            with suppress(OSError):
+                child.send_signal(number)
+
+    previous_handlers = {}
+    for name in _FORWARDED_SIGNALS:
+        number = getattr(signal, name)
+        previous_handlers[number] = signal.signal(number, forward)
+    try:
+        yield received_signals
+    finally:
+        for number, handler in previous_handlers.items():
+            signal.signal(number, handler)
+
+
+def _read_message(descriptor: int) -> bytes:
+    """Return the content of a pipe; empty if nothing was written to it."""
+    with open(descriptor, "rb") as pipe:
+        # A process that the command has left behind may keep the pipe open.
+        os.set_blocking(descriptor, False)
+        return pipe.read() or b""
+
+
 def begin_supervised() -> int | None:
-    """Return the descriptor for `report_status` if another process supervises this one, else None."""
-    text = os.environ.pop(_DESCRIPTOR, None)
+    """Prepare this process to be supervised, if it is; it then ends with its parent.
+
+    Returns
+    -------
+    int or None
+        Descriptor for `report_status`; None if this process is not supervised.
+    """
+    text = os.environ.pop(_DESCRIPTOR_VARIABLE, None)
     if text is None:
         return None
-    descriptor, parent = int(text), os.getppid()
+    descriptor = int(text)
+    parent = os.getppid()
     os.set_inheritable(descriptor, False)
 
     def end_with_parent() -> None:
         while os.getppid() == parent:
-            threading.Event().wait(1.0)
+            threading.Event().wait(_PARENT_POLL_S)
         os.kill(os.getpid(), signal.SIGKILL)
 
     threading.Thread(target=end_with_parent, daemon=True).start()
@@ -110,13 +149,30 @@ def begin_supervised() -> int | None:
 
 
 def report_status(descriptor: int, status: int) -> None:
-    """Tell the supervising process that the command has ended properly, and how."""
+    """Report to the supervising process that the command has ended properly.
+
+    Parameters
+    ----------
+    descriptor : int
+        Descriptor that `begin_supervised` returned.
+    status : int
+        Exit status of the command.
+    """
     with suppress(OSError):
         os.write(descriptor, str(status).encode())
 
 
 def describe_status(status: int) -> str:
-    """Return how a process ended, from its status as `subprocess` has it.
+    """Describe the end of a process.
+
+    Parameters
+    ----------
+    status : int
+        Status of `subprocess`: the exit status, or the negative number of a signal.
+
+    Returns
+    -------
+    str
 
     Examples
     --------
@@ -133,6 +189,7 @@ def describe_status(status: int) -> str:
 
 
 def _is_in_foreground() -> bool:
+    """Return whether this process is in the foreground of its terminal."""
     try:
         terminal = os.open("/dev/tty", os.O_RDONLY)
     except OSError:
