@@ -72,7 +72,7 @@ def test_boundary_and_starts_are_drawn(sketch):
     change = create.set_boundary(sketch, ring)
     assert change.sketch.boundary == tuple(ring)
     assert change.selection == Selection(boundary=True)
-    assert change.description == "boundary drawn anew"
+    assert change.description == "boundary drawn again"
     change = create.add_disc_start(sketch, (2.0, 2.0), 0.5)
     assert change.sketch.starts[-1] == ("start", DiscStart((2.0, 2.0), 0.5))
     change = create.add_disc_start(change.sketch, (2.0, 2.0), 0.5)
@@ -292,7 +292,7 @@ def test_names_and_notes(sketch):
     assert properties.rename(sketch, 2, " west\twall ").sketch.get_item(2).shape.name == "west wall"
     change = properties.rename(sketch, 0, "")
     assert change.sketch.get_item(0).shape.name is None
-    assert change.description == "polygon “desk”: name taken away"
+    assert change.description == "polygon “desk”: name removed"
     change = properties.rename(sketch, "two", "pair")
     assert [name for name, _ in change.sketch.starts] == ["corner", "pair", "all"]
     assert change.selection == Selection.of("pair")

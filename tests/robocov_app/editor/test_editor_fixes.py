@@ -7,7 +7,7 @@ from drawn_sketches import HALL
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits.fixes import FIX_TITLES, fill_unreachable, find_fix
+from robocov_app.editor.edits.fixes import FIXES, fill_unreachable, find_fix
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.sketch import Sketch
 
@@ -55,7 +55,7 @@ def test_a_problem_that_is_mended_is_gone(sketch, kind, words):
     radius = 0.2
     before = measure(sketch, radius).problems
     problem = next(each for each in before if each.kind == kind)
-    assert FIX_TITLES[kind]
+    assert FIXES[kind].title
     change = find_fix(sketch, problem, radius)
     assert words in change.description
     after = measure(change.sketch, radius).problems

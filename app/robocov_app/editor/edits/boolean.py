@@ -1,9 +1,8 @@
-"""Selected obstacles combined into polygons, with the place, the name and the note of the lowest."""
+"""Edits that combine obstacles; results keep the position, name and note of the lowest obstacle."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial, reduce
-from typing import Any
 
 import shapely
 
@@ -15,100 +14,126 @@ from robocov_app.editor.model.geometry import extract_polygons, round_length
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
+MITRE_LIMIT = 1.5  # sharper corners than right angles are cut off when obstacles grow
 _difference = partial(shapely.difference, grid_size=GRID_M)
 _intersection = partial(shapely.intersection, grid_size=GRID_M)
 
 
 def unite(sketch: Sketch, selection: Selection) -> Change:
+    """Unite the selected obstacles."""
     items = _require_solid_items(sketch, selection, "unite")
-    return _replace_items(sketch, items, [_union(items)], f"{format_count(len(items), 'obstacle')} united")
+    description = f"{format_count(len(items), 'obstacle')} united"
+    return _replace_items(sketch, items, [_unite_geometries(items)], description)
 
 
 def subtract(sketch: Sketch, selection: Selection) -> Change:
-    """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
-    lowest, *uppers = items = _require_solid_items(sketch, selection, "subtract")
-    left = _difference(lowest.geometry, _union(uppers))
-    what = sketch.display_name(lowest.key)
-    words = f"{format_count(len(uppers), 'obstacle')} cut out of {what}"
-    return _replace_items(sketch, items, [left], words, f"nothing is left of {what}")
+    """Cut the upper ones of the selected obstacles out of the lowest."""
+    items = _require_solid_items(sketch, selection, "subtract")
+    lowest = items[0]
+    uppers = items[1:]
+    name = sketch.display_name(lowest.key)
+    remainder = _difference(lowest.geometry, _unite_geometries(uppers))
+    description = f"{format_count(len(uppers), 'obstacle')} cut out of {name}"
+    return _replace_items(sketch, items, [remainder], description, f"nothing is left of {name}")
 
 
 def intersect(sketch: Sketch, selection: Selection) -> Change:
+    """Keep what the selected obstacles have in common."""
     items = _require_solid_items(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
-    words = f"{format_count(len(items), 'obstacle')} intersected"
-    return _replace_items(sketch, items, [common], words, "they have nothing in common")
+    description = f"{format_count(len(items), 'obstacle')} intersected"
+    return _replace_items(sketch, items, [common], description, "they have nothing in common")
 
 
 def divide(sketch: Sketch, selection: Selection) -> Change:
-    """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
-    lowest, *uppers = items = _require_solid_items(sketch, selection, "divide")
-    parts = [cut(lowest.geometry, _union(uppers)) for cut in (_difference, _intersection)]
-    return _replace_items(sketch, items, parts, f"{sketch.display_name(lowest.key)} divided")
+    """Divide the lowest of the selected obstacles into the parts outside and inside the upper ones."""
+    items = _require_solid_items(sketch, selection, "divide")
+    lowest = items[0].geometry
+    uppers = _unite_geometries(items[1:])
+    parts = [_difference(lowest, uppers), _intersection(lowest, uppers)]
+    return _replace_items(sketch, items, parts, f"{sketch.display_name(items[0].key)} divided")
 
 
-def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
-    """Grow the selected obstacles by so many metres on every side, with sharp corners; shrink with by < 0."""
-    require(MIN_SIZE_M <= abs(by) <= MAX_SIZE_M, f"expected a length of at least {1000 * MIN_SIZE_M:g} mm")
+def offset(sketch: Sketch, selection: Selection, distance: float) -> Change:
+    """Grow the selected obstacles on every side by a distance, m; a negative one shrinks them."""
+    is_possible = MIN_SIZE_M <= abs(distance) <= MAX_SIZE_M
+    require(is_possible, f"expected a length of at least {1000 * MIN_SIZE_M:g} mm")
     require(selection.items, "select obstacles first")
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in selection.list_items(sketch):
-        if isinstance(item.shape, CircleObstacle):
-            radius = round_length(item.shape.radius + by)
-            shapes[item.key] = [replace(item.shape, radius=radius)] if radius >= MIN_SIZE_M else []
-        else:
-            # corners sharper than a right angle would reach far out: they are cut off
-            buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
-            shapes[item.key] = extract_polygons(buffered, item.shape.name)
+        shapes[item.key] = _offset_item(item, distance)
         require(shapes[item.key], f"nothing would be left of the {sketch.display_name(item.key)}")
-    words = f"{Selection(items=selection.items).describe(sketch)} {'grown' if by > 0 else 'shrunk'}"
-    return replace_obstacles(sketch, shapes, f"{words} by {abs(round_length(by)):g} m")
+    obstacles = Selection(items=selection.items).describe(sketch)
+    verb = "grown" if distance > 0 else "shrunk"
+    description = f"{obstacles} {verb} by {abs(round_length(distance)):g} m"
+    return replace_obstacles(sketch, shapes, description)
+
+
+def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
+    """Return an obstacle grown by a distance, m; a circle stays one."""
+    if isinstance(item.shape, CircleObstacle):
+        radius = round_length(item.shape.radius + distance)
+        return [replace(item.shape, radius=radius)] if radius >= MIN_SIZE_M else []
+    grown = item.geometry.buffer(distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
+    return extract_polygons(grown, item.shape.name)
 
 
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
-    """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected."""
+    """Cut off what sticks out of the boundary: of the selected obstacles, or of all."""
     if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be sound first")
     inside = shapely.Polygon(sketch.boundary)
     shapely.prepare(inside)
-    shapes: dict[int, Sequence[Obstacle]] = {
-        item.key: extract_polygons(_intersection(item.geometry, inside), item.shape.name)
-        for item in sketch.obstacles
-        if (not selection.items or item.key in selection.items) and not inside.covers(item.geometry)
-    }
+    items = selection.list_items(sketch) if selection.items else sketch.obstacles
+    shapes: dict[int, Sequence[Obstacle]] = {}
+    for item in items:
+        if not inside.covers(item.geometry):
+            shapes[item.key] = extract_polygons(_intersection(item.geometry, inside), item.shape.name)
     require(shapes, "nothing sticks out of the boundary")
-    return replace_obstacles(
-        sketch, shapes, f"{format_count(len(shapes), 'obstacle')} cut off at the boundary"
-    )
+    description = f"{format_count(len(shapes), 'obstacle')} cut off at the boundary"
+    return replace_obstacles(sketch, shapes, description)
 
 
 def repair_outlines(sketch: Sketch, selection: Selection) -> Change:
-    """Make crossing outlines valid, of what is selected or of all; the boundary keeps its largest part."""
-    everything = not (selection.items or selection.boundary)
+    """Make crossing outlines valid: the selected ones, or all; the boundary keeps its largest part."""
+    is_all = not selection.items and not selection.boundary
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in sketch.obstacles:
-        shape = item.shape
-        if not isinstance(shape, PolygonObstacle) or not (everything or item.key in selection.items):
-            continue
-        if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
-            shapes[item.key] = extract_polygons(item.geometry, shape.name)
+        if (is_all or item.key in selection.items) and _is_broken(item.shape):
+            shapes[item.key] = extract_polygons(item.geometry, item.shape.name)
     boundary = sketch.boundary
-    meant = everything or selection.boundary
-    if meant and boundary is not None and len(boundary) >= 3 and not shapely.Polygon(boundary).is_valid:
-        parts = extract_polygons(shapely.make_valid(shapely.Polygon(boundary)))
-        boundary = parts[0].vertices if parts else None
-    redrawn = boundary is not sketch.boundary
-    require(shapes or redrawn, "there is nothing to repair: no outline crosses itself")
-    words = f"{format_count(len(shapes) + redrawn, 'outline')} repaired"
-    change = replace_obstacles(replace(sketch, boundary=boundary), shapes, words)
-    return replace(change, selection=replace(change.selection, boundary=redrawn and boundary is not None))
+    if is_all or selection.boundary:
+        boundary = _repair_boundary(sketch)
+    is_boundary_repaired = boundary is not sketch.boundary
+    require(shapes or is_boundary_repaired, "there is nothing to repair: no outline crosses itself")
+    description = f"{format_count(len(shapes) + is_boundary_repaired, 'outline')} repaired"
+    change = replace_obstacles(replace(sketch, boundary=boundary), shapes, description)
+    is_boundary_selected = is_boundary_repaired and boundary is not None
+    return replace(change, selection=replace(change.selection, boundary=is_boundary_selected))
 
 
-def _union(items: Sequence[Item]) -> shapely.Geometry:
+def _is_broken(shape: Obstacle) -> bool:
+    if not isinstance(shape, PolygonObstacle):
+        return False
+    fewest_corners = min(map(len, (shape.vertices, *shape.holes)))
+    return fewest_corners < 3 or not shape.polygon.is_valid
+
+
+def _repair_boundary(sketch: Sketch) -> tuple[tuple[float, float], ...] | None:
+    """Return the largest part of a broken boundary; the same boundary unless it is broken."""
+    boundary = sketch.boundary
+    if boundary is None or len(boundary) < 3 or shapely.Polygon(boundary).is_valid:
+        return boundary
+    parts = extract_polygons(shapely.make_valid(shapely.Polygon(boundary)))
+    return parts[0].vertices if parts else None
+
+
+def _unite_geometries(items: Sequence[Item]) -> shapely.Geometry:
     return shapely.union_all([item.geometry for item in items], grid_size=GRID_M)
 
 
 def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
+    """Return the selected obstacles, the lowest first; raise MapError unless they can be combined."""
     items = selection.list_items(sketch)
     require(len(items) >= 2, f"select two or more obstacles to {verb}")
     for item in items:
@@ -118,10 +143,18 @@ def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> lis
 
 
 def _replace_items(
-    sketch: Sketch, items: list[Item], parts: list[Any], words: str, empty: str = ""
+    sketch: Sketch,
+    items: list[Item],
+    parts: list[shapely.Geometry],
+    description: str,
+    error: str = "nothing is left",
 ) -> Change:
-    """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
-    lowest, *others = items
-    shapes = [shape for part in parts for shape in extract_polygons(part, lowest.shape.name)]
-    require(shapes, empty or "nothing is left")
-    return replace_obstacles(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)
+    """Put the polygons of geometries in place of obstacles; raise MapError if there are none."""
+    lowest = items[0]
+    polygons: list[Obstacle] = []
+    for part in parts:
+        polygons += extract_polygons(part, lowest.shape.name)
+    require(polygons, error)
+    shapes: dict[int, Sequence[Obstacle]] = {item.key: () for item in items}
+    shapes[lowest.key] = polygons
+    return replace_obstacles(sketch, shapes, description)

@@ -1,6 +1,7 @@
-"""Copy and paste as JSON text: also of whole maps, obstacles, and lists of obstacles or of points."""
+"""Copy and paste as JSON text: parts of maps, whole maps, obstacles, and lists of obstacles or points."""
 
 from dataclasses import replace
+from typing import Any
 
 from robocov.environment import Obstacle, Point, PolygonObstacle
 from robocov.errors import MapError
@@ -14,50 +15,97 @@ from robocov_app.editor.model.parser import build_sketch
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, to_document
 
-FORMAT = "robocov-clipboard"  # what the copied text says that it is
+FORMAT = "robocov-clipboard"  # of copied text
+SOURCE = "what was copied"  # in error messages
 
 
 def copy_selection(sketch: Sketch, selection: Selection) -> str:
-    starts = tuple((name, spec) for name, spec in sketch.starts if name in selection.starts)
-    part = Sketch(sketch.name, obstacles=tuple(selection.list_items(sketch)), starts=starts)
-    part = replace(part, boundary=sketch.boundary) if selection.boundary else part
-    anything = part.boundary is not None or part.obstacles or part.starts
-    require(anything, "select obstacles, starts or the boundary to copy")
+    """Return the selected objects as JSON text."""
+    part = Sketch(
+        sketch.name,
+        boundary=sketch.boundary if selection.boundary else None,
+        obstacles=tuple(selection.list_items(sketch)),
+        starts=tuple((name, start) for name, start in sketch.starts if name in selection.starts),
+    )
+    has_content = part.boundary is not None or part.obstacles or part.starts
+    require(has_content, "select obstacles, starts or the boundary to copy")
     return dump_document({**to_document(part), "format": FORMAT})
 
 
-def paste(sketch: Sketch, text: str, at: Point | None = None, grid: float | None = None) -> Change:
-    """Paste copied text, its middle at a place, m (None: as it was); a boundary only where there is none."""
-    part = _part(text)
+def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float | None = None) -> Change:
+    """Paste copied text.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map.
+    text : str
+        The copied text.
+    position : Point, optional
+        Where the centre of what is pasted goes, m; by default it stays where it was.
+    grid : float, optional
+        The displacement is a multiple of this, m.
+
+    Returns
+    -------
+    Change
+        The pasted objects are selected. A boundary is pasted if the map has none.
+
+    Raises
+    ------
+    MapError
+        If the text contains no part of a map.
+    """
+    part = _parse(text)
     shapes: list[tuple[Obstacle, str]] = [(item.shape, item.note) for item in part.obstacles]
-    new_boundary = part.boundary is not None and sketch.boundary is None
-    if part.boundary is not None and not (new_boundary or shapes or part.starts):
+    has_boundary = part.boundary is not None
+    sets_boundary = has_boundary and sketch.boundary is None
+    is_boundary_alone = has_boundary and not shapes and not part.starts
+    if part.boundary is not None and is_boundary_alone and not sets_boundary:
+        # A second boundary becomes an obstacle.
         shapes.append((PolygonObstacle(part.boundary), ""))
-    after, new = create.add_objects(sketch, shapes, part.starts)
-    selection = require(replace(new, boundary=new_boundary), "there is nothing to paste in what was copied")
-    after = replace(after, boundary=part.boundary) if new_boundary else after
-    bounds = transform.compute_bounds(after, selection)
-    by = [0.0, 0.0]
-    if at is not None and bounds is not None:
-        by = [to - middle for to, middle in zip(at, compute_centre(bounds), strict=True)]
-        by = [grid * round(each / grid) for each in by] if grid else by
-    # by nothing too: what is pasted lies on tenths of millimetres, as far as maps reach
-    after = transform.move(after, selection, by[0], by[1]).sketch
-    return Change(after, selection, f"{selection.describe(after)} pasted")
+    pasted, added = create.add_objects(sketch, shapes, part.starts)
+    selection = replace(added, boundary=sets_boundary)
+    require(selection, f"there is nothing to paste in {SOURCE}")
+    if sets_boundary:
+        pasted = replace(pasted, boundary=part.boundary)
+    dx, dy = _compute_displacement(pasted, selection, position, grid)
+    # Even without a displacement, moving rounds coordinates and checks that they are within reach.
+    moved = transform.move(pasted, selection, dx, dy).sketch
+    return Change(moved, selection, f"{selection.describe(moved)} pasted")
 
 
-def _part(text: str) -> Sketch:
+def _compute_displacement(
+    sketch: Sketch, selection: Selection, position: Point | None, grid: float | None
+) -> tuple[float, float]:
+    """Return the displacement, m, that brings the centre of a selection to a position."""
+    bounds = transform.compute_bounds(sketch, selection)
+    if position is None or bounds is None:
+        return 0.0, 0.0
+    x, y = compute_centre(bounds)
+    dx = position[0] - x
+    dy = position[1] - y
+    if grid:
+        return grid * round(dx / grid), grid * round(dy / grid)
+    return dx, dy
+
+
+def _parse(text: str) -> Sketch:
     require(text.strip(), "there is nothing to paste")
-    require(text.lstrip()[:1] in ("{", "["), "what was copied is no part of a map")
+    require(text.lstrip()[:1] in ("{", "["), f"{SOURCE} is no part of a map")
     try:
-        value = parse_json(text, "what was copied")
-        if isinstance(value, dict) and "format" in value:
-            ours = value["format"] == FORMAT
-            return build_sketch({**value, "format": HEADER["format"]} if ours else value, "what was copied")
-        obstacles = [value] if isinstance(value, dict) else value
-        if not obstacles or not all(isinstance(each, dict) for each in obstacles):
-            require(len(obstacles) >= 3, "expected at least three points, obstacles or a map")
-            obstacles = [{"kind": "polygon", "vertices": obstacles}]
-        return build_sketch({**HEADER, "obstacles": obstacles}, "what was copied")
+        return build_sketch(_build_document(parse_json(text, SOURCE)), SOURCE)
     except MapError as error:
         raise MapError(f"this cannot be pasted: {error}") from None
+
+
+def _build_document(value: Any) -> Any:
+    """Return the document of a map: as copied, or around an obstacle, a list of obstacles, or of points."""
+    if isinstance(value, dict) and "format" in value:
+        return {**value, "format": HEADER["format"]} if value["format"] == FORMAT else value
+    obstacles = [value] if isinstance(value, dict) else value
+    are_obstacles = obstacles and all(isinstance(obstacle, dict) for obstacle in obstacles)
+    if not are_obstacles:
+        require(len(obstacles) >= 3, "expected at least three points, obstacles or a map")
+        obstacles = [{"kind": "polygon", "vertices": obstacles}]
+    return {**HEADER, "obstacles": obstacles}

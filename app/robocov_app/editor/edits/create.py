@@ -1,10 +1,9 @@
-"""Edits that draw: obstacles, the boundary, starts, and doors in walls, which stay walls."""
+"""Edits that add obstacles, starts and the boundary, and open doors in walls."""
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
-from itertools import chain, count
+from itertools import count
 
 import numpy as np
 import shapely
@@ -27,170 +26,237 @@ from robocov_app.editor.model.hit_test import find_obstacles
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Sketch
 
-MIN_DRAWN_LENGTH_M = 0.02  # metres below which what is drawn is taken for a slip of the hand
+MIN_DRAWN_LENGTH_M = 0.02  # shorter strokes are slips of the hand
+MAX_TEXT_CHARACTERS = 10_000
 
 
 def add_obstacle(sketch: Sketch, shape: Obstacle) -> Change:
-    after, keys = sketch.with_obstacles([shape])
-    return Change(after, Selection.of(*keys), f"{after.display_name(keys[0])} drawn")
+    """Add an obstacle on top, and select it."""
+    added, keys = sketch.with_obstacles([shape])
+    return Change(added, Selection.of(*keys), f"{added.display_name(keys[0])} drawn")
 
 
 def add_polygon(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Put a polygon down; it may cross itself, which `validation` will say."""
-    return add_obstacle(sketch, env.PolygonObstacle(_outline(points, "a polygon")))
+    """Add a polygon; it may cross itself, which validation reports."""
+    return add_obstacle(sketch, env.PolygonObstacle(_build_outline(points, "a polygon")))
 
 
 def add_rectangle(sketch: Sketch, points: Sequence[Point]) -> Change:
-    low, high = round_ring(np.sort(np.array(points, dtype=float), axis=0))  # of two opposite corners
+    """Add a rectangle between two opposite corners, m."""
+    low, high = round_ring(np.sort(np.array(points, dtype=float), axis=0))
     if min(high[0] - low[0], high[1] - low[1]) < MIN_DRAWN_LENGTH_M:
         raise MapError("a rectangle needs a width and a height: drag from corner to corner")
-    return replace(
-        add_obstacle(sketch, env.PolygonObstacle(build_rectangle(low, high))), description="rectangle drawn"
-    )
+    change = add_obstacle(sketch, env.PolygonObstacle(build_rectangle(low, high)))
+    return replace(change, description="rectangle drawn")
 
 
 def add_circle(sketch: Sketch, center: Point, radius: float) -> Change:
-    return add_obstacle(sketch, env.CircleObstacle(check_point(center), _radius(radius, "a circle")))
+    """Add a circle with a centre and radius, m."""
+    return add_obstacle(sketch, env.CircleObstacle(check_point(center), _check_radius(radius, "a circle")))
 
 
 def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
+    """Add a wall along a line, with a width, m."""
     line = drop_repeated_points(round_ring(points), closed=False)
     if len(line) < 2 or shapely.LineString(line).length < MIN_DRAWN_LENGTH_M:
         raise MapError("a wall needs two points that are apart")
-    require(MIN_SIZE_M <= width <= MAX_SIZE_M, f"a wall's width is at least {1000 * MIN_SIZE_M:g} mm")
+    is_possible = MIN_SIZE_M <= width <= MAX_SIZE_M
+    require(is_possible, f"a wall's width is at least {1000 * MIN_SIZE_M:g} mm")
     return add_obstacle(sketch, env.WallObstacle(line, round_length(width)))
 
 
 def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
-    words = "boundary drawn" if sketch.boundary is None else "boundary drawn anew"
-    return Change(replace(sketch, boundary=_outline(points, "a boundary")), Selection(boundary=True), words)
+    """Replace the boundary, and select it."""
+    description = "boundary drawn" if sketch.boundary is None else "boundary drawn again"
+    boundary = _build_outline(points, "a boundary")
+    return Change(replace(sketch, boundary=boundary), Selection(boundary=True), description)
 
 
 def add_disc_start(sketch: Sketch, center: Point, radius: float) -> Change:
-    return _add_start(sketch, env.DiscStart(check_point(center), _radius(radius, "a start")))
+    """Add a start that is a disc with a centre and radius, m."""
+    return _add_start(sketch, env.DiscStart(check_point(center), _check_radius(radius, "a start")))
 
 
 def add_points_start(sketch: Sketch, points: Sequence[Point]) -> Change:
-    places = require(tuple(dict.fromkeys(round_ring(points))), "a start needs a place for a robot at least")
-    return _add_start(sketch, env.PointsStart(places))
+    """Add a start with a position, m, for each robot; repeated positions are dropped."""
+    positions = tuple(dict.fromkeys(round_ring(points)))
+    require(positions, "a start needs a place for a robot at least")
+    return _add_start(sketch, env.PointsStart(positions))
 
 
-def _add_start(sketch: Sketch, spec: StartSpec) -> Change:
+def add_uniform_start(sketch: Sketch) -> Change:
+    """Add a start anywhere in the free space."""
+    return _add_start(sketch, env.UniformStart())
+
+
+def _add_start(sketch: Sketch, start: StartSpec) -> Change:
     name = find_free_name(sketch, "start")
-    return Change(sketch.with_objects({name: spec}), Selection.of(name), f"start “{name}” added")
-
-
-add_uniform_start = partial(_add_start, spec=env.UniformStart())
+    return Change(sketch.with_objects({name: start}), Selection.of(name), f"start “{name}” added")
 
 
 def add_objects(
     sketch: Sketch, shapes: Iterable[tuple[Obstacle, str]], starts: Iterable[tuple[str, StartSpec]]
 ) -> tuple[Sketch, Selection]:
-    """Return the sketch with more obstacles, with notes, and starts, under free names; and what they are."""
-    after, keys = sketch.with_obstacles(shapes)
+    """Add obstacles and starts.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map.
+    shapes : iterable of Obstacle and str
+        Obstacles with their notes.
+    starts : iterable of str and StartSpec
+        Starts with their names; names that are taken get a number.
+
+    Returns
+    -------
+    sketch : Sketch
+        The map with the objects.
+    selection : Selection
+        The added objects.
+    """
+    added, keys = sketch.with_obstacles(shapes)
     names = []
-    for name, spec in starts:
-        names.append(find_free_name(after, name or "start"))
-        after = after.with_objects({names[-1]: spec})
-    return after, Selection.of(*keys, *names)
+    for name, start in starts:
+        free_name = find_free_name(added, name or "start")
+        added = added.with_objects({free_name: start})
+        names.append(free_name)
+    return added, Selection.of(*keys, *names)
 
 
 def find_free_name(sketch: Sketch, name: str) -> str:
-    """Return a name for a start that no start has yet: this one, or with a number after it: "start 2"."""
+    """Return a name that no start has: the given one, or with a number after it, such as "start 2"."""
+    taken = dict(sketch.starts)
+    if name not in taken:
+        return name
     stem = re.sub(r" \d+$", "", name)
-    names = chain([name], (f"{stem} {k}" for k in count(2)))
-    return next(each for each in names if each not in dict(sketch.starts))
+    return next(numbered for k in count(2) if (numbered := f"{stem} {k}") not in taken)
 
 
 def clean_label(name: str) -> str:
+    """Return a name without needless blanks; raise MapError if it is too long or has control characters."""
     name = clean_text(" ".join(name.split()), "a name", MAX_LABEL_CHARACTERS)
-    require(all(ord(char) >= 32 and ord(char) != 127 for char in name), "a name is text on one line")
+    is_printable = all(ord(char) >= 32 and ord(char) != 127 for char in name)
+    require(is_printable, "a name is text on one line")
     return name
 
 
-def clean_text(text: str, what: str, most: int = 10_000) -> str:
-    """Return text as maps can have it: without halves of characters, which no file could hold."""
+def clean_text(text: str, label: str, maximum: int = MAX_TEXT_CHARACTERS) -> str:
+    """Return a text without blanks around it; raise MapError if it is too long.
+
+    Parameters
+    ----------
+    text : str
+        The text. Halves of characters, which no file can contain, are dropped.
+    label : str
+        What the text is, for the error message.
+    maximum : int
+        Maximum number of characters.
+    """
     text = text.encode("utf-8", "ignore").decode("utf-8")
-    require(len(text) <= most, f"{what} has at most {most} characters")
+    require(len(text) <= maximum, f"{label} has at most {maximum} characters")
     return text.strip()
 
 
-def _outline(points: Sequence[Point], what: str) -> Ring:
+def _build_outline(points: Sequence[Point], label: str) -> Ring:
     ring = drop_repeated_points(round_ring(points))
     if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < MIN_DRAWN_LENGTH_M**2:
-        raise MapError(f"{what} needs three corners that enclose something")
+        raise MapError(f"{label} needs three corners that enclose something")
     return ring
 
 
-def _radius(radius: float, what: str) -> float:
-    require(
-        MIN_DRAWN_LENGTH_M <= radius <= MAX_SIZE_M, f"{what} needs a radius: drag from its middle to its rim"
-    )
+def _check_radius(radius: float, label: str) -> float:
+    is_possible = MIN_DRAWN_LENGTH_M <= radius <= MAX_SIZE_M
+    require(is_possible, f"{label} needs a radius: drag from its middle to its rim")
     return round_length(radius)
 
 
 def find_wall(sketch: Sketch, point: Point, reach: float) -> int | None:
-    keys = find_obstacles(sketch, point, reach)
-    return next((key for key in keys if isinstance(sketch.get_item(key).shape, env.WallObstacle)), None)
+    """Return the key of the wall within `reach` metres of a point."""
+    for key in find_obstacles(sketch, point, reach):
+        if isinstance(sketch.get_item(key).shape, env.WallObstacle):
+            return key
+    return None
 
 
 def compute_door_ends(sketch: Sketch, key: int, point: Point, width: float) -> tuple[Point, Point]:
-    """Return both sides of a door whose middle is as near to a point as the wall allows."""
-    line = _line(sketch, key)
-    a, b = _span(line, point, min(width, line.length))
-    return _along(line, a), _along(line, b)
+    """Return both ends of a door.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map.
+    key : int
+        Key of the wall.
+    point : Point
+        The centre of the door is as near to this as the wall allows, m.
+    width : float
+        Width of the door, m.
+    """
+    line = _build_wall_line(sketch, key)
+    start, end = _compute_door_span(line, point, min(width, line.length))
+    return _interpolate(line, start), _interpolate(line, end)
 
 
 def project_on_wall(sketch: Sketch, key: int, point: Point) -> Point:
-    line = _line(sketch, key)
-    return _along(line, line.project(shapely.Point(point)))
+    """Return the point of a wall's line that is nearest to a point, m."""
+    line = _build_wall_line(sketch, key)
+    return _interpolate(line, line.project(shapely.Point(point)))
 
 
 def check_door_width(width: float) -> float:
-    require(
-        MIN_DRAWN_LENGTH_M <= width <= MAX_SIZE_M,
-        f"a door's width is at least {100 * MIN_DRAWN_LENGTH_M:g} cm",
-    )
+    """Return a width, m; raise MapError if no door can have it."""
+    is_possible = MIN_DRAWN_LENGTH_M <= width <= MAX_SIZE_M
+    require(is_possible, f"a door's width is at least {100 * MIN_DRAWN_LENGTH_M:g} cm")
     return width
 
 
 def open_door(sketch: Sketch, key: int, point: Point, width: float) -> Change:
-    line = _line(sketch, key)
+    """Open a door of a width, m, in a wall near a point."""
+    line = _build_wall_line(sketch, key)
     if check_door_width(width) > line.length - MIN_SIZE_M:
         raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")
-    return _open_wall_between(sketch, key, *_span(line, point, width))
+    start, end = _compute_door_span(line, point, width)
+    return _open_wall_between(sketch, key, start, end)
 
 
 def open_wall(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
-    """Open a wall between the places on it that are nearest to two points."""
-    begin, end = sorted(_line(sketch, key).project(shapely.Point(place)) for place in (a, b))
-    check_door_width(end - begin)
-    return _open_wall_between(sketch, key, begin, end)
+    """Open a wall between the points of its line that are nearest to two points, m."""
+    line = _build_wall_line(sketch, key)
+    start, end = sorted(line.project(shapely.Point(point)) for point in (a, b))
+    check_door_width(end - start)
+    return _open_wall_between(sketch, key, start, end)
 
 
-def _open_wall_between(sketch: Sketch, key: int, begin: float, end: float) -> Change:
-    """Take what lies between two lengths along a wall away; the pieces keep its name and note."""
-    line, wall = _line(sketch, key), sketch.get_item(key).shape
+def _open_wall_between(sketch: Sketch, key: int, start: float, end: float) -> Change:
+    """Remove a wall between two lengths along its line, m; the pieces keep its name and note."""
+    line = _build_wall_line(sketch, key)
+    wall = sketch.get_item(key).shape
     assert isinstance(wall, env.WallObstacle)
-    left = [(low, high) for low, high in ((0.0, begin), (end, line.length)) if high - low >= MIN_SIZE_M]
-    pieces = [replace(wall, points=tuple(map(round_point, substring(line, *part).coords))) for part in left]
-    require(pieces, f"nothing would be left of the {sketch.display_name(key)}")
-    words = f"door of {end - begin:.3g} m opened in {sketch.display_name(key)}"
-    return replace_obstacles(sketch, {key: pieces}, words)
+    pieces = []
+    for low, high in ((0.0, start), (end, line.length)):
+        if high - low >= MIN_SIZE_M:
+            points = tuple(map(round_point, substring(line, low, high).coords))
+            pieces.append(replace(wall, points=points))
+    name = sketch.display_name(key)
+    require(pieces, f"nothing would be left of the {name}")
+    return replace_obstacles(sketch, {key: pieces}, f"door of {end - start:.3g} m opened in {name}")
 
 
-def _line(sketch: Sketch, key: int) -> shapely.LineString:
+def _build_wall_line(sketch: Sketch, key: int) -> shapely.LineString:
     wall = sketch.get_item(key).shape
     if not isinstance(wall, env.WallObstacle) or len(set(wall.points)) < 2:
         raise MapError("doors are opened in walls")
     return shapely.LineString(wall.points)
 
 
-def _span(line: shapely.LineString, point: Point, width: float) -> tuple[float, float]:
-    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
-    return middle - width / 2, middle + width / 2
+def _compute_door_span(line: shapely.LineString, point: Point, width: float) -> tuple[float, float]:
+    """Return the lengths along a line, m, between which a door lies."""
+    nearest = line.project(shapely.Point(point))
+    centre = min(max(nearest, width / 2), line.length - width / 2)
+    return centre - width / 2, centre + width / 2
 
 
-def _along(line: shapely.LineString, length: float) -> Point:
+def _interpolate(line: shapely.LineString, length: float) -> Point:
     ((x, y),) = line.interpolate(length).coords
     return x, y

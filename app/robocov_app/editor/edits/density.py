@@ -1,4 +1,4 @@
-"""Edits of the density: features of one kind, hot spots on a floor or weighted areas on a background."""
+"""Edits of the density: hot spots on a floor, or weighted areas on a background."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,113 +12,134 @@ from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import check_point, drop_repeated_points, round_length, round_ring
+from robocov_app.editor.model.geometry import (
+    check_point,
+    drop_repeated_points,
+    round_length,
+    round_ring,
+)
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 Feature: TypeAlias = Gaussian | WeightedArea
-MIN_PEAK_WEIGHT = 1e-6  # smallest weight of a hot spot, and of every place where there is none
+MIN_PEAK_WEIGHT = 1e-6  # of a hot spot, and of a density without features
 
 
 def list_features(sketch: Sketch) -> tuple[Feature, ...]:
-    """Return the hot spots or the areas; none where the density is of another kind."""
+    """Return the hot spots or areas; none if the density is of another kind."""
     if isinstance(sketch.density, Gaussians):
         return sketch.density.peaks
     return sketch.density.areas if isinstance(sketch.density, WeightedPolygons) else ()
 
 
 def compute_spread(peak: Gaussian) -> float:
-    """Return the standard deviation of a hot spot, m: of one that is not round, the geometric mean."""
+    """Return the standard deviation of a hot spot, m; of an elliptic one, the geometric mean."""
+    if peak.sigma is not None:
+        return peak.sigma
     (a, b), (c, d) = peak.matrix
-    return float((a * d - b * c) ** 0.25) if peak.sigma is None else peak.sigma
+    return float((a * d - b * c) ** 0.25)
 
 
 def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
-    """Add a hot spot; without a density, to one that is 1 everywhere."""
+    """Add a hot spot with a centre and standard deviation, m; without a density, to one of 1 everywhere."""
     if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.is_uniform:
-        raise _other_kind(sketch.density, ", hot spots are not")
-    peak = Gaussian(check_point(center), _weight(weight, least=MIN_PEAK_WEIGHT), _sigma(sigma))
-    return _put(sketch, (*list_features(sketch), peak), "hot spot added")
+        raise _build_kind_error(sketch.density, ", hot spots are not")
+    peak = Gaussian(check_point(center), _check_weight(weight, MIN_PEAK_WEIGHT), _check_sigma(sigma))
+    return _set_features(sketch, (*list_features(sketch), peak), "hot spot added")
 
 
 def add_area(sketch: Sketch, area: WeightedArea) -> Change:
-    """Add an area of constant weight on top; without a density, to one that is 1 everywhere."""
+    """Add an area of constant weight on top; without a density, to one of 1 everywhere."""
     if isinstance(sketch.density, Gaussians | Raster):
-        raise _other_kind(sketch.density, ", areas are not")
-    area = _sound(replace(area, vertices=drop_repeated_points(round_ring(area.vertices))))
-    return _put(sketch, (*list_features(sketch), area), "area added")
+        raise _build_kind_error(sketch.density, ", areas are not")
+    area = _check_area(replace(area, vertices=drop_repeated_points(round_ring(area.vertices))))
+    return _set_features(sketch, (*list_features(sketch), area), "area added")
 
 
 def convert_polygons(sketch: Sketch, selection: Selection, weight: float) -> Change:
-    chosen = [item.shape for item in selection.list_items(sketch)]
-    shapes = [shape for shape in chosen if isinstance(shape, PolygonObstacle)]
-    missing = "select polygons first: they become areas that count more, or less"
-    require(len(shapes) == len(chosen) > 0, missing)
-    after = sketch.without(selection.items)
-    for shape in shapes:
-        area = WeightedArea(shape.vertices, weight, shape.holes, shape.name)
-        after = add_area(after, area).sketch
-    return Change(after, Selection(), f"{format_count(len(shapes), 'polygon')} made an area of the density")
+    """Turn the selected polygons into areas of a weight."""
+    shapes = [item.shape for item in selection.list_items(sketch)]
+    polygons = [shape for shape in shapes if isinstance(shape, PolygonObstacle)]
+    are_polygons = len(polygons) == len(shapes) > 0
+    require(are_polygons, "select polygons first: they become areas that count more, or less")
+    changed = sketch.without(selection.items)
+    for polygon in polygons:
+        area = WeightedArea(polygon.vertices, weight, polygon.holes, polygon.name)
+        changed = add_area(changed, area).sketch
+    description = f"{format_count(len(polygons), 'polygon')} made an area of the density"
+    return Change(changed, Selection(), description)
 
 
 def remove_feature(sketch: Sketch, number: int) -> Change:
-    """Take a feature away; with the last one the density goes."""
-    words = f"{_name(_feature(sketch, number))} taken away"
-    kept = [each for k, each in enumerate(list_features(sketch)) if k != number]
-    return _put(sketch, kept, words) if kept else replace(remove_density(sketch), description=words)
+    """Remove a feature; with the last one, the density."""
+    description = f"{_name_feature(_get_feature(sketch, number))} removed"
+    remaining = [feature for k, feature in enumerate(list_features(sketch)) if k != number]
+    if remaining:
+        return _set_features(sketch, remaining, description)
+    return replace(remove_density(sketch), description=description)
 
 
 def move_feature(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
-    return _changed(sketch, number, transform.Affine(x0=dx, y0=dy).apply(_feature(sketch, number)), "moved")
+    """Move a feature by a displacement, m."""
+    moved = transform.Affine(x0=dx, y0=dy).apply(_get_feature(sketch, number))
+    return _replace_feature(sketch, number, moved, "moved")
 
 
 def resize_peak(sketch: Sketch, number: int, sigma: float) -> Change:
-    """Give a hot spot another standard deviation, m; one that is not round keeps its shape."""
-    peak, rounded = _feature(sketch, number), _sigma(sigma)
+    """Give a hot spot another standard deviation, m; an elliptic one keeps its shape."""
+    peak = _get_feature(sketch, number)
+    rounded = _check_sigma(sigma)
     if not isinstance(peak, Gaussian):
         raise MapError("there is no such hot spot any more")
     if peak.covariance is None:
-        return _changed(sketch, number, replace(peak, sigma=rounded), "sized")
+        return _replace_feature(sketch, number, replace(peak, sigma=rounded), "sized")
     factor = (sigma / compute_spread(peak)) ** 2
-    (a, b), (c, d) = ((factor * x, factor * y) for x, y in peak.matrix)
-    return _changed(sketch, number, replace(peak, covariance=((a, b), (c, d))), "sized")
+    (a, b), (c, d) = peak.matrix
+    covariance = ((factor * a, factor * b), (factor * c, factor * d))
+    return _replace_feature(sketch, number, replace(peak, covariance=covariance), "sized")
 
 
-def move_corner(sketch: Sketch, number: int, corner: int, to: Point) -> Change:
-    area = _feature(sketch, number)
+def move_corner(sketch: Sketch, number: int, corner: int, position: Point) -> Change:
+    """Move a corner of an area to a position, m."""
+    area = _get_feature(sketch, number)
     if not isinstance(area, WeightedArea) or corner >= len(area.vertices):
         raise MapError("there is no such corner any more")
-    points = (*area.vertices[:corner], check_point(to), *area.vertices[corner + 1 :])
-    return _changed(sketch, number, _sound(replace(area, vertices=points)), "changed")
+    vertices = (*area.vertices[:corner], check_point(position), *area.vertices[corner + 1 :])
+    return _replace_feature(sketch, number, _check_area(replace(area, vertices=vertices)), "changed")
 
 
 def set_weight(sketch: Sketch, number: int, weight: float) -> Change:
-    feature = _feature(sketch, number)
-    weight = _weight(weight, least=MIN_PEAK_WEIGHT if isinstance(feature, Gaussian) else 0.0)
-    return _changed(sketch, number, replace(feature, weight=weight), f"weighs {weight:g}")
+    """Set the weight of a feature."""
+    feature = _get_feature(sketch, number)
+    minimum = MIN_PEAK_WEIGHT if isinstance(feature, Gaussian) else 0.0
+    weight = _check_weight(weight, minimum)
+    return _replace_feature(sketch, number, replace(feature, weight=weight), f"weighs {weight:g}")
 
 
 def set_floor(sketch: Sketch, floor: float) -> Change:
-    """Let every place count so much, without the hot spots or outside the areas."""
+    """Set the density away from hot spots, or outside the areas."""
     features = list_features(sketch)
-    floor = _weight(floor, least=0.0 if features else MIN_PEAK_WEIGHT)
-    return _put(sketch, features, f"every place counts {floor:g} at least", floor)
+    floor = _check_weight(floor, 0.0 if features else MIN_PEAK_WEIGHT)
+    return _set_features(sketch, features, f"every place counts {floor:g} at least", floor)
 
 
 def remove_density(sketch: Sketch) -> Change:
+    """Remove the density, so that every position counts the same."""
     require(sketch.density is not None, "every place counts the same already")
-    return Change(replace(sketch, density=None), Selection(), "density taken away")
+    return Change(replace(sketch, density=None), Selection(), "density removed")
 
 
 def parse_weight(text: str) -> float:
+    """Return a typed weight; raise MapError if it is none."""
     try:
         weight = float(text)
     except ValueError:
         raise MapError(f"expected a weight above 0, got “{text}”") from None
-    return _weight(weight, least=MIN_PEAK_WEIGHT)
+    return _check_weight(weight, MIN_PEAK_WEIGHT)
 
 
 def describe_density(density: Density | None) -> str:
+    """Describe a density in a few words: "2 hot spots, floor 0.5"."""
     if density is None:
         return "none: every place counts the same"
     if isinstance(density, Gaussians):
@@ -126,68 +147,81 @@ def describe_density(density: Density | None) -> str:
     if isinstance(density, Raster):
         rows, columns = density.values.shape
         return f"picture, {columns} x {rows}"
-    kind = format_count(len(density.areas), "area") if isinstance(density, WeightedPolygons) else density.kind
+    kind = density.kind
+    if isinstance(density, WeightedPolygons):
+        kind = format_count(len(density.areas), "area")
     return f"{kind}, {density.min_value:g} to {density.max_value:g}"
 
 
-def _other_kind(density: Density, wanted: str = "") -> MapError:
-    return MapError(f"this map's density is a {density.kind}{wanted}: “density none” takes it away first")
+def _build_kind_error(density: Density, reason: str = "") -> MapError:
+    return MapError(f"this map's density is a {density.kind}{reason}: “density none” takes it away first")
 
 
-def _put(sketch: Sketch, features: Sequence[Feature], words: str, base: float | None = None) -> Change:
-    """Return the change to other features, and perhaps to another value where there are none."""
-    density = sketch.density
+def _set_features(
+    sketch: Sketch, features: Sequence[Feature], description: str, base: float | None = None
+) -> Change:
+    """Return the change to other features, and to another value `base` where there are none."""
+    # Raises for densities of other kinds, even if their value is replaced.
+    present_base = _get_base(sketch.density)
+    base = present_base if base is None else base
+    peaks = tuple(feature for feature in features if isinstance(feature, Gaussian))
+    areas = tuple(feature for feature in features if isinstance(feature, WeightedArea))
+    density: Density = WeightedPolygons(areas, base) if areas else Gaussians(peaks, base)
+    if areas:
+        max_weight = max(base, *(area.weight for area in areas))
+        require(max_weight > 0.0, "some place must have a weight above 0")
+    return Change(replace(sketch, density=density), Selection(), description)
+
+
+def _get_base(density: Density | None) -> float:
+    """Return the value of a density where it has no features."""
+    if density is None:
+        return 1.0
     if isinstance(density, Gaussians):
-        now = density.floor
-    elif isinstance(density, WeightedPolygons):
-        now = density.background
-    elif density is None or density.is_uniform:
-        now = 1.0 if density is None else density.max_value
-    else:
-        raise _other_kind(density)
-    base = now if base is None else base
-    peaks = tuple(each for each in features if isinstance(each, Gaussian))
-    areas = tuple(each for each in features if isinstance(each, WeightedArea))
-    heaviest = max([base, *(area.weight for area in areas)])
-    require(heaviest > 0.0 or not areas, "some place must have a weight above 0")
-    after = replace(sketch, density=WeightedPolygons(areas, base) if areas else Gaussians(peaks, base))
-    return Change(after, Selection(), words)
+        return density.floor
+    if isinstance(density, WeightedPolygons):
+        return density.background
+    if density.is_uniform:
+        return density.max_value
+    raise _build_kind_error(density)
 
 
-def _changed(sketch: Sketch, number: int, feature: Feature, words: str) -> Change:
+def _replace_feature(sketch: Sketch, number: int, feature: Feature, verb: str) -> Change:
     features = list(list_features(sketch))
     features[number] = feature
-    return _put(sketch, features, f"{_name(feature)} {words}")
+    return _set_features(sketch, features, f"{_name_feature(feature)} {verb}")
 
 
-def _feature(sketch: Sketch, number: int) -> Feature:
+def _get_feature(sketch: Sketch, number: int) -> Feature:
     features = list_features(sketch)
     require(0 <= number < len(features), "there is no such hot spot any more")
     return features[number]
 
 
-def _name(feature: Feature) -> str:
+def _name_feature(feature: Feature) -> str:
     if isinstance(feature, Gaussian):
         return "hot spot"
     return f"area “{feature.name}”" if feature.name else "area"
 
 
-def _sound(area: WeightedArea) -> WeightedArea:
-    polygon = shapely.Polygon(area.vertices, area.holes) if len(area.vertices) >= 3 else shapely.Polygon()
+def _check_area(area: WeightedArea) -> WeightedArea:
+    """Return an area; raise MapError if it covers nothing, crosses itself, or has no possible weight."""
+    polygon = shapely.Polygon()
+    if len(area.vertices) >= 3:
+        polygon = shapely.Polygon(area.vertices, area.holes)
     if not polygon.is_valid or polygon.area < create.MIN_DRAWN_LENGTH_M**2:
         raise MapError("an area needs three corners that enclose something, and an outline without crossings")
-    return replace(area, weight=_weight(area.weight, least=0.0))
+    return replace(area, weight=_check_weight(area.weight, 0.0))
 
 
-def _sigma(sigma: float) -> float:
-    require(
-        create.MIN_DRAWN_LENGTH_M <= sigma <= MAX_SIZE_M,
-        "a hot spot needs a size: drag from its middle outwards",
-    )
+def _check_sigma(sigma: float) -> float:
+    is_possible = create.MIN_DRAWN_LENGTH_M <= sigma <= MAX_SIZE_M
+    require(is_possible, "a hot spot needs a size: drag from its middle outwards")
     return round_length(sigma)
 
 
-def _weight(weight: float, *, least: float) -> float:
-    if not least <= weight <= MAX_WEIGHT:
-        raise MapError(f"weight: expected a number {'above' if least else 'from'} 0, got {weight:g}")
+def _check_weight(weight: float, minimum: float) -> float:
+    if not minimum <= weight <= MAX_WEIGHT:
+        bound = "above" if minimum else "from"
+        raise MapError(f"weight: expected a number {bound} 0, got {weight:g}")
     return float(weight)

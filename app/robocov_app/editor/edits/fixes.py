@@ -1,9 +1,10 @@
-"""Fixes: for problems of most kinds the change that mends them."""
+"""Fixes: for most kinds of problems, the change that solves them."""
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -21,124 +22,224 @@ from robocov_app.editor.model.geometry import (
     round_point,
 )
 from robocov_app.editor.model.measurement import compute_reach
-from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position, format_numbered_name
-from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.model.validation import Kind, Problem, find_problems
+from robocov_app.editor.model.selection import (
+    Change,
+    Selection,
+    Vertex,
+    find_position,
+    format_numbered_name,
+)
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.model.validation import Problem, ProblemKind, find_problems
 
-_TITLES: dict[str, tuple[Kind, ...]] = {
-    "Draw one": ("no boundary",), "Repair": ("crossing",), "Merge": ("double",), "Widen": ("narrow",),
-    "Move": ("spot", "no room"), "Delete": ("outside", "twice"), "Fill": ("sealed", "cut off"),
-}  # fmt: skip
-FIX_TITLES: Final = {kind: title for title, kinds in _TITLES.items() for kind in kinds}
-"""Button label of the fix for each kind of problem; other kinds have none."""
+BOUNDARY_MARGIN_M = 0.5  # between everything and a boundary drawn around it
+DEFAULT_BOUNDS_M = (0.0, 0.0, 10.0, 10.0)
+FILL_OVERLAP_M = 0.002  # by which a filling overlaps what is around it
+FILL_MITRE_LIMIT = 2.0
+SPARE_M = 1e-3  # by which a widened gap is wider than a robot
+START_DISTANCE_RADII = 2.01  # between the positions of two robots
 
-_MARGIN = 0.5  # metres between a boundary that is drawn round everything and what it is drawn round
-_OVER = 0.002  # metres by which what fills a place reaches into what is round it
-_SPARE = 1e-3  # metres by which a widened gap is wider than a robot
+FindFix: TypeAlias = Callable[[Sketch, Any, float], Change]  # map, problem and radius of a robot in m
+
+
+class _GapSide(NamedTuple):
+    """An obstacle at an end of a gap: the end, and the opposite end."""
+
+    item: Item
+    end: Point
+    opposite: Point
+
+
+@dataclass(frozen=True)
+class Fix:
+    """A fix for some kinds of problems.
+
+    Attributes
+    ----------
+    title : str
+        Label of its button.
+    find : callable
+        Returns the change; raises MapError if there is none.
+    """
+
+    title: str
+    find: FindFix
 
 
 def find_fix(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
-    owner: Any = problem.owner  # problems of each kind have the place and the owner that its fix needs
-    where: Any = problem.geometry
+    """Find the change that solves a problem.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map.
+    problem : Problem
+        The problem.
+    radius : float
+        Radius of a robot, m.
+
+    Returns
+    -------
+    Change or None
+        The change; None if there is none.
+    """
+    fix = FIXES.get(problem.kind)
+    if fix is None:
+        return None
     with suppress(MapError):
-        match problem.kind:
-            case "no boundary":
-                low_x, low_y, high_x, high_y = sketch.bounds or (0.0, 0.0, 10.0, 10.0)
-                by = _MARGIN if sketch.bounds else 0.0
-                ring = build_rectangle(
-                    round_point((low_x - by, low_y - by)), round_point((high_x + by, high_y + by))
-                )
-                words = "boundary drawn round everything"
-                return Change(replace(sketch, boundary=ring), Selection(boundary=True), words)
-            case "sealed":
-                return _filled(sketch, where)
-            case "cut off":
-                free = find_problems(sketch, radius)[1]
-                return _filled(sketch, _beyond(free, compute_reach(free, radius)[0][0], [where]))
-            case "narrow":
-                return _widened(sketch, where, 2.0 * radius)
-            case "crossing":
-                return boolean.repair_outlines(sketch, Selection.of(owner))
-            case "outside" | "twice":
-                return properties.delete(sketch, Selection.of(owner))
-            case "double":
-                rings = [
-                    drop_repeated_points(points, closed=closed)
-                    for _, points, closed in sketch.list_rings(owner)
-                ]
-                words = f"{format_numbered_name(sketch, owner)}: vertices merged"
-                return Change(sketch.with_rings(owner, rings), Selection.of(owner), words)
-            case "spot" | "no room":
-                return _start_moved(sketch, owner, where, radius)
+        return fix.find(sketch, problem, radius)
     return None
 
 
 def fill_unreachable(sketch: Sketch, radius: float) -> Change:
-    free = find_problems(sketch, radius)[1]
-    reached, untouched = compute_reach(free, radius)
-    require(reached, f"no robot of radius {radius:g} m fits anywhere")
-    return _filled(sketch, _beyond(free, reached[0], [*reached[1:], untouched, *list(free.geoms)[1:]]))
+    """Fill all of the free space that robots of a radius, m, cannot reach from its largest part."""
+    _, free = find_problems(sketch, radius)
+    swept, untouched = compute_reach(free, radius)
+    require(swept, f"no robot of radius {radius:g} m fits anywhere")
+    unreachable = [*swept[1:], untouched, *list(free.geoms)[1:]]
+    return _fill(sketch, _find_parts(free, swept[0], unreachable))
 
 
-def _filled(sketch: Sketch, where: Geometry) -> Change:
-    shapes = extract_polygons(where.buffer(_OVER, join_style="mitre", mitre_limit=2.0))
-    require(shapes, "there is nothing to fill")
-    after, keys = sketch.with_obstacles(shapes)
-    return Change(after, Selection.of(*keys), "filled what cannot be reached")
+def _draw_boundary(sketch: Sketch, problem: Any, radius: float) -> Change:
+    low_x, low_y, high_x, high_y = sketch.bounds or DEFAULT_BOUNDS_M
+    margin = BOUNDARY_MARGIN_M if sketch.bounds else 0.0
+    low = round_point((low_x - margin, low_y - margin))
+    high = round_point((high_x + margin, high_y + margin))
+    boundary = build_rectangle(low, high)
+    description = "boundary drawn round everything"
+    return Change(replace(sketch, boundary=boundary), Selection(boundary=True), description)
 
 
-def _beyond(free: MultiPolygon, largest: Geometry, others: list[Geometry]) -> Geometry:
-    """Return those parts of the free space that hold any of some places, without the largest part."""
-    parts = shapely.get_parts(free - largest.buffer(MAX_SAGITTA_M))
-    return shapely.union_all(
-        parts[shapely.intersects(parts, shapely.union_all(others).buffer(-MAX_SAGITTA_M))]
-    )
+def _fill_sealed(sketch: Sketch, problem: Any, radius: float) -> Change:
+    return _fill(sketch, problem.geometry)
 
 
-def _start_moved(sketch: Sketch, name: str, where: Geometry, radius: float) -> Change:
-    """Move the spot at the last of some points, or a disc, to where a robot fits that is nearest."""
-    room = find_problems(sketch, radius)[1].buffer(-radius - _SPARE)
-    spec, number, spot = sketch.get_start(name), 0, ""
-    if isinstance(spec, PointsStart):
-        x, y = shapely.get_coordinates(where)[-1].tolist()
-        number = max(k for k, at in enumerate(spec.positions) if at == (x, y))
-        others = shapely.points(np.delete(np.array(spec.positions), number, axis=0))
-        room -= shapely.union_all(shapely.buffer(others, 2.01 * radius + _SPARE))
-        spot = f": place {number + 1}"
-    require(not room.is_empty, "a robot fits nowhere")
-    vertex = Vertex(name, 0, number)
-    way = shapely.shortest_line(room, shapely.Point(find_position(sketch, vertex)))
-    after = vertices.place_vertices(sketch, {vertex: round_point(way.coords[0])})
-    return Change(after, Selection.of(name), f"start “{name}”{spot} moved to where a robot fits")
+def _fill_cut_off(sketch: Sketch, problem: Any, radius: float) -> Change:
+    _, free = find_problems(sketch, radius)
+    swept, _ = compute_reach(free, radius)
+    return _fill(sketch, _find_parts(free, swept[0], [problem.geometry]))
 
 
-def _widened(sketch: Sketch, gap: LineString, width: float) -> Change:
-    """Make a gap as wide as asked: shorten a wall that ends at it, or move the smaller thing beside it."""
-    lack = width + _SPARE - gap.length
-    ends = [(gap.coords[0], gap.coords[-1]), (gap.coords[-1], gap.coords[0])]
-    sides = []
-    for a, b in ends:
-        near = sketch.tree.query(shapely.Point(a), predicate="dwithin", distance=MAX_SAGITTA_M).tolist()
-        sides += [(sketch.obstacles[k], a, b) for k in near if not sketch.obstacles[k].locked]
-    for item, a, _ in sides:
-        if shorter := _shortened(item.shape, a, lack):
-            words = f"{format_numbered_name(sketch, item.key)} shortened by {lack:.2g} m"
-            return Change(sketch.with_objects({item.key: shorter}), Selection.of(item.key), words)
-    here, there = ({item.key for item, a, _ in sides if a == end} for end, _ in ends)
-    alone = [side for side in sides if side[0].key not in here & there]
-    require(alone and gap.length > 0.0, "nothing can move away")
-    item, a, b = min(alone, key=lambda side: side[0].geometry.area)
-    dx, dy = (lack * (a[k] - b[k]) / gap.length for k in (0, 1))
+def _widen_gap(sketch: Sketch, problem: Any, radius: float) -> Change:
+    """Make a gap wide enough: shorten a wall that ends at it, or move the smaller obstacle next to it."""
+    gap: LineString = problem.geometry
+    missing = 2.0 * radius + SPARE_M - gap.length
+    sides = _list_gap_sides(sketch, gap)
+    for side in sides:
+        shortened = _shorten_wall(side.item.shape, side.end, missing)
+        if shortened is not None:
+            key = side.item.key
+            description = f"{format_numbered_name(sketch, key)} shortened by {missing:.2g} m"
+            return Change(sketch.with_objects({key: shortened}), Selection.of(key), description)
+    movable = _drop_obstacles_at_both_ends(sides)
+    require(movable and gap.length > 0.0, "nothing can move away")
+    item, end, opposite = min(movable, key=lambda side: side.item.geometry.area)
+    dx = missing * (end[0] - opposite[0]) / gap.length
+    dy = missing * (end[1] - opposite[1]) / gap.length
     change = transform.move(sketch, Selection.of(item.key), dx, dy)
-    return replace(change, description=f"{format_numbered_name(sketch, item.key)} moved by {lack:.2g} m")
+    return replace(change, description=f"{format_numbered_name(sketch, item.key)} moved by {missing:.2g} m")
 
 
-def _shortened(wall: Obstacle, end: Point, by: float) -> WallObstacle | None:
-    """Return a wall that is shorter at the end that is near a place; None where none of its ends is."""
+def _list_gap_sides(sketch: Sketch, gap: LineString) -> list[_GapSide]:
+    """Return the obstacles at both ends of a gap that are not locked."""
+    first = gap.coords[0]
+    last = gap.coords[-1]
+    sides: list[_GapSide] = []
+    for end, opposite in ((first, last), (last, first)):
+        near = sketch.tree.query(shapely.Point(end), predicate="dwithin", distance=MAX_SAGITTA_M)
+        items = [sketch.obstacles[k] for k in near.tolist()]
+        sides += [_GapSide(item, end, opposite) for item in items if not item.locked]
+    return sides
+
+
+def _drop_obstacles_at_both_ends(sides: list[_GapSide]) -> list[_GapSide]:
+    """Return the sides whose obstacle is at one end of the gap only."""
+    ends_by_key: dict[int, set[Point]] = {}
+    for side in sides:
+        ends_by_key.setdefault(side.item.key, set()).add(side.end)
+    return [side for side in sides if len(ends_by_key[side.item.key]) == 1]
+
+
+def _shorten_wall(wall: Obstacle, end: Point, length: float) -> WallObstacle | None:
+    """Return a wall shortened by a length, m, at the end that is near a point; None if no end is."""
     if not isinstance(wall, WallObstacle) or len(wall.points) < 2:
         return None
     line = LineString(wall.points)
-    for at, low, high in ((wall.points[0], by, line.length), (wall.points[-1], 0.0, line.length - by)):
-        if math.dist(at, end) <= wall.width / 2 + MAX_SAGITTA_M and high - low > wall.width:
+    spans = (
+        (wall.points[0], length, line.length),
+        (wall.points[-1], 0.0, line.length - length),
+    )
+    for wall_end, low, high in spans:
+        is_near = math.dist(wall_end, end) <= wall.width / 2 + MAX_SAGITTA_M
+        if is_near and high - low > wall.width:
             return replace(wall, points=tuple(map(round_point, substring(line, low, high).coords)))
     return None
+
+
+def _repair_outline(sketch: Sketch, problem: Any, radius: float) -> Change:
+    return boolean.repair_outlines(sketch, Selection.of(problem.owner))
+
+
+def _delete_object(sketch: Sketch, problem: Any, radius: float) -> Change:
+    return properties.delete(sketch, Selection.of(problem.owner))
+
+
+def _merge_vertices(sketch: Sketch, problem: Any, radius: float) -> Change:
+    owner = problem.owner
+    rings = [
+        drop_repeated_points(points, closed=is_closed) for _, points, is_closed in sketch.list_rings(owner)
+    ]
+    description = f"{format_numbered_name(sketch, owner)}: vertices merged"
+    return Change(sketch.with_rings(owner, rings), Selection.of(owner), description)
+
+
+def _move_start(sketch: Sketch, problem: Any, radius: float) -> Change:
+    """Move a disc, or the position at the last point of the problem, to the nearest free point."""
+    name = problem.owner
+    start = sketch.get_start(name)
+    _, free = find_problems(sketch, radius)
+    space = free.buffer(-radius - SPARE_M)
+    number = 0
+    label = ""
+    if isinstance(start, PointsStart):
+        x, y = shapely.get_coordinates(problem.geometry)[-1].tolist()
+        number = max(k for k, position in enumerate(start.positions) if position == (x, y))
+        others = shapely.points(np.delete(np.array(start.positions), number, axis=0))
+        space -= shapely.union_all(shapely.buffer(others, START_DISTANCE_RADII * radius + SPARE_M))
+        label = f": place {number + 1}"
+    require(not space.is_empty, "a robot fits nowhere")
+    vertex = Vertex(name, 0, number)
+    nearest = shapely.shortest_line(space, shapely.Point(find_position(sketch, vertex)))
+    moved = vertices.place_vertices(sketch, {vertex: round_point(nearest.coords[0])})
+    return Change(moved, Selection.of(name), f"start “{name}”{label} moved to where a robot fits")
+
+
+def _fill(sketch: Sketch, area: Geometry) -> Change:
+    """Add obstacles that cover an area."""
+    grown = area.buffer(FILL_OVERLAP_M, join_style="mitre", mitre_limit=FILL_MITRE_LIMIT)
+    polygons = extract_polygons(grown)
+    require(polygons, "there is nothing to fill")
+    filled, keys = sketch.with_obstacles(polygons)
+    return Change(filled, Selection.of(*keys), "filled what cannot be reached")
+
+
+def _find_parts(free: MultiPolygon, largest: Geometry, areas: list[Geometry]) -> Geometry:
+    """Return the parts of the free space without its largest part that meet any of some areas."""
+    parts = shapely.get_parts(free - largest.buffer(MAX_SAGITTA_M))
+    inside = shapely.union_all(areas).buffer(-MAX_SAGITTA_M)
+    return shapely.union_all(parts[shapely.intersects(parts, inside)])
+
+
+FIXES: Final[dict[ProblemKind, Fix]] = {
+    "no boundary": Fix("Draw one", _draw_boundary),
+    "crossing": Fix("Repair", _repair_outline),
+    "double": Fix("Merge", _merge_vertices),
+    "narrow": Fix("Widen", _widen_gap),
+    "spot": Fix("Move", _move_start),
+    "no room": Fix("Move", _move_start),
+    "outside": Fix("Delete", _delete_object),
+    "twice": Fix("Delete", _delete_object),
+    "sealed": Fix("Fill", _fill_sealed),
+    "cut off": Fix("Fill", _fill_cut_off),
+}
+"""The fix for each kind of problem; other kinds have none."""

@@ -1,11 +1,10 @@
-"""Edits of what things are: deleted, named, noted, sized, ordered, grouped, locked, hidden."""
+"""Edits of properties: delete, name, note, size, order, group, lock and hide objects; describe the map."""
 
 from dataclasses import replace
-from functools import partial
 from itertools import count
-from typing import Any
+from typing import Any, Literal
 
-from robocov.environment import PolygonObstacle
+from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, to_one_line
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.edits import create, vertices
@@ -17,67 +16,93 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
 def delete(sketch: Sketch, selection: Selection) -> Change:
+    """Delete the selected objects and vertices."""
     require(selection, "select something first")
-    after = sketch.without(selection.items | selection.starts)
-    after = replace(after, boundary=None if selection.boundary else sketch.boundary)
-    others = Selection(vertices=selection.vertices).restrict_to(after)
-    after = vertices.delete_vertices(after, others).sketch if others else after
-    return Change(after, Selection(), f"{selection.describe(sketch)} deleted")
+    changed = sketch.without(selection.items | selection.starts)
+    if selection.boundary:
+        changed = replace(changed, boundary=None)
+    remaining = Selection(vertices=selection.vertices).restrict_to(changed)
+    if remaining:
+        changed = vertices.delete_vertices(changed, remaining).sketch
+    return Change(changed, Selection(), f"{selection.describe(sketch)} deleted")
 
 
 def rename(sketch: Sketch, owner: Owner, name: str) -> Change:
-    """Name an obstacle or a start; an empty name takes an obstacle's name away."""
+    """Rename an obstacle or a start; an empty name removes that of an obstacle."""
     name = create.clean_label(name)
-    words = f"{sketch.display_name(owner)} renamed to “{name}”"
     require(owner != BOUNDARY, "the boundary has no name; the map has one")
     if isinstance(owner, str):
-        require(name, "a start needs a name")
-        require(name == owner or name not in dict(sketch.starts), f"there is a start “{name}” already")
-        starts = tuple((name if each == owner else each, spec) for each, spec in sketch.starts)
-        return Change(replace(sketch, starts=starts), Selection.of(name), words)
-    words = words if name else f"{sketch.display_name(owner)}: name taken away"
-    after = sketch.with_objects({owner: replace(sketch.get_item(owner).shape, name=name or None)})
-    return Change(after, Selection.of(owner), words)
+        return _rename_start(sketch, owner, name)
+    previous = sketch.display_name(owner)
+    description = f"{previous} renamed to “{name}”" if name else f"{previous}: name removed"
+    shape = replace(sketch.get_item(owner).shape, name=name or None)
+    return Change(sketch.with_objects({owner: shape}), Selection.of(owner), description)
+
+
+def _rename_start(sketch: Sketch, previous: str, name: str) -> Change:
+    require(name, "a start needs a name")
+    is_free = name == previous or name not in dict(sketch.starts)
+    require(is_free, f"there is a start “{name}” already")
+    starts = tuple((name if key == previous else key, start) for key, start in sketch.starts)
+    description = f"{sketch.display_name(previous)} renamed to “{name}”"
+    return Change(replace(sketch, starts=starts), Selection.of(name), description)
 
 
 def set_note(sketch: Sketch, selection: Selection, note: str) -> Change:
+    """Write a note on the selected obstacles; an empty one removes it."""
     require(selection.items, "select obstacles first: notes are written to them")
     note = create.clean_text(note, "a note")
-    words = f"note on {Selection(items=selection.items).describe(sketch)}{'' if note else ' taken away'}"
-    return replace(_marked(sketch, selection, "", note=note), description=words)
+    obstacles = Selection(items=selection.items).describe(sketch)
+    description = f"note on {obstacles}" if note else f"note on {obstacles} removed"
+    return replace(_mark(sketch, selection, "", note=note), description=description)
 
 
 def group(sketch: Sketch, selection: Selection, name: str = "") -> Change:
-    """Put the selected obstacles into a group, a new one without a name: a click selects all of it."""
+    """Put the selected obstacles into a group with a name, by default a new one."""
     require(len(selection.items) >= 2, "select two or more obstacles to group")
+    name = create.clean_label(name) or _find_free_group(sketch)
+    return _mark(sketch, selection, f"grouped as “{name}”", group=name)
+
+
+def _find_free_group(sketch: Sketch) -> str:
     taken = {item.group for item in sketch.obstacles}
-    name = create.clean_label(name) or next(each for k in count(1) if (each := f"group {k}") not in taken)
-    return _marked(sketch, selection, f"grouped as “{name}”", group=name)
+    return next(name for k in count(1) if (name := f"group {k}") not in taken)
 
 
 def ungroup(sketch: Sketch, selection: Selection) -> Change:
+    """Take the selected obstacles out of their groups."""
     keys = [key for key in selection.items if sketch.get_item(key).group]
     require(keys, "select obstacles that are in a group")
-    return _marked(sketch, Selection.of(*keys), "ungrouped", group="")
+    return _mark(sketch, Selection.of(*keys), "ungrouped", group="")
+
+
+def lock(sketch: Sketch, selection: Selection) -> Change:
+    """Lock the selected obstacles, so that the mouse does not select them."""
+    change = _mark(sketch, selection, "locked", locked=True)
+    return replace(change, selection=replace(selection, items=frozenset()))
+
+
+def hide(sketch: Sketch, selection: Selection) -> Change:
+    """Hide the selected obstacles in the editor; they stay part of the map."""
+    change = _mark(sketch, selection, "hidden", hidden=True)
+    return replace(change, selection=replace(selection, items=frozenset()))
 
 
 def release(sketch: Sketch) -> Change:
-    """Unlock and show all obstacles; those that were locked or hidden are selected then."""
+    """Unlock and show all obstacles, and select those that were locked or hidden."""
     keys = [item.key for item in sketch.obstacles if not item.is_selectable]
     require(keys, "nothing is locked or hidden")
-    return _marked(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
+    return _mark(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
-def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> Change:
+def _mark(sketch: Sketch, selection: Selection, verb: str, **marks: Any) -> Change:
+    """Change fields of the selected obstacles."""
     require(selection.items, "select obstacles first")
-    items = tuple(replace(i, **marks) if i.key in selection.items else i for i in sketch.obstacles)
-    words = f"{Selection(items=selection.items).describe(sketch)} {words}"
-    left = replace(selection, items=frozenset()) if True in marks.values() else selection
-    return Change(replace(sketch, obstacles=items), left, words)
-
-
-lock = partial(_marked, words="locked", locked=True)  # the mouse cannot take them
-hide = partial(_marked, words="hidden", hidden=True)  # in the editor; robots meet them all the same
+    items = tuple(
+        replace(item, **marks) if item.key in selection.items else item for item in sketch.obstacles
+    )
+    description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
+    return Change(replace(sketch, obstacles=items), selection, description)
 
 
 def set_title(sketch: Sketch, name: str) -> Change:
@@ -94,67 +119,89 @@ def set_description(sketch: Sketch, description: str) -> Change:
 
 
 def set_width(sketch: Sketch, selection: Selection, width: float) -> Change:
-    return _sized(sketch, selection, "width", width, "select walls first", "made {:g} m wide")
+    """Set the width of the selected walls, m."""
+    width = _check_size("width", width)
+    walls: dict[Owner, Any] = {}
+    for owner in selection.owners:
+        shape = sketch.find_object(owner)
+        if isinstance(shape, WallObstacle):
+            walls[owner] = replace(shape, width=width)
+    require(walls, "select walls first")
+    description = f"{Selection.of(*walls).describe(sketch)} made {width:g} m wide"
+    return Change(sketch.with_objects(walls), selection, description)
 
 
 def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    missing = "select circles first, or starts that are discs"
-    return _sized(sketch, selection, "radius", radius, missing, "given a radius of {:g} m")
+    """Set the radius of the selected circles and starts, m."""
+    radius = _check_size("radius", radius)
+    circles: dict[Owner, Any] = {}
+    for owner in selection.owners:
+        shape = sketch.find_object(owner)
+        if isinstance(shape, CircleObstacle | DiscStart):
+            circles[owner] = replace(shape, radius=radius)
+    require(circles, "select circles first, or starts that are discs")
+    description = f"{Selection.of(*circles).describe(sketch)} given a radius of {radius:g} m"
+    return Change(sketch.with_objects(circles), selection, description)
 
 
-def _sized(sketch: Sketch, selection: Selection, name: str, size: float, missing: str, words: str) -> Change:
-    require(MIN_SIZE_M <= size <= MAX_SIZE_M, f"expected a {name} of at least {1000 * MIN_SIZE_M:g} mm")
-    things: dict[Owner, Any] = {owner: sketch.find_object(owner) for owner in selection.owners}
-    sized = {owner: thing for owner, thing in things.items() if hasattr(thing, name)}
-    require(sized, missing)
-    after = sketch.with_objects(
-        {o: replace(thing, **{name: round_length(size)}) for o, thing in sized.items()}
-    )
-    return Change(
-        after, selection, f"{Selection.of(*sized).describe(sketch)} {words.format(round_length(size))}"
-    )
+def _check_size(name: str, size: float) -> float:
+    """Return a size to the tenth of a millimetre, m; raise MapError if it is not possible."""
+    is_possible = MIN_SIZE_M <= size <= MAX_SIZE_M
+    require(is_possible, f"expected a {name} of at least {1000 * MIN_SIZE_M:g} mm")
+    return round_length(size)
 
 
-def restack(sketch: Sketch, selection: Selection, where: str) -> Change:
+def restack(sketch: Sketch, selection: Selection, end: Literal["top", "bottom"]) -> Change:
+    """Bring the selected obstacles to the top, or send them to the bottom."""
     require(selection.items, "select obstacles first")
-    require(where in ("top", "bottom"), "expected top or bottom")
-    upper = selection.items if where == "top" else sketch.index_by_key.keys() - selection.items
-    order = tuple(sorted(sketch.obstacles, key=lambda item: item.key in upper))
-    way = "brought to the top" if where == "top" else "sent to the bottom"
-    words = f"{Selection(items=selection.items).describe(sketch)} {way}"
-    return Change(replace(sketch, obstacles=order), selection, words)
+    require(end in ("top", "bottom"), "expected top or bottom")
+    selected = tuple(item for item in sketch.obstacles if item.key in selection.items)
+    others = tuple(item for item in sketch.obstacles if item.key not in selection.items)
+    order = others + selected if end == "top" else selected + others
+    verb = "brought to the top" if end == "top" else "sent to the bottom"
+    description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
+    return Change(replace(sketch, obstacles=order), selection, description)
 
 
 def make_default_start(sketch: Sketch, name: str) -> Change:
+    """Make a start the default, which is the first."""
     require(name in dict(sketch.starts), f"there is no start “{to_one_line(name)}”")
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
-    words = f"start “{to_one_line(name)}” made the default"
-    return Change(replace(sketch, starts=starts), Selection.of(name), words)
+    description = f"start “{to_one_line(name)}” made the default"
+    return Change(replace(sketch, starts=starts), Selection.of(name), description)
 
 
 def convert_to_polygons(sketch: Sketch, selection: Selection) -> Change:
-    chosen = [item for item in selection.list_items(sketch) if not isinstance(item.shape, PolygonObstacle)]
-    require(chosen, "select circles or walls first")
-    shapes = {}
-    for item in chosen:
+    """Turn the selected circles and walls into polygons."""
+    shapes: dict[int, list[Obstacle]] = {}
+    for item in selection.list_items(sketch):
+        if isinstance(item.shape, PolygonObstacle):
+            continue
         polygons = extract_polygons(item.geometry, item.shape.name)
-        require(polygons, f"the {sketch.display_name(item.key)} covers nothing: it cannot become a polygon")
+        name = sketch.display_name(item.key)
+        require(polygons, f"the {name} covers nothing: it cannot become a polygon")
         shapes[item.key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
-    change = replace_obstacles(
-        sketch, shapes, f"{Selection.of(*shapes).describe(sketch)} turned into polygons"
-    )
+    require(shapes, "select circles or walls first")
+    description = f"{Selection.of(*shapes).describe(sketch)} turned into polygons"
+    change = replace_obstacles(sketch, shapes, description)
     return replace(change, selection=change.selection.union(selection.without_vertices()))
 
 
 def convert_to_boundary(sketch: Sketch, selection: Selection) -> Change:
+    """Make the selected polygon the boundary."""
     shapes = [sketch.get_item(key).shape for key in selection.items]
     if len(shapes) != 1 or not isinstance(shapes[0], PolygonObstacle):
         raise MapError("select one polygon: its outline becomes the boundary")
-    after = replace(sketch.without(selection.items), boundary=shapes[0].vertices)
-    return Change(after, Selection(boundary=True), f"{selection.describe(sketch)} made the boundary")
+    changed = replace(sketch.without(selection.items), boundary=shapes[0].vertices)
+    return Change(changed, Selection(boundary=True), f"{selection.describe(sketch)} made the boundary")
 
 
 def set_background(sketch: Sketch, background: Background | None) -> Change:
-    words = "picture laid under" if sketch.background is None else "picture changed"
-    words = "picture taken away" if background is None else words
-    return Change(replace(sketch, background=background), Selection(), words)
+    """Set or remove the picture under the map."""
+    if background is None:
+        description = "picture removed"
+    elif sketch.background is None:
+        description = "picture laid under"
+    else:
+        description = "picture changed"
+    return Change(replace(sketch, background=background), Selection(), description)

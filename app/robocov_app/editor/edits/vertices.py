@@ -1,11 +1,11 @@
-"""Edits of vertices: moved, inserted, deleted, cut off, left out, straightened; walls joined and split."""
+"""Edits of vertices: move, insert, delete, cut off, simplify and straighten; join and split walls."""
 
 import cmath
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -37,181 +37,264 @@ from robocov_app.editor.model.selection import (
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-_STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
-_MOST_SEGMENTS = 256
-_STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
-_Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
-_Redraw: TypeAlias = Callable[[tuple[Ring, ...], bool], tuple[Ring, ...]]  # of rings, closed or not
-_SAME = 1e-4  # ends of walls that are closer, in metres, are one point
+MIN_CORNER_RAD = math.radians(0.1)  # corners that turn by less cannot be cut off
+MAX_ARC_SEGMENTS = 256
+SIMPLIFY_ATTEMPTS = 12  # each with half the tolerance of the one before, until nothing crosses
+STRAIGHTEN_ANGLE_DEG = 5.0
+MAX_STRAIGHTEN_ANGLE_DEG = 30.0
+JOIN_DISTANCE_M = 1e-4  # ends of walls that are closer are one point
+_EDGE_TOLERANCE_M = 1e-9
+
+
+class CornerCut(NamedTuple):
+    """How a corner is cut off.
+
+    Attributes
+    ----------
+    length : float
+        Length that is cut off both edges, m.
+    segments : int
+        Number of segments of the arc in place of the corner.
+    """
+
+    length: float
+    segments: int
+
+
+ComputeCut: TypeAlias = Callable[[float], CornerCut]  # for the angle by which a corner turns, rad
+RedrawRings: TypeAlias = Callable[
+    [tuple[Ring, ...], bool], tuple[Ring, ...]
+]  # rings, whether they are closed
 
 
 def move_vertices(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
-    """Move the selected vertices by (dx, dy) m; a rim's vertex changes the radius."""
+    """Move the selected vertices by a displacement, m; a vertex on the rim of a circle sets the radius."""
     require(selection.vertices, "select vertices first")
-    places = {vertex: find_position(sketch, vertex) for vertex in selection.vertices}
-    after = place_vertices(sketch, {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()})
-    return Change(after, selection, f"{Selection(vertices=selection.vertices).describe(sketch)} moved")
+    positions = {}
+    for vertex in selection.vertices:
+        x, y = find_position(sketch, vertex)
+        positions[vertex] = (x + dx, y + dy)
+    description = f"{Selection(vertices=selection.vertices).describe(sketch)} moved"
+    return Change(place_vertices(sketch, positions), selection, description)
 
 
-def place_vertices(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
-    """Return the sketch with vertices elsewhere; a circle's centre moves it, its rim gives the radius."""
-    by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
-    for vertex, place in places.items():
+def place_vertices(sketch: Sketch, positions: Mapping[Vertex, Point]) -> Sketch:
+    """Place vertices at positions, m; the centre of a circle moves it, its rim sets the radius."""
+    positions_by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
+    for vertex, position in positions.items():
+        # Raises if the vertex has gone.
         find_position(sketch, vertex)
-        by_owner[vertex.owner][vertex] = place
-    for owner, moves in by_owner.items():
-        disc = sketch.find_object(owner)
-        if isinstance(disc, env.CircleObstacle | env.DiscStart):
-            first = min(moves, key=lambda vertex: vertex.index)
-            place = check_point(moves[first])
-            radius = disc.radius if first.index == 0 else round_length(math.dist(disc.center, place))
-            if first.index and radius < MIN_SIZE_M:
-                raise MapError("a circle needs a radius: drag its rim away from its centre")
-            center = disc.center if first.index else place
-            sketch = sketch.with_objects({owner: replace(disc, center=center, radius=radius)})
+        positions_by_owner[vertex.owner][vertex] = position
+    for owner, moved in positions_by_owner.items():
+        shape = sketch.find_object(owner)
+        if isinstance(shape, env.CircleObstacle | env.DiscStart):
+            sketch = sketch.with_objects({owner: _reshape_circle(shape, moved)})
             continue
         rings = [list(ring) for ring in sketch.list_vertex_rings(owner)]
-        for vertex, place in zip(moves, round_ring(list(moves.values())), strict=True):
-            rings[vertex.ring][vertex.index] = place
+        for vertex, position in zip(moved, round_ring(list(moved.values())), strict=True):
+            rings[vertex.ring][vertex.index] = position
         sketch = sketch.with_rings(owner, rings)
     return sketch
 
 
+def _reshape_circle(
+    circle: env.CircleObstacle | env.DiscStart, positions: Mapping[Vertex, Point]
+) -> env.CircleObstacle | env.DiscStart:
+    """Return a circle with its centre at a position, or else with its rim through one."""
+    vertex = min(positions, key=lambda vertex: vertex.index)
+    position = check_point(positions[vertex])
+    if vertex.index == 0:
+        return replace(circle, center=position)
+    radius = round_length(math.dist(circle.center, position))
+    require(radius >= MIN_SIZE_M, "a circle needs a radius: drag its rim away from its centre")
+    return replace(circle, radius=radius)
+
+
 def insert_vertex(sketch: Sketch, edge: Edge) -> Change:
+    """Insert a vertex into an edge, and select it."""
     rings = [list(ring) for ring in sketch.list_vertex_rings(edge.owner)]
-    counts = {number: len(ring) - (not closed) for number, ring, closed in sketch.list_rings(edge.owner)}
-    require(0 <= edge.index < counts.get(edge.ring, 0), "there is no such edge any more")
+    edge_counts = {}
+    for number, ring, is_closed in sketch.list_rings(edge.owner):
+        edge_counts[number] = len(ring) if is_closed else len(ring) - 1
+    require(0 <= edge.index < edge_counts.get(edge.ring, 0), "there is no such edge any more")
     rings[edge.ring].insert(edge.index + 1, check_point(edge.point))
-    new = Selection(vertices=frozenset({Vertex(edge.owner, edge.ring, edge.index + 1)}))
-    after = sketch.with_rings(edge.owner, rings)
-    return Change(after, new, f"vertex inserted in {sketch.display_name(edge.owner)}")
+    inserted = Vertex(edge.owner, edge.ring, edge.index + 1)
+    return Change(
+        sketch.with_rings(edge.owner, rings),
+        Selection(vertices=frozenset({inserted})),
+        f"vertex inserted in {sketch.display_name(edge.owner)}",
+    )
 
 
 def delete_vertices(sketch: Sketch, selection: Selection) -> Change:
-    """Delete the selected vertices, and with too few left the hole or obstacle; the boundary keeps three."""
+    """Delete the selected vertices; holes and obstacles with too few left go, the boundary keeps three."""
     require(selection.vertices, "select vertices first")
-    after = sketch
-    for owner, gone in _by_ring(sketch, selection.vertices).items():
-        thing, rings = sketch.find_object(owner), []
-        if isinstance(thing, env.DiscStart | env.CircleObstacle):
-            what, whole = ("disc", "start") if isinstance(owner, str) else ("circle", "circle")
-            raise MapError(f"the points of a {what} cannot be deleted: delete the {whole} itself")
-        least = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(thing), 3)
-        for number, ring in enumerate(sketch.list_vertex_rings(owner)):
-            kept = tuple(point for k, point in enumerate(ring) if k not in gone[number])
-            # a hole goes that has too few left, but one that was broken before and is not touched stays
-            if number == 0 or not gone[number] or len(kept) >= 3:
-                rings.append(kept)
-        require(owner != BOUNDARY or len(rings[0]) >= least, "the boundary needs three corners at least")
-        after = after.with_rings(owner, rings) if len(rings[0]) >= least else after.without({owner})
-    words = f"{Selection(vertices=selection.vertices).describe(sketch)} deleted"
-    return Change(after, selection.without_vertices().restrict_to(after), words)
+    changed = sketch
+    for owner, indices_by_ring in _group_by_ring(sketch, selection.vertices).items():
+        changed = _delete_from_object(changed, owner, indices_by_ring)
+    description = f"{Selection(vertices=selection.vertices).describe(sketch)} deleted"
+    return Change(changed, selection.without_vertices().restrict_to(changed), description)
 
 
-def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int, set[int]]]:
-    found: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
+def _delete_from_object(sketch: Sketch, owner: Owner, indices_by_ring: Mapping[int, set[int]]) -> Sketch:
+    shape = sketch.find_object(owner)
+    if isinstance(shape, env.DiscStart):
+        raise MapError("the points of a disc cannot be deleted: delete the start itself")
+    if isinstance(shape, env.CircleObstacle):
+        raise MapError("the points of a circle cannot be deleted: delete the circle itself")
+    rings = []
+    for number, ring in enumerate(sketch.list_vertex_rings(owner)):
+        indices = indices_by_ring[number]
+        remaining = tuple(point for k, point in enumerate(ring) if k not in indices)
+        # A hole that was broken before stays unless its vertices are deleted.
+        if number == 0 or not indices or len(remaining) >= 3:
+            rings.append(remaining)
+    minimum = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(shape), 3)
+    if len(rings[0]) >= minimum:
+        return sketch.with_rings(owner, rings)
+    require(owner != BOUNDARY, "the boundary needs three corners at least")
+    return sketch.without({owner})
+
+
+def _group_by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int, set[int]]]:
+    """Return the indices of vertices by their owner and ring; raise MapError if any has gone."""
+    indices: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
     for vertex in vertices:
         find_position(sketch, vertex)
-        found[vertex.owner][vertex.ring].add(vertex.index)
-    return found
+        indices[vertex.owner][vertex.ring].add(vertex.index)
+    return indices
 
 
 def fill_hole(sketch: Sketch, key: int, ring: int) -> Change:
+    """Fill a hole of a polygon."""
     rings = sketch.list_vertex_rings(key)
     if not isinstance(sketch.find_object(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
         raise MapError("there is no such hole")
-    after = sketch.with_rings(key, rings[:ring] + rings[ring + 1 :])
-    return Change(after, Selection.of(key), f"hole of {sketch.display_name(key)} filled")
+    filled = sketch.with_rings(key, rings[:ring] + rings[ring + 1 :])
+    return Change(filled, Selection.of(key), f"hole of {sketch.display_name(key)} filled")
 
 
 def bevel_corners(sketch: Sketch, selection: Selection, length: float) -> Change:
-    """Cut the selected corners off, `length` metres from each along both edges; ends of walls are none."""
+    """Cut the selected corners off, a length, m, from each along both edges; ends of walls have none."""
     require(0.0 < length < math.inf, "a bevel needs a length above 0 m")
-    return _cut(sketch, selection, lambda turn: (length, 1), "bevelled")
+    return _cut_corners(sketch, selection, lambda turn: CornerCut(length, 1), "bevelled")
 
 
 def round_corners(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Round the selected corners with a radius in metres, to a millimetre, by arcs that touch both edges."""
+    """Round the selected corners with a radius, m, by arcs that touch both edges, to a millimetre."""
     require(0.0 < radius < math.inf, "expected a radius above 0 m")
 
-    def cut(turn: float) -> tuple[float, int]:
+    def compute_cut(turn: float) -> CornerCut:
         step = 2.0 * math.acos(max(1.0 - env.MAX_SAGITTA_M / radius, 0.0))
-        return radius * math.tan(turn / 2.0), min(_MOST_SEGMENTS, math.ceil(turn / step))
+        return CornerCut(radius * math.tan(turn / 2.0), min(MAX_ARC_SEGMENTS, math.ceil(turn / step)))
 
-    return _cut(sketch, selection, cut, "rounded")
+    return _cut_corners(sketch, selection, compute_cut, "rounded")
 
 
-def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Change:
-    after, count = sketch, 0
-    for owner, by_ring in _by_ring(sketch, selection.vertices).items():
+def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, verb: str) -> Change:
+    changed = sketch
+    count = 0
+    for owner, indices_by_ring in _group_by_ring(sketch, selection.vertices).items():
         rings = list(sketch.list_vertex_rings(owner))
-        for number, ring, closed in sketch.list_rings(owner):
-            cuts = _cuts(ring, by_ring[number], closed, wanted)
-            arcs = [_arc(ring, k, *cuts[k]) if k in cuts else [ring[k]] for k in range(len(ring))]
+        for number, ring, is_closed in sketch.list_rings(owner):
+            cuts = _compute_cuts(ring, indices_by_ring[number], is_closed, compute_cut)
             if cuts:
-                rings[number] = drop_repeated_points(round_ring(np.concatenate(arcs)), closed=closed)
+                rings[number] = _replace_corners(ring, cuts, is_closed)
                 count += len(cuts)
-                after = after.with_rings(owner, rings)
+        if rings != list(sketch.list_vertex_rings(owner)):
+            changed = changed.with_rings(owner, rings)
     require(count, "select corners first, of polygons, walls or the boundary")
-    words = f"{count} corners {words}" if count > 1 else f"corner {words}"
-    return Change(after, selection.without_vertices(), words)
+    description = f"{count} corners {verb}" if count > 1 else f"corner {verb}"
+    return Change(changed, selection.without_vertices(), description)
 
 
-def _cuts(ring: Ring, indices: set[int], closed: bool, wanted: _Cut) -> dict[int, tuple[float, int]]:
-    """Return length and segments for those of the indices that are corners."""
-    cuts, count = {}, len(ring)
-    for k in sorted(indices):
-        before, at, after = (complex(*ring[i % count]) for i in (k - 1, k, k + 1))
-        # either way; 0 where an edge has no length
-        turn = abs(cmath.phase((after - at) * (at - before).conjugate()))
-        if not closed and k in (0, count - 1):
+def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool) -> Ring:
+    """Return a ring with arcs in place of the corners that are cut off."""
+    points: list[Array] = []
+    for index, point in enumerate(ring):
+        points.append(_build_arc(ring, index, cuts[index]) if index in cuts else np.array([point]))
+    return drop_repeated_points(round_ring(np.concatenate(points)), closed=is_closed)
+
+
+def _compute_cuts(
+    ring: Ring, indices: set[int], is_closed: bool, compute_cut: ComputeCut
+) -> dict[int, CornerCut]:
+    """Return the cuts of those vertices that are corners; raise MapError if an edge is too short."""
+    cuts: dict[int, CornerCut] = {}
+    count = len(ring)
+    for index in sorted(indices):
+        is_end = not is_closed and index in (0, count - 1)
+        turn = _compute_turn(ring, index)
+        if is_end:
             continue
-        require(turn <= math.pi - _STRAIGHT, "a corner that turns right back cannot be cut off")
-        if turn >= _STRAIGHT:
-            cuts[k] = wanted(turn)
-    for k, (length, _) in cuts.items():
-        for other in ((k - 1) % count, (k + 1) % count):
-            edge = math.dist(ring[k], ring[other])
-            taken = length + (cuts[other][0] if other in cuts else 0.0)
-            if taken > edge + 1e-9:
-                more = " for the corners at both ends" if other in cuts else ""
-                lengths = f"{round_length(taken):g} m of an edge that is {round_length(edge):g} m long{more}"
-                raise MapError(f"that takes {lengths}: expected less")
+        require(turn <= math.pi - MIN_CORNER_RAD, "a corner that turns right back cannot be cut off")
+        if turn >= MIN_CORNER_RAD:
+            cuts[index] = compute_cut(turn)
+    for index, cut in cuts.items():
+        for neighbour in ((index - 1) % count, (index + 1) % count):
+            edge_length = math.dist(ring[index], ring[neighbour])
+            has_both = neighbour in cuts
+            required = cut.length + (cuts[neighbour].length if has_both else 0.0)
+            if required > edge_length + _EDGE_TOLERANCE_M:
+                reason = " for the corners at both ends" if has_both else ""
+                lengths = f"{round_length(required):g} m of an edge that is {round_length(edge_length):g} m"
+                raise MapError(f"that takes {lengths} long{reason}: expected less")
     return cuts
 
 
-def _arc(ring: Ring, k: int, length: float, segments: int) -> Array:
-    """Return the (segments + 1, 2) points of the arc that touches both edges so far from a corner."""
-    before, corner, after = (complex(*ring[i % len(ring)]) for i in (k - 1, k, k + 1))
-    back, on = (before - corner) / abs(before - corner), (after - corner) / abs(after - corner)
-    half = cmath.phase(on / back) / 2.0  # the centre is where the normals at both ends meet: on the bisector
-    bisector = (back + on) / abs(back + on)
-    center = corner + length / math.cos(half) * bisector
-    spoke, end = length * back + corner - center, length * on + corner - center
-    points = center + spoke * np.exp(1j * np.linspace(0.0, cmath.phase(end / spoke), segments + 1))
+def _list_neighbours(ring: Ring, index: int) -> tuple[complex, complex, complex]:
+    """Return the vertex before a corner, the corner, and the vertex after it as complex numbers."""
+    count = len(ring)
+    before = complex(*ring[(index - 1) % count])
+    after = complex(*ring[(index + 1) % count])
+    return before, complex(*ring[index]), after
+
+
+def _compute_turn(ring: Ring, index: int) -> float:
+    """Return the angle by which a ring turns at a vertex to either side, rad; 0 at edges without length."""
+    before, corner, after = _list_neighbours(ring, index)
+    return abs(cmath.phase((after - corner) * (corner - before).conjugate()))
+
+
+def _build_arc(ring: Ring, index: int, cut: CornerCut) -> Array:
+    """Return the (segments + 1, 2) points, m, of the arc that touches both edges in place of a corner."""
+    before, corner, after = _list_neighbours(ring, index)
+    backwards = (before - corner) / abs(before - corner)
+    forwards = (after - corner) / abs(after - corner)
+    half_angle = cmath.phase(forwards / backwards) / 2.0
+    # The centre is on the bisector, where the normals at both ends meet.
+    bisector = (backwards + forwards) / abs(backwards + forwards)
+    center = corner + cut.length / math.cos(half_angle) * bisector
+    first_spoke = cut.length * backwards + corner - center
+    last_spoke = cut.length * forwards + corner - center
+    angles = np.linspace(0.0, cmath.phase(last_spoke / first_spoke), cut.segments + 1)
+    points = center + first_spoke * np.exp(1j * angles)
     return np.column_stack([points.real, points.imag])
 
 
 def extend_wall(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
-    """Go on with a wall from its first or last vertex; the new one is selected then."""
-    points = _wall(sketch, vertex).points
+    """Extend a wall from its first or last vertex to a point, m, and select the new end."""
+    points = _require_wall(sketch, vertex).points
     require(vertex.index in (0, len(points) - 1), "a wall goes on from its ends only")
-    at = 0 if vertex.index == 0 else len(points)
-    after = sketch.with_rings(vertex.owner, [(*points[:at], check_point(point), *points[at:])])
-    selection = Selection(vertices=frozenset({Vertex(vertex.owner, 0, at)}))
-    return Change(after, selection, f"{sketch.display_name(vertex.owner)} extended")
+    index = 0 if vertex.index == 0 else len(points)
+    extended = sketch.with_rings(vertex.owner, [(*points[:index], check_point(point), *points[index:])])
+    selection = Selection(vertices=frozenset({Vertex(vertex.owner, 0, index)}))
+    return Change(extended, selection, f"{sketch.display_name(vertex.owner)} extended")
 
 
 def split_wall(sketch: Sketch, vertex: Vertex) -> Change:
-    wall = _wall(sketch, vertex)
+    """Split a wall in two at a vertex between its ends."""
+    wall = _require_wall(sketch, vertex)
     if not 0 < vertex.index < len(wall.points) - 1:
         raise MapError("a wall is cut at a vertex between its ends: insert one first")
-    halves = wall.points[: vertex.index + 1], wall.points[vertex.index :]
-    pieces = {vertex.owner: [replace(wall, points=points) for points in halves]}
-    return replace_obstacles(sketch, pieces, f"{sketch.display_name(vertex.owner)} cut in two")
+    first = replace(wall, points=wall.points[: vertex.index + 1])
+    second = replace(wall, points=wall.points[vertex.index :])
+    description = f"{sketch.display_name(vertex.owner)} cut in two"
+    return replace_obstacles(sketch, {vertex.owner: [first, second]}, description)
 
 
-def _wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
+def _require_wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
+    """Return the wall of a vertex; raise MapError if the vertex has gone, or is not part of a wall."""
     find_position(sketch, vertex)
     wall = sketch.find_object(vertex.owner)
     if not isinstance(wall, env.WallObstacle):
@@ -220,106 +303,148 @@ def _wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
 
 
 def join_walls(sketch: Sketch, selection: Selection) -> Change:
-    """Join the selected walls by their nearest ends, as wide as the lowest, with the first name and note."""
+    """Join the selected walls by their nearest ends; the lowest gives the width."""
     items = selection.list_items(sketch)
-    shapes = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
-    require(len(shapes) == len(items) >= 2, "select two or more walls to join, and nothing else")
-    chain, *rest = [wall.points for wall in shapes]
-    while rest:
-        ways = [(a, b, line) for line in rest for a in (chain, chain[::-1]) for b in (line, line[::-1])]
-        a, b, line = min(ways, key=lambda way: math.dist(way[0][-1], way[1][0]))
-        chain = (*a, *(b[1:] if math.dist(a[-1], b[0]) <= _SAME else b))
-        rest.remove(line)
-    name = next((wall.name for wall in shapes if wall.name is not None), None)
+    walls = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
+    require(len(walls) == len(items) >= 2, "select two or more walls to join, and nothing else")
+    points = _join_lines([wall.points for wall in walls])
+    name = next((wall.name for wall in walls if wall.name is not None), None)
     note = next((item.note for item in items if item.note), "")
-    whole = replace(items[0], shape=env.WallObstacle(chain, shapes[0].width, name), note=note)
-    kept = sketch.without(item.key for item in items[1:]).obstacles
-    after = replace(sketch, obstacles=tuple(whole if item.key == whole.key else item for item in kept))
-    return Change(after, Selection.of(whole.key), f"{len(items)} walls joined")
+    joined = replace(items[0], shape=env.WallObstacle(points, walls[0].width, name), note=note)
+    remaining = sketch.without(item.key for item in items[1:])
+    obstacles = tuple(joined if item.key == joined.key else item for item in remaining.obstacles)
+    changed = replace(sketch, obstacles=obstacles)
+    return Change(changed, Selection.of(joined.key), f"{len(items)} walls joined")
+
+
+def _join_lines(lines: list[Ring]) -> Ring:
+    """Join lines one after the other, always by the two ends that are nearest, m."""
+    chain = lines[0]
+    remaining = lines[1:]
+    while remaining:
+        pairs: list[tuple[float, int, Ring, Ring, Ring]] = []
+        for line in remaining:
+            for head in (chain, chain[::-1]):
+                for tail in (line, line[::-1]):
+                    pairs.append((math.dist(head[-1], tail[0]), len(pairs), head, tail, line))
+        _, _, head, tail, line = min(pairs)
+        is_same_point = math.dist(head[-1], tail[0]) <= JOIN_DISTANCE_M
+        chain = (*head, *(tail[1:] if is_same_point else tail))
+        remaining.remove(line)
+    return chain
 
 
 def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
-    """Leave vertices out, to `tolerance` m, by Douglas and Peucker (1973): nothing comes to cross itself."""
+    """Remove vertices by Douglas and Peucker (1973), to a tolerance, m, so that nothing crosses itself."""
     require(0.0 <= tolerance <= MAX_SIZE_M, "expected a tolerance of 0 m or more")
-    after, changed = _redrawn(sketch, selection, lambda rings, closed: _simpler(rings, tolerance, closed))
-    count = sum(len(old) - len(new) for old, new in changed)
+
+    def redraw(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
+        return _simplify_rings(rings, tolerance, is_closed)
+
+    changed, replaced = _redraw(sketch, selection, redraw)
+    count = sum(len(old) - len(new) for old, new in replaced)
     require(count, "no vertex can be left out at that tolerance")
-    words = "1 vertex left out" if count == 1 else f"{count} vertices left out"
-    return Change(after, selection.without_vertices(), words)
+    description = "1 vertex left out" if count == 1 else f"{count} vertices left out"
+    return Change(changed, selection.without_vertices(), description)
 
 
-def straighten(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
-    """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
-    require(0.0 < degrees <= 30.0, "expected an angle of up to 30 degrees")
-    after, changed = _redrawn(
-        sketch, selection, lambda rings, closed: tuple(_straight(ring, degrees, closed) for ring in rings)
-    )
-    require(changed, f"no edge is within {degrees:g} degrees of level or upright, and not so already")
-    return Change(
-        after, selection.without_vertices(), f"{format_count(len(changed), 'outline')} straightened"
-    )
+def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN_ANGLE_DEG) -> Change:
+    """Make edges horizontal or vertical that nearly are, so that edges in line lie on one line."""
+    is_possible = 0.0 < degrees <= MAX_STRAIGHTEN_ANGLE_DEG
+    require(is_possible, f"expected an angle of up to {MAX_STRAIGHTEN_ANGLE_DEG:g} degrees")
+
+    def redraw(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
+        return tuple(_straighten_ring(ring, degrees, is_closed) for ring in rings)
+
+    changed, replaced = _redraw(sketch, selection, redraw)
+    require(replaced, f"no edge is within {degrees:g} degrees of level or upright, and not so already")
+    description = f"{format_count(len(replaced), 'outline')} straightened"
+    return Change(changed, selection.without_vertices(), description)
 
 
-def _redrawn(sketch: Sketch, selection: Selection, redraw: _Redraw) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
-    """Redraw what is selected, or all obstacles; return the sketch, and what rings were and became."""
-    chosen = selection.owners if selection.items or selection.boundary else sketch.index_by_key.keys()
-    outlines = {
-        each: found for each in sketch.owners if each in chosen and (found := sketch.list_rings(each))
-    }
-    require(outlines, "select polygons, walls or the boundary first")
-    after, changed = sketch, []
-    for owner, ((_, _, closed), *_) in outlines.items():
+def _redraw(
+    sketch: Sketch, selection: Selection, redraw: RedrawRings
+) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
+    """Redraw the selected obstacles and the boundary, or all obstacles.
+
+    Returns
+    -------
+    sketch : Sketch
+        The redrawn map.
+    replaced : list of tuple of Ring
+        The rings that have changed, before and after.
+    """
+    owners: Collection[Owner] = sketch.index_by_key.keys()
+    if selection.items or selection.boundary:
+        owners = selection.owners
+    redrawn = [owner for owner in sketch.owners if owner in owners and sketch.list_rings(owner)]
+    require(redrawn, "select polygons, walls or the boundary first")
+    changed = sketch
+    replaced: list[tuple[Ring, Ring]] = []
+    for owner in redrawn:
+        _, _, is_closed = sketch.list_rings(owner)[0]
         rings = sketch.list_vertex_rings(owner)
-        new = redraw(rings, closed)
-        changed += [pair for pair in zip(rings, new, strict=True) if pair[0] != pair[1]]
-        after = after.with_rings(owner, new) if new != rings else after
-    return after, changed
+        new_rings = redraw(rings, is_closed)
+        replaced += [(old, new) for old, new in zip(rings, new_rings, strict=True) if old != new]
+        if new_rings != rings:
+            changed = changed.with_rings(owner, new_rings)
+    return changed, replaced
 
 
-def _simpler(rings: tuple[Ring, ...], tolerance: float, closed: bool) -> tuple[Ring, ...]:
-
-    def is_sound(rings: tuple[Ring, ...]) -> bool:
-        return not closed or (min(map(len, rings)) >= 3 and bool(Polygon(rings[0], rings[1:]).is_valid))
-
-    for step in range(_STEPS):
-        fewer = tuple(_fewer(ring, tolerance / 2**step, closed) for ring in rings)
-        if is_sound(fewer) >= is_sound(rings):
-            return fewer
+def _simplify_rings(rings: tuple[Ring, ...], tolerance: float, is_closed: bool) -> tuple[Ring, ...]:
+    """Simplify the rings of an obstacle to a tolerance, m, or less if they would cross."""
+    for attempt in range(SIMPLIFY_ATTEMPTS):
+        simplified = tuple(_simplify_ring(ring, tolerance / 2**attempt, is_closed) for ring in rings)
+        if not is_closed or _is_sound(simplified) or not _is_sound(rings):
+            return simplified
     return rings
 
 
-def _fewer(ring: Ring, tolerance: float, closed: bool) -> Ring:
-    if len(set(ring)) < (4 if closed else 3):
+def _is_sound(rings: tuple[Ring, ...]) -> bool:
+    """Return whether closed rings make a valid polygon."""
+    has_corners = min(map(len, rings)) >= 3
+    return has_corners and bool(Polygon(rings[0], rings[1:]).is_valid)
+
+
+def _simplify_ring(ring: Ring, tolerance: float, is_closed: bool) -> Ring:
+    if len(set(ring)) < (4 if is_closed else 3):
         return ring
-    if not closed:
+    if not is_closed:
         return tuple(LineString(ring).simplify(tolerance, preserve_topology=False).coords)
-    # begin at a vertex that stays: the one farthest from the middle is a corner of the hull
+    # Start at a vertex that stays: the one farthest from the centre is a corner of the convex hull.
     points = np.array(ring)
     first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())
-    line = LineString([*ring[first:], *ring[: first + 1]]).simplify(tolerance, preserve_topology=False)
-    kept = set(line.coords)
-    if len(kept) < 3 or not shapely.MultiPoint(list(kept)).convex_hull.area > 0.0:
+    line = LineString([*ring[first:], *ring[: first + 1]])
+    remaining = set(line.simplify(tolerance, preserve_topology=False).coords)
+    if len(remaining) < 3 or not shapely.MultiPoint(list(remaining)).convex_hull.area > 0.0:
         return ring
-    return tuple(point for point in ring if point in kept)  # in the order in which they were
+    return tuple(point for point in ring if point in remaining)
 
 
-def _straight(ring: Ring, degrees: float, closed: bool) -> Ring:
+def _straighten_ring(ring: Ring, degrees: float, is_closed: bool) -> Ring:
     points = to_array(ring)
-    if len(points) < 2:
+    count = len(points)
+    if count < 2:
         return ring
     edges = np.roll(points, -1, axis=0) - points
-    if not closed:
+    if not is_closed:
         edges[-1] = np.nan
-    slope, count = math.tan(math.radians(degrees)), len(points)
-    size, moved = np.abs(edges), points.copy()
-    # the ends of edges in a row that are level come to the same y, of upright ones to the same x
+    max_slope = math.tan(math.radians(degrees))
+    extents = np.abs(edges)
+    moved = points.copy()
+    # The ends of level edges in a row get the same y, those of upright edges the same x.
     for axis in (1, 0):
-        flat = np.flatnonzero((size[:, axis] <= slope * size[:, 1 - axis]) & (size.max(axis=1) > 0.0))
-        if len(flat) < count:
-            row = coo_array((np.ones(len(flat)), (flat, (flat + 1) % count)), shape=(count, count))
-            _, run = connected_components(row, directed=False)
-            ends = [of(points[:, axis], run, run) for of in (ndimage.minimum, ndimage.maximum)]
-            moved[:, axis] = (ends[0] + ends[1]) / 2
-    if closed and (len({tuple(p) for p in moved.tolist()}) < 3 or Polygon(moved).area == 0.0):
-        return ring
+        is_straight = extents[:, axis] <= max_slope * extents[:, 1 - axis]
+        straight = np.flatnonzero(is_straight & (extents.max(axis=1) > 0.0))
+        if len(straight) < count:
+            connections = (np.ones(len(straight)), (straight, (straight + 1) % count))
+            graph = coo_array(connections, shape=(count, count))
+            _, runs = connected_components(graph, directed=False)
+            low = ndimage.minimum(points[:, axis], runs, runs)
+            high = ndimage.maximum(points[:, axis], runs, runs)
+            moved[:, axis] = (low + high) / 2
+    if is_closed:
+        has_corners = len({tuple(point) for point in moved.tolist()}) >= 3
+        if not has_corners or Polygon(moved).area == 0.0:
+            return ring
     return round_ring(moved)

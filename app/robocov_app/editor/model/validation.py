@@ -23,7 +23,7 @@ from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.selection import format_numbered_name
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, to_document
 
-Kind: TypeAlias = Literal[
+ProblemKind: TypeAlias = Literal[
     "other", "no boundary", "crossing", "spot", "no room", "outside", "twice", "double", "sealed", "narrow",
     "cut off",
 ]  # fmt: skip
@@ -48,7 +48,7 @@ class Problem:
     geometry: shapely.Geometry | None  # a point, an edge, an area; None where it is nowhere
     owner: Owner | None = None  # None of the map as a whole
     is_error: bool = True  # the map cannot run so; else it is a warning
-    kind: Kind = "other"
+    kind: ProblemKind = "other"
 
 
 def find_problems(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:

@@ -10,7 +10,7 @@ from robocov.environment import DiscStart
 from robocov.errors import MapError
 from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.editor import Editor
-from robocov_app.editor.edits.fixes import FIX_TITLES
+from robocov_app.editor.edits.fixes import FIXES
 from robocov_app.editor.model.selection import (
     Selection,
     find_position,
@@ -407,10 +407,10 @@ class Panel(SidePanel):
     def _draw_problem(self, ui: Ui, number: int, problem: Problem) -> bool:
         """Draw a problem; return whether its fix has been applied."""
         editor = self.editor
-        has_fix = problem.kind in FIX_TITLES
-        text_width = ui.wide - 44 - (66 if has_fix else 0)
+        fix = FIXES.get(problem.kind)
+        text_width = ui.wide - 44 - (66 if fix else 0)
         lines = wrapped(problem.message, ui.px(TEXT), ui.px(text_width))
-        columns = (20, 0, 54) if has_fix else (20, 0)
+        columns = (20, 0, 54) if fix else (20, 0)
         ui.row(*columns, height=(TEXT + 5) * len(lines) + 8, below=2)
         badge = ui.cell()
         if ui.surface is not None:
@@ -422,7 +422,7 @@ class Panel(SidePanel):
                 editor.select(Selection.of(problem.owner).restrict_to(editor.sketch))
             editor.revision += 1
             self._show_problem()
-        if has_fix and ui.button(FIX_TITLES[problem.kind], key=f"mend:{number}", small=True):
+        if fix and ui.button(fix.title, key=f"mend:{number}", small=True):
             editor.problem = problem
             editor.attempt(lambda: fix_problem(editor))
             return True
