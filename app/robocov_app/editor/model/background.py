@@ -1,11 +1,11 @@
-"""The picture under a sketch, and the other marks that the editor keeps in a map's free keys."""
+"""The picture under a map, and the marks of obstacles that the editor keeps in a map's free keys."""
 
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import count, islice
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -15,169 +15,285 @@ from robocov.mapfile.models import to_json_value
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import compute_cos_sin, compute_levelling_angle
 
-MAX_PIXELS = 64_000_000  # pixels of the largest picture that is taken
+MAX_PIXELS = 64_000_000
+DEFAULT_WIDTH_M = 20.0
+MIN_PIXEL_M = 1e-6
+MAX_PIXEL_M = 1e3
 
 
 @dataclass(frozen=True)
 class Background:
-    """A picture under the map; its pixels count from the upper left corner, y down, as pictures have them."""
+    """A picture under the map; its pixels count from the upper left corner, y downwards.
+
+    Attributes
+    ----------
+    path : str
+        Its path as in the map: relative to the map's folder, or absolute.
+    pixels : tuple of int
+        Width and height, px.
+    scale : float
+        Side of a pixel, m.
+    corner : tuple of float
+        Position of the lower left corner, m.
+    turn : float
+        Rotation about that corner, degrees counter-clockwise.
+    opacity : float
+        From 0, invisible, to 1.
+    shown : bool
+        Whether it is shown.
+    """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    path: Annotated[str, Field(min_length=1)]  # as in the map: relative to its folder, or absolute
-    pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]  # (width, height)
-    scale: Annotated[float, Field(gt=0.0)] = 0.01  # m; side of a pixel
-    corner: tuple[float, float] = (0.0, 0.0)  # m; where the picture's lower left corner lies
-    turn: float = 0.0  # degrees; how far it is turned about that corner, counter-clockwise
-    opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5  # from 0, not to be seen, to 1
+    path: Annotated[str, Field(min_length=1)]
+    pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
+    scale: Annotated[float, Field(gt=0.0)] = 0.01
+    corner: tuple[float, float] = (0.0, 0.0)
+    turn: float = 0.0
+    opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     shown: bool = True
 
     def to_world(self, pixel: Point) -> Point:
-        x, y = pixel[0] * self.scale, (self.pixels[1] - pixel[1]) * self.scale
+        """Return the position of a pixel, m."""
+        x = pixel[0] * self.scale
+        y = (self.pixels[1] - pixel[1]) * self.scale
         cos, sin = compute_cos_sin(self.turn)
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
 
     @property
     def corners(self) -> tuple[Point, Point, Point, Point]:
-        """Corners, m: lower left, lower right, upper right, upper left."""
+        """Positions of the lower left, lower right, upper right and upper left corner, m."""
         width, height = self.pixels
-        left, right = self.to_world((0, height)), self.to_world((width, height))
-        return left, right, self.to_world((width, 0)), self.to_world((0, 0))
+        return (
+            self.to_world((0, height)),
+            self.to_world((width, height)),
+            self.to_world((width, 0)),
+            self.to_world((0, 0)),
+        )
 
     def to_document(self) -> dict[str, Any]:
-        return {name: to_json_value(value) for name, value in asdict(self).items()} | {"shown": self.shown}
+        """Return the picture as it is written to a map."""
+        document = {name: to_json_value(value) for name, value in asdict(self).items()}
+        return document | {"shown": self.shown}
 
     @classmethod
     def from_document(cls, document: Any) -> "Background | None":
-        """Return the picture that stands in a map; None where that is something else."""
-        if not isinstance(document, dict) or set(document) != {item.name for item in fields(cls)}:
+        """Return the picture in a map; None if that is something else."""
+        if not isinstance(document, dict) or set(document) != {field.name for field in fields(cls)}:
             return None
         try:
-            found = _ADAPTER.validate_json(json.dumps(document), strict=True)
+            background = _ADAPTER.validate_json(json.dumps(document), strict=True)
         except ValidationError:
             return None
-        return found if math.prod(found.pixels) <= MAX_PIXELS else None
+        return background if math.prod(background.pixels) <= MAX_PIXELS else None
 
 
 _ADAPTER = TypeAdapter(Background)
 
 
-def create_background(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
-    """Return a picture just taken, so many metres wide, its lower left corner in the origin."""
+def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT_WIDTH_M) -> Background:
+    """Return a picture of a width, m, with its lower left corner at the origin.
+
+    Parameters
+    ----------
+    path : str
+        Its path as in the map.
+    pixels : tuple of int
+        Width and height, px.
+    width : float
+        Width on the map, m.
+
+    Raises
+    ------
+    MapError
+        If the picture is empty or too large.
+    """
     if min(pixels) < 1 or math.prod(pixels) > MAX_PIXELS:
-        wanted = f"expected 1 to {MAX_PIXELS // 1_000_000} million pixels"
-        raise MapError(f"the picture has {pixels[0]} x {pixels[1]} pixels: {wanted}")
+        size = f"{pixels[0]} x {pixels[1]} pixels"
+        raise MapError(f"the picture has {size}: expected 1 to {MAX_PIXELS // 1_000_000} million pixels")
     return Background(path, pixels, width / pixels[0])
 
 
-def scale_to_length(background: Background, a: Point, b: Point, metres: float) -> Background:
-    """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays."""
-    require(0.0 < metres < math.inf, "the length between the two points must be above 0 m")
+def scale_to_length(background: Background, a: Point, b: Point, length: float) -> Background:
+    """Return a picture scaled about `a` so that two of its points, m, are a length, m, apart."""
+    require(0.0 < length < math.inf, "the length between the two points must be above 0 m")
     _require_apart(background, a, b)
-    factor = metres / math.dist(a, b)
-    if not 1e-6 <= background.scale * factor <= 1e3:
-        raise MapError(f"a pixel would be {background.scale * factor:.3g} m wide: is {metres:g} m right?")
+    factor = length / math.dist(a, b)
+    scale = background.scale * factor
+    if not MIN_PIXEL_M <= scale <= MAX_PIXEL_M:
+        raise MapError(f"a pixel would be {scale:.3g} m wide: is {length:g} m right?")
     x, y = background.corner
-    moved = a[0] + factor * (x - a[0]), a[1] + factor * (y - a[1])
-    return replace(background, scale=background.scale * factor, corner=moved)
+    corner = (a[0] + factor * (x - a[0]), a[1] + factor * (y - a[1]))
+    return replace(background, scale=scale, corner=corner)
 
 
 def level_background(background: Background, a: Point, b: Point) -> Background:
+    """Return a picture turned about `a` so that the line to `b` is level or upright."""
     _require_apart(background, a, b)
     return rotate_background(background, compute_levelling_angle(a, b), a)
 
 
 def rotate_background(background: Background, degrees: float, about: Point) -> Background:
-    """Return the picture turned counter-clockwise about a place, m."""
+    """Return a picture turned counter-clockwise about a point, m."""
     cos, sin = compute_cos_sin(degrees)
-    dx, dy = background.corner[0] - about[0], background.corner[1] - about[1]
-    corner = about[0] + cos * dx - sin * dy, about[1] + sin * dx + cos * dy
+    dx = background.corner[0] - about[0]
+    dy = background.corner[1] - about[1]
+    corner = (about[0] + cos * dx - sin * dy, about[1] + sin * dx + cos * dy)
     return replace(background, corner=corner, turn=math.remainder(background.turn + degrees, 360.0))
 
 
 def _require_apart(background: Background, a: Point, b: Point) -> None:
-    require(math.dist(a, b) >= 2 * background.scale, "click two points of the picture that are farther apart")
+    is_apart = math.dist(a, b) >= 2 * background.scale
+    require(is_apart, "click two points of the picture that are farther apart")
 
 
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
-"""Attributes of an obstacle besides its shape, with their types; falsy values are not written."""
+"""Attributes of an obstacle besides its shape, with their types; empty and false values are not written."""
 
-_HOME = "editor"  # the editor's free key, unless that holds something of somebody else
-_LISTS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
-_OURS = {*_LISTS, "background"}
-_Keys: TypeAlias = Mapping[str, Any]
-_Marks: TypeAlias = dict[int, dict[str, Any]]  # by the place of their obstacle
-_Names: TypeAlias = Sequence[str | None]  # of the obstacles
-_LOST = "notes of obstacles that are gone"
+_HOME = "editor"  # the free key of the editor, unless it contains something else
+_SECTIONS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
+_OWN_KEYS = {*_SECTIONS, "background"}
+_LOST_NOTES = "notes of obstacles that are gone"
+FreeKeys: TypeAlias = Mapping[str, Any]
+MarksByIndex: TypeAlias = dict[int, dict[str, Any]]
+Names: TypeAlias = Sequence[str | None]  # of the obstacles
 
 
-def write_marks(extra: _Keys, marks: _Marks, names: _Names, background: Background | None) -> dict[str, Any]:
-    """Return the free keys of a map, `extra`, with the editor's; marks come by the place of an obstacle."""
-    ours: dict[str, Any] = {}
-    for key, kept in _LISTS.items():
-        for k in sorted(marks):
-            of = {"obstacle": k} if names[k] is None else {"obstacle": k, "name": names[k]}
-            if held := {name: marks[k][name] for name in kept if name in marks[k]}:
-                ours.setdefault(key, []).append({**of, **held})
+class ReadMarks(NamedTuple):
+    """What the editor has written to the free keys of a map.
+
+    Attributes
+    ----------
+    marks : dict of int to dict
+        Marks by the index of their obstacle.
+    background : Background or None
+        The picture under the map.
+    others : dict
+        The free keys of others.
+    """
+
+    marks: MarksByIndex
+    background: Background | None
+    others: dict[str, Any]
+
+
+def write_marks(
+    extra: FreeKeys, marks: MarksByIndex, names: Names, background: Background | None
+) -> dict[str, Any]:
+    """Return the free keys of a map with marks and picture.
+
+    Parameters
+    ----------
+    extra : mapping
+        The free keys of others.
+    marks : dict of int to dict
+        Marks by the index of their obstacle.
+    names : sequence of str or None
+        Names of the obstacles.
+    background : Background or None
+        The picture under the map.
+    """
+    own: dict[str, Any] = {}
+    for section, mark_names in _SECTIONS.items():
+        for index in sorted(marks):
+            values = {name: marks[index][name] for name in mark_names if name in marks[index]}
+            if values:
+                own.setdefault(section, []).append({**_identify(index, names), **values})
     if background is not None:
-        ours["background"] = background.to_document()
-    if not ours:
+        own["background"] = background.to_document()
+    if not own:
         return dict(extra)
-    home = next(key for key in _homes() if _is_free(extra.get(key, {})))
-    return {**extra, home: {**extra.get(home, {}), **ours}}
+    home = next(key for key in _list_homes() if _is_free(extra.get(key, {})))
+    return {**extra, home: {**extra.get(home, {}), **own}}
 
 
-def read_marks(extra: _Keys, names: _Names) -> tuple[_Marks, Background | None, dict[str, Any]]:
-    """Return marks by the place of their obstacle, the picture, and the free keys of everybody else."""
-    for home in islice(_homes(), len(extra) + 1):
-        held = extra.get(home)
-        if not isinstance(held, dict) or _is_free(held):
+def _identify(index: int, names: Names) -> dict[str, Any]:
+    """Return what identifies an obstacle in the free keys: its index, and its name if it has one."""
+    name = names[index]
+    return {"obstacle": index} if name is None else {"obstacle": index, "name": name}
+
+
+def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
+    """Return marks and picture in the free keys of a map, given the names of its obstacles."""
+    for home in islice(_list_homes(), len(extra) + 1):
+        content = extra.get(home)
+        if not isinstance(content, dict) or _is_free(content):
             continue
-        background = Background.from_document(held.get("background"))
-        sound = all(_are_entries(held.get(key, []), kept) for key, kept in _LISTS.items())
-        if not sound or ("background" in held and background is None):
+        background = Background.from_document(content.get("background"))
+        has_broken_background = "background" in content and background is None
+        if has_broken_background or not _has_sound_sections(content):
             continue
-        marks: _Marks = {}
-        rest = {key: value for key, value in held.items() if key not in _OURS}
-        for key, kept in _LISTS.items():
-            taken = set()
-            for entry in held.get(key, []):
-                k = _obstacle_of(entry, names)
-                if k is not None and k not in taken:
-                    taken.add(k)
-                    marks.setdefault(k, {}).update((name, entry[name]) for name in kept if name in entry)
-                elif key == "notes":
-                    rest[_LOST] = [*rest.get(_LOST, []), entry]
-        others = {**extra, home: rest}
-        return marks, background, {key: value for key, value in others.items() if key != home or rest}
-    return {}, None, dict(extra)
+        marks, rest = _assign_marks(content, names)
+        others = {key: rest if key == home else value for key, value in extra.items()}
+        if not rest:
+            del others[home]
+        return ReadMarks(marks, background, others)
+    return ReadMarks({}, None, dict(extra))
 
 
-def _homes() -> Iterator[str]:
+def _has_sound_sections(content: FreeKeys) -> bool:
+    return all(
+        _are_entries(content.get(section, []), mark_names) for section, mark_names in _SECTIONS.items()
+    )
+
+
+def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[str, Any]]:
+    """Assign the entries of the editor's free key to obstacles.
+
+    Returns
+    -------
+    marks : dict of int to dict
+        Marks by the index of their obstacle.
+    rest : dict
+        What others have written to the key, and notes whose obstacle has gone.
+    """
+    marks: MarksByIndex = {}
+    rest = {key: value for key, value in content.items() if key not in _OWN_KEYS}
+    for section, mark_names in _SECTIONS.items():
+        assigned: set[int] = set()
+        for entry in content.get(section, []):
+            index = _find_obstacle(entry, names)
+            if index is not None and index not in assigned:
+                assigned.add(index)
+                values = {name: entry[name] for name in mark_names if name in entry}
+                marks.setdefault(index, {}).update(values)
+            elif section == "notes":
+                rest[_LOST_NOTES] = [*rest.get(_LOST_NOTES, []), entry]
+    return marks, rest
+
+
+def _list_homes() -> Iterator[str]:
+    """Yield the free keys that the editor may use, in their order."""
     yield _HOME
     yield from (f"{_HOME} {k}" for k in count(2))
 
 
-def _is_free(held: object) -> bool:
-    return isinstance(held, dict) and not _OURS & held.keys()
+def _is_free(content: object) -> bool:
+    return isinstance(content, dict) and not _OWN_KEYS & content.keys()
 
 
-def _are_entries(entries: object, kept: tuple[str, ...]) -> bool:
-    return isinstance(entries, list) and all(
-        isinstance(entry, dict)
-        and type(entry.get("obstacle")) is int
-        and isinstance(entry.get("name", ""), str)
-        and set(entry) <= {"obstacle", "name", *kept}
-        and any(name in entry for name in kept)
-        and all(type(entry[name]) is MARKS[name] for name in kept if name in entry)
-        for entry in entries
-    )
+def _are_entries(entries: object, mark_names: tuple[str, ...]) -> bool:
+    return isinstance(entries, list) and all(_is_entry(entry, mark_names) for entry in entries)
 
 
-def _obstacle_of(entry: _Keys, names: _Names) -> int | None:
-    k, name = entry["obstacle"], entry.get("name")
-    there = 0 <= k < len(names)
-    if not (there and names[k] == name) and name is not None and names.count(name) == 1:
+def _is_entry(entry: object, mark_names: tuple[str, ...]) -> bool:
+    """Return whether a value is an entry with some of the marks."""
+    if not isinstance(entry, dict) or type(entry.get("obstacle")) is not int:
+        return False
+    if not isinstance(entry.get("name", ""), str) or not set(entry) <= {"obstacle", "name", *mark_names}:
+        return False
+    present = [name for name in mark_names if name in entry]
+    return bool(present) and all(type(entry[name]) is MARKS[name] for name in present)
+
+
+def _find_obstacle(entry: FreeKeys, names: Names) -> int | None:
+    """Return the index of the obstacle of an entry: by index and name, else by a name that is unique."""
+    index = entry["obstacle"]
+    name = entry.get("name")
+    exists = 0 <= index < len(names)
+    has_same_name = exists and names[index] == name
+    if not has_same_name and name is not None and names.count(name) == 1:
         return names.index(name)
-    # it may have got a name, or lost it
-    return k if there and (name is None or names[k] in (None, name)) else None
+    # The obstacle may have got a name since, or lost it.
+    is_compatible = exists and (name is None or names[index] in (None, name))
+    return index if is_compatible else None

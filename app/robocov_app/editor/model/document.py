@@ -61,6 +61,7 @@ class History:
         return self._go_to(self._undone[-1].before)
 
     def redo(self) -> Change | None:
+        """Redo the change that was undone last; return the state that it leads to."""
         if not self._undone:
             return None
         self._done.append(self._undone.pop())
@@ -84,10 +85,12 @@ class History:
 
     @property
     def undo_descriptions(self) -> tuple[str, ...]:
+        """Descriptions of the changes that can be undone, the newest first."""
         return tuple(step.after.description for step in reversed(self._done))
 
     @property
     def redo_descriptions(self) -> tuple[str, ...]:
+        """Descriptions of the changes that can be redone, the next first."""
         return tuple(step.after.description for step in reversed(self._undone))
 
     def save_point(self) -> Callable[[], None]:
@@ -102,6 +105,7 @@ class History:
         return take_back
 
     def mark_saved(self) -> None:
+        """Remember that the file has the present content."""
         self.saved = self.sketch
         self.starts_new_step = True
 
@@ -135,6 +139,7 @@ class Autosave:
     disk: OnDisk | None  # what the file was like when it was read or written last
 
     def read_sketch(self) -> Sketch:
+        """Return the map."""
         return build_sketch(autosave.read_draft(self.folder, KIND).content.get("sketch"), str(self.folder))
 
     def describe(self, now: datetime | None = None) -> str:
@@ -147,6 +152,7 @@ class Autosave:
 
 
 def build_record(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
+    """Return the content of a draft."""
     file = disk and {"digest": disk.digest, "stamp": list(disk.stamp)}
     return {"disk": file, "sketch": to_document(sketch)}
 
@@ -180,6 +186,7 @@ class ChangedError(OutputError):
 
 
 def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
+    """Read a map; return it with the state of its file."""
     path = path.absolute()
     stamp = _stamp(path)  # the stamp of before: what changes while it is read is noticed at the next look
     content = read_bytes(path)
@@ -266,13 +273,16 @@ class Document:
 
     @classmethod
     def recover(cls, kept: Autosave, drafts: Path | None) -> Self:
+        """Return the document of a draft."""
         return cls(kept.read_sketch(), drafts, kept.path, kept.disk, resumed=kept.folder, saved=False)
 
     @property
     def title(self) -> str:
+        """Name of the file, or of the map."""
         return self.path.name if self.path is not None else self.stem or self.history.sketch.name
 
     def suggest_path(self, folder: Path) -> Path:
+        """Return a free path for the map in a folder."""
         if self.path is not None:
             return self.path
         stem = self.stem or "-".join(self.history.sketch.name.lower().split()) or "map"
@@ -281,6 +291,7 @@ class Document:
         return next(path for name in names if not (path := folder / f"{name}{SUFFIX}").exists())
 
     def would_spoil(self, path: Path) -> bool:
+        """Return whether saving would replace a valid map with a draft."""
         with suppress(MapError):
             load_map(_with_suffix(path))
             try:
@@ -304,6 +315,7 @@ class Document:
         return f"saved: {path}"
 
     def keep_aside(self) -> None:
+        """Keep a draft of unsaved changes, or drop it when there are none."""
         before, self._kept = self._kept, self.history.sketch
         if before is not self._kept and self.history.has_unsaved_changes:
             self.autosaver.save_draft(partial(build_record, self._kept, self.disk))
@@ -334,6 +346,7 @@ class Document:
         self._settle()
 
     def ignore_disk_change(self) -> None:
+        """Let the next save replace the file although it has changed."""
         self._over = True
 
     def _settle(self) -> None:

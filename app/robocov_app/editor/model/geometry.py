@@ -1,4 +1,4 @@
-"""Points, angles and outlines of the plane: to the tenth of a millimetre, within reach."""
+"""Points, angles and outlines, to a tenth of a millimetre and within the reach of maps."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -21,21 +21,23 @@ distance = math.dist
 
 
 def round_length(length: float) -> float:
-    """Return a length to the tenth of a millimetre, never minus zero."""
+    """Return a length to a tenth of a millimetre, never minus zero."""
     return round(float(length), DECIMALS) + 0.0
 
 
 def round_point(point: Iterable[float]) -> Point:
+    """Return a point to a tenth of a millimetre."""
     x, y = point
     return round_length(x), round_length(y)
 
 
 def to_array(points: Sequence[Point] | Array) -> Array:
+    """Return points as a (k, 2) array, m."""
     return np.asarray(points, dtype=float).reshape(-1, 2)
 
 
 def round_ring(points: Sequence[Point] | Array) -> Ring:
-    """Return points to the tenth of a millimetre; MapError where one is farther than maps reach."""
+    """Return points to a tenth of a millimetre; raise MapError if any is beyond the reach of maps."""
     found = to_array(points)
     limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
     require(
@@ -45,11 +47,12 @@ def round_ring(points: Sequence[Point] | Array) -> Ring:
 
 
 def check_point(point: Point) -> Point:
+    """Return a point to a tenth of a millimetre; raise MapError if it is beyond the reach of maps."""
     return round_ring([point])[0]
 
 
 def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
-    """Return points without those that repeat the one before; in a closed ring the first follows the last."""
+    """Return points without those that repeat the one before; closed rings also at their end."""
     kept = [point for point, _ in groupby(ring)]
     if closed and len(kept) > 1 and kept[0] == kept[-1]:
         kept.pop()
@@ -57,7 +60,22 @@ def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
 
 
 def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
-    """Return for k edges the (k, 2) places that are nearest to a point, and their (k,) distances from it."""
+    """Find the points of edges that are nearest to a point.
+
+    Parameters
+    ----------
+    starts, ends : (k, 2) array, m
+        Ends of the edges.
+    point : Point
+        The point, m.
+
+    Returns
+    -------
+    nearest : (k, 2) array, m
+        The nearest point of each edge.
+    distances : (k,) array, m
+        Its distance from the point.
+    """
     along = ends - starts
     squared = np.einsum("kd,kd->k", along, along)
     part = np.einsum("kd,kd->k", np.array(point) - starts, along) / np.where(squared > 0.0, squared, 1.0)
@@ -74,37 +92,40 @@ def compute_cos_sin(degrees: float) -> tuple[float, float]:
 
 
 def compute_bearing(a: Point, b: Point) -> float:
-    """Return the direction from one point to another, degrees counter-clockwise from the x axis."""
+    """Return the direction from a point to another, degrees counter-clockwise from the x axis."""
     return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
 
 
 def compute_levelling_angle(a: Point, b: Point) -> float:
-    """Return by how many degrees a line has to be turned to be level or upright, whichever is nearer."""
+    """Return the angle by which a line must turn to be level or upright, whichever is nearer, degrees."""
     return 90.0 * round(compute_bearing(a, b) / 90.0) - compute_bearing(a, b)
 
 
 def constrain_angle(origin: Point, point: Point) -> Point:
-    """Return the point on the nearest line at a multiple of `ANGLE` degrees through another."""
+    """Return the nearest point on a line through `origin` at a multiple of `SHIFT_ANGLE_DEG`."""
     cos, sin = compute_cos_sin(SHIFT_ANGLE_DEG * round(compute_bearing(origin, point) / SHIFT_ANGLE_DEG))
     along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
     return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0
 
 
 def build_rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the corners of a rectangle between two opposite ones."""
     return a, (b[0], a[1]), b, (a[0], b[1])
 
 
 def compute_centre(box: Box) -> Point:
+    """Return the centre of a box, m."""
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
 
 
 def enclose_boxes(boxes: Iterable[Box]) -> Box:
+    """Return the bounding box of boxes, m."""
     low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
     return min(low_x), min(low_y), max(high_x), max(high_y)
 
 
 def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
-    """Return the polygons of a geometry, to tenths of a millimetre, the largest first, without crumbs."""
+    """Return the polygons of a geometry to a tenth of a millimetre, the largest first, without tiny ones."""
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
@@ -122,19 +143,20 @@ def _is_crumb(part: shapely.Geometry) -> bool:
 
 
 def format_bearing(a: Point, b: Point) -> str:
-    """Return length and direction from one point to another: "2.40 m  ∠ 90°"."""
+    """Format length and direction from a point to another: "2.40 m  ∠ 90°"."""
     angle = compute_bearing(a, b)
     shown = 0.0 if abs(angle) < 0.05 else angle
     return f"{format_length(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
 
 
 def format_length(metres: float) -> str:
-    """Return a length as it stands beside the cursor: "2.3 cm", "12.35 m", "1234.5 m"."""
+    """Format a length: "2.3 cm", "12.35 m", "1234.5 m"."""
     if metres < 0.1:
         return f"{100 * metres:.1f} cm"
     return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"
 
 
 def format_point(point: Point) -> str:
+    """Format a position: "(1.00, 2.50) m"."""
     x, y = (round(value, 2) + 0.0 for value in point)  # never minus zero
     return f"({x:.2f}, {y:.2f}) m"

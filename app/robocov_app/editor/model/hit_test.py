@@ -1,4 +1,4 @@
-"""Hit testing under the cursor and in a box; locked and hidden things are skipped."""
+"""Hit testing under the cursor and in a box; locked and hidden obstacles are skipped."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -14,7 +14,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
 def find_owners(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
-    """Return what a click may mean within `reach` m: starts, what covers the point, what is near."""
+    """Return the objects that a click may mean: starts, obstacles, and those within `reach` metres."""
     found: list[Owner] = []
     discs: list[Owner] = []
     for name, spec in reversed(sketch.starts):
@@ -37,10 +37,12 @@ def find_owners(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]
 
 
 def find_obstacles(sketch: Sketch, point: Point, reach: float) -> list[int]:
+    """Return the keys of the obstacles that a click may mean, see `find_owners`."""
     return [each for each in find_owners(sketch, point, reach) if isinstance(each, int) and each != BOUNDARY]
 
 
 def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
+    """Return the nearest edge of some objects within `reach` metres of a point."""
     best, nearest = reach, None
     wanted = list(owners)
     if len(wanted) > 8:  # of many obstacles, only those that may have something within reach
@@ -60,7 +62,7 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
 
 
 def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
-    """Return all that lies in a box, `touched`: or only touches it; the boundary counts only as a whole."""
+    """Return the objects in a box between two corners, m, with `touched` also those that it touches."""
     box = shapely.box(*np.minimum(a, b), *np.maximum(a, b))
     if touched:
         places = sketch.tree.query(box, predicate="intersects")
@@ -80,6 +82,7 @@ def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) ->
 
 
 def find_vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner]) -> Selection:
+    """Return the vertices of some objects in a box between two corners, m."""
     pairs = [pair for owner in owners for pair in list_vertices(sketch, owner)]
     inside = np.flatnonzero(_inside([at for _, at in pairs], a, b)).tolist()
     return Selection(vertices=frozenset(pairs[k][0] for k in inside))

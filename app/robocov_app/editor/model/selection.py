@@ -1,4 +1,4 @@
-"""The selection, the vertices of things, and the change that an edit makes."""
+"""Selections, vertices, and the changes that edits make."""
 
 from __future__ import annotations
 
@@ -14,23 +14,45 @@ from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 @dataclass(frozen=True, slots=True)
 class Vertex:
-    """A point of something that can be dragged."""
+    """A point of an object that can be dragged.
 
-    owner: Owner  # key of an obstacle, `BOUNDARY`, or name of a start
-    ring: int  # 0 for the outline, or a wall's line; 1, 2, ... for the holes of a polygon
-    index: int  # in the ring; of a disc: 0 the centre, 1 to 4 its rim in the east, north, west, south
+    Attributes
+    ----------
+    owner : int or str
+        Key of an obstacle, `BOUNDARY`, or name of a start.
+    ring : int
+        0 for the outline or a wall's line; 1, 2, ... for the holes of a polygon.
+    index : int
+        Index in the ring. Of a circle, 0 is the centre and 1 to 4 its rim in the east, north, west and south.
+    """
+
+    owner: Owner
+    ring: int
+    index: int
 
 
 @dataclass(frozen=True, slots=True)
 class Edge(Vertex):
-    """A place on an edge, `point` in m: from a vertex of a ring to the next."""
+    """A point, m, on the edge from a vertex of a ring to the next."""
 
     point: Point
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Selected things: obstacles, single vertices, starts, the boundary."""
+    """Selected objects and vertices.
+
+    Attributes
+    ----------
+    items : frozenset of int
+        Keys of obstacles.
+    vertices : frozenset of Vertex
+        Single vertices.
+    starts : frozenset of str
+        Names of starts.
+    boundary : bool
+        Whether the boundary is selected.
+    """
 
     items: frozenset[int] = frozenset()
     vertices: frozenset[Vertex] = frozenset()
@@ -42,18 +64,20 @@ class Selection:
 
     @classmethod
     def of(cls, *owners: Owner) -> Selection:
+        """Return the selection of some objects."""
         items = frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY)
         starts = frozenset(each for each in owners if isinstance(each, str))
         return cls(items, starts=starts, boundary=BOUNDARY in owners)
 
     @classmethod
     def select_all(cls, sketch: Sketch) -> Selection:
-        """Return the selection of every obstacle that is not locked or hidden, every start, the boundary."""
+        """Return the selection of everything except locked and hidden obstacles."""
         shut = frozenset(item.key for item in sketch.obstacles if not item.is_selectable)
         return cls.of(*(owner for owner in sketch.owners if owner not in shut)).restrict_to(sketch)
 
     @property
     def owners(self) -> frozenset[Owner]:
+        """Selected obstacles, starts and the boundary."""
         return self.items | self.starts | ({BOUNDARY} if self.boundary else frozenset())
 
     def list_items(self, sketch: Sketch) -> list[Item]:
@@ -61,31 +85,33 @@ class Selection:
         return [item for item in sketch.obstacles if item.key in self.items]
 
     def union(self, other: Selection) -> Selection:
+        """Return the union of two selections."""
         items, starts = self.items | other.items, self.starts | other.starts
         return Selection(items, self.vertices | other.vertices, starts, self.boundary or other.boundary)
 
     def toggle(self, other: Selection) -> Selection:
-        """Return the selection after a click with Shift: what is in both goes, the rest of `other` comes."""
+        """Return the symmetric difference of two selections, as after a click with Shift."""
         items, starts = self.items ^ other.items, self.starts ^ other.starts
         return Selection(items, self.vertices ^ other.vertices, starts, self.boundary != other.boundary)
 
     def restrict_to(self, sketch: Sketch) -> Selection:
-        """Return what of the selection there is in a sketch, as after undoing."""
+        """Return the part of the selection that exists in a map, for instance after undoing."""
         items, starts = self.items & sketch.index_by_key.keys(), self.starts & dict(sketch.starts).keys()
         vertices = frozenset(vertex for vertex in self.vertices if has_vertex(sketch, vertex))
         return Selection(items, vertices, starts, self.boundary and sketch.boundary is not None)
 
     def without_vertices(self) -> Selection:
+        """Return the selection without its vertices."""
         return replace(self, vertices=frozenset())
 
     def with_groups(self, sketch: Sketch) -> Selection:
-        """Return the selection with the members of all its groups, but for the locked and the hidden."""
+        """Return the selection with the members of its groups, except for locked and hidden ones."""
         groups = {sketch.get_item(key).group for key in self.items} - {""}
         members = {item.key for item in sketch.obstacles if item.group in groups and item.is_selectable}
         return replace(self, items=self.items | members)
 
     def describe(self, sketch: Sketch) -> str:
-        """Return what people call it: "wall “west”", "3 obstacles", "2 vertices"."""
+        """Describe the selection: "wall “west”", "3 obstacles", "2 vertices"."""
         owners, vertices = self.owners, len(self.vertices)
         if sum(map(bool, (self.items, self.starts, self.boundary, vertices))) > 1:
             return f"{len(owners) + vertices} things"
@@ -98,7 +124,17 @@ class Selection:
 
 @dataclass(frozen=True)
 class Change:
-    """Change that an edit makes; the words are in the past, as undo says them: "3 obstacles moved"."""
+    """The change that an edit makes.
+
+    Attributes
+    ----------
+    sketch : Sketch
+        The map after the edit.
+    selection : Selection
+        The selection after the edit.
+    description : str
+        What has happened, for the history: "3 obstacles moved".
+    """
 
     sketch: Sketch
     selection: Selection
@@ -106,7 +142,7 @@ class Change:
 
 
 def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
-    """Return a name that tells things apart: obstacles without a name by their number, "wall 17"."""
+    """Return a unique name of an object; obstacles without a name get their number: "wall 17"."""
     name = sketch.display_name(owner)
     if isinstance(owner, str) or owner == BOUNDARY or sketch.get_item(owner).shape.name:
         return name
@@ -114,7 +150,7 @@ def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
 
 
 def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], words: str) -> Change:
-    """Return the change that puts shapes, none or several, in the place of some obstacles."""
+    """Return the change that replaces obstacles, given by their keys, with any number of shapes each."""
     fresh = sketch.next_key
     items: list[Item] = []
     keys: list[int] = []
@@ -130,16 +166,18 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], 
 
 
 def list_vertices(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
+    """Return the vertices of an object with their positions, m."""
     rings = enumerate(sketch.list_vertex_rings(owner))
     return tuple((Vertex(owner, ring, k), at) for ring, points in rings for k, at in enumerate(points))
 
 
 def has_vertex(sketch: Sketch, vertex: Vertex) -> bool:
+    """Return whether a vertex exists in a map."""
     rings = sketch.list_vertex_rings(vertex.owner)
     return 0 <= vertex.ring < len(rings) and 0 <= vertex.index < len(rings[vertex.ring])
 
 
 def find_position(sketch: Sketch, vertex: Vertex) -> Point:
-    """Return where a vertex is, m; MapError when there is none."""
+    """Return the position of a vertex, m; raise MapError if it has gone."""
     require(has_vertex(sketch, vertex), "there is no such vertex any more")
     return sketch.list_vertex_rings(vertex.owner)[vertex.ring][vertex.index]

@@ -1,4 +1,4 @@
-"""A map in the making, valid or not: a value; every edit makes another, which shares what did not change."""
+"""A map that is being edited, valid or not. It is immutable; edits share what they do not change."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,42 +26,79 @@ Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`,
 
 @dataclass(frozen=True)
 class Item:
-    """An obstacle of a sketch."""
+    """An obstacle of a sketch.
 
-    key: int  # who it is, whatever it looks like: stays the same through every edit; not in the file
-    shape: Obstacle  # in a draft it may break rules, such as a polygon with two corners
-    note: str = ""  # what people wrote about it
-    group: str = ""  # the name of the group that it is in; empty for none
-    locked: bool = False  # not to be taken by the mouse
-    hidden: bool = False  # not shown in the editor either; robots meet it all the same
+    Attributes
+    ----------
+    key : int
+        Identifies the obstacle through all edits; not in the file.
+    shape : Obstacle
+        Its shape. In a draft it may break rules, such as a polygon with two corners.
+    note : str
+        Note of the user.
+    group : str
+        Name of its group; empty for none.
+    locked : bool
+        Whether the mouse does not select it.
+    hidden : bool
+        Whether it is not shown in the editor; robots meet it all the same.
+    """
+
+    key: int
+    shape: Obstacle
+    note: str = ""
+    group: str = ""
+    locked: bool = False
+    hidden: bool = False
 
     @cached_property
     def geometry(self) -> shapely.Geometry:
-        """Covered area as a valid shapely geometry, m: a line or a point where it covers nothing."""
+        """Covered area as a valid geometry, m; a line or a point if it covers nothing."""
         return build_geometry(self.shape)
 
     @property
     def is_selectable(self) -> bool:
+        """Whether the mouse can select it."""
         return not (self.locked or self.hidden)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what can be derived again."""
+        """Leave out what can be computed again."""
         return {name: getattr(self, name) for name in ("key", *MARKS)} | {"shape": replace(self.shape)}
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """A map in the making. Immutable; equal when the content is equal, the keys of obstacles included."""
+    """A map that is being edited. Immutable; equal if the content with the keys of obstacles is equal.
+
+    Attributes
+    ----------
+    name, description : str
+        Texts for people.
+    boundary : Ring or None
+        The boundary, m; None while there is none.
+    obstacles : tuple of Item
+        Obstacles from the bottom to the top.
+    starts : tuple of (str, StartSpec)
+        Starts with their names; the first is the default.
+    background : Background or None
+        The picture under the map.
+    extra : mapping
+        Free keys of the file, without those of the editor.
+    schema : str or None
+        The key ``$schema`` of the file.
+    density : Density or None
+        The density.
+    """
 
     name: str = "Untitled"
     description: str = ""
-    boundary: Ring | None = None  # m
-    obstacles: tuple[Item, ...] = ()  # from the bottom to the top
-    starts: tuple[tuple[str, StartSpec], ...] = ()  # the first is the default
+    boundary: Ring | None = None
+    obstacles: tuple[Item, ...] = ()
+    starts: tuple[tuple[str, StartSpec], ...] = ()
     background: Background | None = None
-    extra: Mapping[str, Any] = field(default_factory=dict)  # the file's free keys, without the editor's
-    schema: str | None = None  # the file's ``$schema``
-    density: Density | None = None  # how much each place counts; pictures are read when the map is
+    extra: Mapping[str, Any] = field(default_factory=dict)
+    schema: str | None = None
+    density: Density | None = None
 
     def __hash__(self) -> int:
         return hash((self.name, self.boundary, self.obstacles))
@@ -81,11 +118,11 @@ class Sketch:
         )
 
     def build_environment(self, where: str = "map") -> env.Environment:
-        """Return the map that can be simulated; MapError when it breaks a rule, as of the saved file."""
+        """Build the map for simulations; raise MapError, about a file called `where`, if it breaks a rule."""
         return from_json(to_document(self), where)
 
     def build_unchecked_environment(self) -> env.Environment:
-        """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
+        """Build the map without checking its rules; if it breaks any, using it may raise any error."""
         shapes, marks = [item.shape for item in self.obstacles], dict[int, dict[str, Any]]()
         for k, item in enumerate(self.obstacles):
             marks[k] = {name: value for name in MARKS if (value := getattr(item, name))}
@@ -98,23 +135,26 @@ class Sketch:
         )
 
     def get_item(self, key: int) -> Item:
+        """Return an obstacle by its key."""
         return self.obstacles[self.index_by_key[key]]
 
     def get_start(self, name: str) -> StartSpec:
+        """Return a start by its name."""
         return dict(self.starts)[name]
 
     def find_object(self, owner: Owner) -> Obstacle | StartSpec | None:
-        """Return an obstacle or a start; None of the boundary, and where there is no such thing."""
+        """Return the shape of an obstacle, or a start; None for other objects."""
         if isinstance(owner, str):
             return dict(self.starts).get(owner)
         return self.get_item(owner).shape if owner in self.index_by_key else None
 
     @property
     def owners(self) -> tuple[Owner, ...]:
+        """The boundary, the keys of the obstacles and the names of the starts."""
         return BOUNDARY, *self.index_by_key, *dict(self.starts)
 
     def display_name(self, owner: Owner) -> str:
-        """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
+        """Return the name of an object for people: "polygon “desk”", "start “corner”", "boundary"."""
         if isinstance(owner, str):
             return to_one_line(f"start “{owner}”")
         shape = None if owner == BOUNDARY else self.get_item(owner).shape
@@ -122,7 +162,7 @@ class Sketch:
         return to_one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
 
     def list_vertex_rings(self, owner: Owner) -> tuple[Ring, ...]:
-        """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
+        """Return the positions of an object's vertices, m, ring by ring; empty if there is no such object."""
         if owner == BOUNDARY:
             return () if self.boundary is None else (self.boundary,)
         thing: Any = self.find_object(owner)
@@ -134,7 +174,7 @@ class Sketch:
         return (getattr(thing, _LINES[type(thing)]),) if type(thing) in _LINES else ()
 
     def list_rings(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
-        """Return the rings of something: number, points, whether it is closed; none of circles and starts."""
+        """Return number, points, m, and whether it is closed of each ring; none for circles and starts."""
         thing = self.find_object(owner)
         if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
             return ()
@@ -142,7 +182,7 @@ class Sketch:
         return tuple((k, points, closed) for k, points in enumerate(self.list_vertex_rings(owner)))
 
     def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Self:
-        """Return the sketch with other vertices for something that `ring_points` has, but circles."""
+        """Return the map with other vertices, m, for an object that is not a circle."""
         line, *holes = map(tuple, rings)
         if owner == BOUNDARY:
             return replace(self, boundary=line)
@@ -153,30 +193,34 @@ class Sketch:
 
     @cached_property
     def index_by_key(self) -> Mapping[int, int]:
+        """Index of each obstacle by its key."""
         return {item.key: place for place, item in enumerate(self.obstacles)}
 
     @cached_property
-    def geometries(self) -> Any:  # an array of shapely geometries
+    def geometries(self) -> Any:
+        """Geometries of the obstacles, an (n,) array of shapely geometries, m."""
         return np.array([item.geometry for item in self.obstacles], dtype=object)
 
     @cached_property
     def tree(self) -> shapely.STRtree:
+        """Search tree of the geometries."""
         return shapely.STRtree(self.geometries)
 
     @property
     def next_key(self) -> int:
+        """A key that no obstacle has, nor any greater one."""
         return max(self.index_by_key, default=-1) + 1
 
     def with_obstacles(
         self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]
     ) -> tuple[Self, tuple[int, ...]]:
-        """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
+        """Return the map with more obstacles on top, each a shape or a shape with a note, and their keys."""
         pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
         items = [Item(k, *pair) for k, pair in enumerate(pairs, self.next_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
     def with_objects(self, things: Mapping[Any, Any]) -> Self:
-        """Return the sketch with other obstacles by their keys, and other or more starts by their names."""
+        """Return the map with other obstacles by their keys, and other or more starts by their names."""
         changed = {
             k: new for k, new in things.items() if isinstance(k, int) and new != self.get_item(k).shape
         }
@@ -185,18 +229,19 @@ class Sketch:
         return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))
 
     def without(self, owners: Iterable[Owner]) -> Self:
+        """Return the map without some obstacles and starts."""
         gone = frozenset(owners)
         obstacles = tuple(item for item in self.obstacles if item.key not in gone)
         return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
 
     def with_default_name(self, name: str) -> Self:
-        """Return the sketch with a name if nobody has given it one."""
+        """Return the map with a name, unless it has one."""
         name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
         return replace(self, name=name) if self.name == Sketch.name and name else self
 
     @property
     def bounds(self) -> Box | None:
-        """Bounding box of all that there is, with a shown picture; None of nothing."""
+        """Bounding box of everything including a shown picture, m; None of an empty map."""
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
@@ -212,7 +257,7 @@ class Sketch:
 
 
 def to_document(sketch: Sketch) -> dict[str, Any]:
-    """Return the map document of a sketch, valid or not; `parser.sketch_of` reads it back, keys aside."""
+    """Return the document of a map, valid or not; `parser.build_sketch` reads it back, with other keys."""
     document = to_json(sketch.build_unchecked_environment())
     if sketch.boundary is None:
         del document["boundary"]
@@ -220,11 +265,12 @@ def to_document(sketch: Sketch) -> dict[str, Any]:
 
 
 def dump_sketch(sketch: Sketch) -> str:
+    """Return the text of the file of a map."""
     return dump_document(to_document(sketch))
 
 
 def build_geometry(shape: Obstacle) -> shapely.Geometry:
-    """Return what any obstacle covers as a valid geometry: nothing where it is too large or too far away."""
+    """Build the area that an obstacle covers as a valid geometry, m; empty beyond the reach of maps."""
     if isinstance(shape, env.CircleObstacle):
         if not _is_near([shape.center]):
             return shapely.GeometryCollection()
