@@ -166,10 +166,10 @@ def _set_features(
     base = present_base if base is None else base
     peaks = tuple(feature for feature in features if isinstance(feature, Gaussian))
     areas = tuple(feature for feature in features if isinstance(feature, WeightedArea))
-    density: Density = WeightedPolygons(areas, base) if areas else Gaussians(peaks, base)
     if areas:
         max_weight = max(base, *(area.weight for area in areas))
         require(max_weight > 0.0, "some place must have a weight above 0")
+    density: Density = WeightedPolygons(areas, base) if areas else Gaussians(peaks, base)
     return Change(replace(sketch, density=density), Selection(), description)
 
 
