@@ -160,7 +160,7 @@ class RandomEvents:
         self.window = window
         self.random = random.Random(seed)
         self.files = write_odd_files(folder)
-        self.page = page_events.Hands()
+        self.page = page_events.EventTranslator()
         self.at = (5, 5)
         self.held: list[int] = []
         self.pressed: dict[str, int] = {}

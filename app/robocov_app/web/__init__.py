@@ -47,10 +47,14 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         return
     from robocov_app.terminal.interruption import unblock_interrupts
     from robocov_app.toolkit.termination import ending_on_signals, is_ending
-    from robocov_app.web.confined import confined
+    from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
 
-    with WebDisplay(options.host, options.port, folder) as display, confined(folder), ending_on_signals():
+    with (
+        WebDisplay(options.host, options.port, folder) as display,
+        confine_files(folder),
+        ending_on_signals(),
+    ):
         echo(f"open {display.link}", flush=True)
         echo(f"to watch only: {display.watch_link}", flush=True)
         window.remote = display

@@ -7,32 +7,45 @@ from urllib.parse import parse_qsl
 
 from robocov.errors import InputError
 
-
-def link_to(host: str, port: int, token: str) -> str:
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
-    return f"http://{f'[{host}]' if ':' in host else host}:{port}/?token={token}"
+_LOOPBACK_ADDRESSES = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+"""Addresses to open in a browser for a server that listens at all addresses."""
 
 
-def listening_failed(host: str, port: int, error: OSError) -> InputError:
-    why = (error.strerror or str(error)).rpartition(": ")[2]
-    return InputError(f"--port: {host}:{port} cannot be listened to: {why}; --port 0 takes one that is free")
+def build_link(host: str, port: int, token: str) -> str:
+    """Return the address of a served window with its token."""
+    host = _LOOPBACK_ADDRESSES.get(host, host)
+    if ":" in host:
+        host = f"[{host}]"
+    return f"http://{host}:{port}/?token={token}"
 
 
-def query_of(address: str) -> dict[str, str]:
+def build_listen_error(host: str, port: int, error: OSError) -> InputError:
+    """Return the error for an address that a server cannot listen at."""
+    reason = (error.strerror or str(error)).rpartition(": ")[2]
+    return InputError(
+        f"--port: {host}:{port} cannot be listened to: {reason}; --port 0 takes one that is free"
+    )
+
+
+def parse_query(address: str) -> dict[str, str]:
+    """Return the query of an address, the last value for each name."""
     return dict(parse_qsl(address.partition("?")[2]))
 
 
-def token_in(address: str) -> str:
-    return query_of(address).get("token", "")
+def get_token(address: str) -> str:
+    """Return the token in an address; empty if it has none."""
+    return parse_query(address).get("token", "")
 
 
-def cookies_of(headers: Iterable[str]) -> dict[str, str]:
+def parse_cookies(headers: Iterable[str]) -> dict[str, str]:
+    """Return the cookies of a request by their names; none if a header is invalid."""
     try:
-        return {name: each.value for name, each in SimpleCookie("; ".join(headers)).items()}
+        cookies = SimpleCookie("; ".join(headers))
     except CookieError:
         return {}
+    return {name: cookie.value for name, cookie in cookies.items()}
 
 
-def same(token: str, other: str) -> bool:
-    """Compare in a time that tells nothing of where they differ."""
+def are_equal(token: str, other: str) -> bool:
+    """Compare two tokens in a time that does not depend on where they differ."""
     return hmac.compare_digest(token.encode(errors="replace"), other.encode())

@@ -1,10 +1,10 @@
-"""Files of a served window: only those below the folder that was named, whatever is typed in the window."""
+"""Restriction of a process to the files below one folder, whatever a visitor types in a served window."""
 
 import os
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -17,17 +17,18 @@ from robocov.errors import InputError
 from robocov.files.array_files import ArrayCache
 from robocov.mapfile import list_bundled_maps
 
-# Python's audit events, and which of their arguments are paths
-_READING = ("os.listdir", "os.scandir")
-_EVENTS = {
-    **dict.fromkeys((*_READING, "open", "os.mkdir", "os.rmdir", "os.remove"), 1),
+_READING_EVENTS = ("os.listdir", "os.scandir")
+_PATH_COUNTS = {
+    **dict.fromkeys((*_READING_EVENTS, "open", "os.mkdir", "os.rmdir", "os.remove"), 1),
     **dict.fromkeys(("os.truncate", "os.chmod", "os.utime"), 1),
     **dict.fromkeys(("os.rename", "os.link", "os.symlink"), 2),
 }
-_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+"""Python's audit events, and how many of their first arguments are paths."""
+_WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+_SYSTEM_FOLDERS = ("/dev", "/proc", "/usr/share")
 
-_read: tuple[Path, ...] | None = None  # None: everything is allowed
-_written: tuple[Path, ...] = ()
+_readable: tuple[Path, ...] | None = None  # None: no restriction
+_writable: tuple[Path, ...] = ()
 
 
 class OutsideError(InputError, PermissionError):
@@ -35,47 +36,67 @@ class OutsideError(InputError, PermissionError):
 
 
 def _audit(event: str, arguments: tuple[Any, ...]) -> None:
-    if _read is None or event not in _EVENTS:
+    """Raise OutsideError if an event of Python's audit hook is about a file that is not allowed."""
+    if _readable is None or event not in _PATH_COUNTS:
         return
-    reads = event in _READING or (event == "open" and not (arguments[2] or 0) & _WRITES)
-    for given in arguments[: _EVENTS[event]]:
-        if not isinstance(given, str | bytes | os.PathLike):
-            continue  # what is open already
-        path = Path(os.path.realpath(os.fsdecode(given)))
-        compiled = "__pycache__" in path.parts
-        if not any(path.is_relative_to(root) for root in (_read if reads or compiled else _written)):
-            raise OutsideError(f"{os.fsdecode(given)}: outside of the folder that is served")
+    is_reading = event in _READING_EVENTS
+    if event == "open" and not (arguments[2] or 0) & _WRITE_FLAGS:
+        is_reading = True
+    for argument in arguments[: _PATH_COUNTS[event]]:
+        if not isinstance(argument, str | bytes | os.PathLike):
+            continue  # The number of a file that is already open.
+        path = Path(os.path.realpath(os.fsdecode(argument)))
+        is_compiled_code = "__pycache__" in path.parts
+        roots = _readable if is_reading or is_compiled_code else _writable
+        if not any(path.is_relative_to(root) for root in roots):
+            raise OutsideError(f"{os.fsdecode(argument)}: outside of the folder that is served")
 
 
 @cache
 def _add_hook() -> None:
-    sys.addaudithook(_audit)  # for the rest of the process
+    sys.addaudithook(_audit)  # Hooks cannot be removed.
 
 
 @contextmanager
-def confined(folder: Path) -> Iterator[None]:
-    """Let the process read and write files only below a folder, and read those that programs consist of.
+def confine_files(folder: Path) -> Iterator[None]:
+    """Let the process read and write only files below a folder, and read the files of programs.
 
-    Python itself asks: what is typed, named in a session or linked to is held to this. Raises OutsideError.
+    The restriction holds for every file that Python opens, whether it is typed, named in a session or linked.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    OutsideError
+        Where another file is opened.
     """
-    global _read, _written
+    global _readable, _writable
     _add_hook()
-    programs = *sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, "/dev", "/proc", "/usr/share"
-    packages = (Path(str(module.__file__)).parent for module in (robocov, robocov_app))
-    places: tuple[str | Path, ...] = (
-        *programs,
-        *packages,
-        *(path.parent for path in list_bundled_maps().values()),
-    )
+    programs = _list_program_folders()
     arrays = ArrayCache.open_default()
-    caches = [each for each in (open_cache_folder(), arrays and arrays.folder) if each]
-    before = tempfile.tempdir
-    with tempfile.TemporaryDirectory(prefix="robocov-") as own:
-        tempfile.tempdir = own
-        ours: tuple[str | Path, ...] = folder, own, os.devnull, "/dev/shm", *caches
-        _written = tuple(Path(os.path.realpath(each)) for each in ours)
-        _read = (*_written, *(Path(os.path.realpath(each)) for each in places))
+    caches = [
+        cache_folder for cache_folder in (open_cache_folder(), arrays and arrays.folder) if cache_folder
+    ]
+    previous_temporary_folder = tempfile.tempdir
+    with tempfile.TemporaryDirectory(prefix="robocov-") as temporary_folder:
+        tempfile.tempdir = temporary_folder
+        _writable = _resolve_all([folder, temporary_folder, os.devnull, "/dev/shm", *caches])
+        _readable = (*_writable, *_resolve_all(programs))
         try:
             yield
         finally:
-            _read, tempfile.tempdir = None, before
+            _readable = None
+            tempfile.tempdir = previous_temporary_folder
+
+
+def _list_program_folders() -> list[str | Path]:
+    """Return the folders of Python, its packages, the system's data and the bundled maps."""
+    packages = [Path(str(module.__file__)).parent for module in (robocov, robocov_app)]
+    maps = [path.parent for path in list_bundled_maps().values()]
+    return [*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, *_SYSTEM_FOLDERS, *packages, *maps]
+
+
+def _resolve_all(paths: Iterable[str | Path]) -> tuple[Path, ...]:
+    return tuple(Path(os.path.realpath(path)) for path in paths)

@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from robocov_app.terminal.output import echo
-from robocov_app.web.access import listening_failed
+from robocov_app.web.access import build_listen_error
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
@@ -109,7 +109,7 @@ class Listener:
                 logger=logger,
             )
         except OSError as error:
-            raise listening_failed(host, port, error) from None
+            raise build_listen_error(host, port, error) from None
         found: int = self._server.sockets[0].getsockname()[1]
         return found
 

@@ -24,7 +24,7 @@ from urllib.parse import quote, unquote, urlencode, urlsplit
 
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
 from robocov_app.terminal.interruption import block_interrupts, unblock_interrupts
-from robocov_app.web.access import cookies_of, link_to, query_of, same, token_in
+from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
     FAULT,
     NOT_UNDERSTOOD,
@@ -167,7 +167,7 @@ class Sessions:
                 loop.add_signal_handler(number, task.cancel)
         try:
             self._spare = await self._open(self._folders.create())  # reports at once what is wrong
-            tell(f"open {link_to(host, port, self.token)}")
+            tell(f"open {build_link(host, port, self.token)}")
             while True:
                 await asyncio.sleep(LOOKING_INTERVAL_S)
                 self._look_after()
@@ -192,9 +192,9 @@ class Sessions:
     async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for the page or a file; None lets a socket be opened."""
         path = request.path.partition("?")[0]
-        given = token_in(request.path)
+        given = get_token(request.path)
         kept = self._kept_token(request)
-        if same(given, self.token) and path.endswith("/"):
+        if are_equal(given, self.token) and path.endswith("/"):
             return self._admit(connection, kept)
         token = self._visitor_token(request)
         if not token:
@@ -224,11 +224,11 @@ class Sessions:
         return response
 
     def _kept_token(self, request: Request) -> str:
-        return cookies_of(request.headers.get_all("Cookie")).get(self._folders.cookie, "")
+        return parse_cookies(request.headers.get_all("Cookie")).get(self._folders.cookie, "")
 
     def _visitor_token(self, request: Request) -> str:
         """Return the token of the visitor who sends a request; empty if this server let in nobody such."""
-        for token in (token_in(request.path), self._kept_token(request)):
+        for token in (get_token(request.path), self._kept_token(request)):
             if is_signed(token, self.token):
                 return token
         return ""
@@ -266,7 +266,7 @@ class Sessions:
         session.n_pages += 1
         try:
             window = await asyncio.shield(session.opening)
-            await self._carry(connection, window, query_of(request.path).get("page", ""))
+            await self._carry(connection, window, parse_query(request.path).get("page", ""))
         except RobocovError as error:
             if self._sessions.get(visitor) is session and not self._is_ending:
                 del self._sessions[visitor]
@@ -419,7 +419,7 @@ class Sessions:
                 text = await asyncio.to_thread(_receive_line, receiver)
             word, _, link = text.strip().partition(" ")
             if word == "open":
-                return Window(process, folder, urlsplit(link).port or 0, token_in(link))
+                return Window(process, folder, urlsplit(link).port or 0, get_token(link))
             process.terminate()
             with suppress(OSError):
                 folder.rmdir()  # only if it is empty

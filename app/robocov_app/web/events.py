@@ -10,7 +10,11 @@ from pygame.event import Event
 
 from robocov_app.toolkit import clipboard
 
-SMALLEST, LARGEST, MOST_PIXELS = 200, 7680, 4096 * 2304  # a page's sides, and its area, in pixels
+MIN_PAGE_SIDE_PX, MAX_PAGE_SIDE_PX, MAX_PAGE_PIXELS = (
+    200,
+    7680,
+    4096 * 2304,
+)  # a page's sides, and its area, in pixels
 
 MAX_UPLOAD_BYTES = 1 << 24
 _STRIPPED_CATEGORIES = ("Cc", "Cs")
@@ -54,23 +58,23 @@ class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-class _OfHands(_Message):
+class _HeldMessage(_Message):
     held: int = Field(default=0, ge=0, le=15)  # Shift 1, Ctrl 2, Alt 4, Meta 8
 
 
-class _OfPointer(_OfHands):
+class _PointerMessage(_HeldMessage):
     x: _Pixel
     y: _Pixel
 
 
-class PointerMoved(_OfPointer):
+class PointerMoved(_PointerMessage):
     """The pointer is elsewhere; `button` is held meanwhile, 0 for none."""
 
     kind: Literal["move"]
     button: int = Field(default=0, ge=0, le=3)
 
 
-class ButtonChanged(_OfPointer):
+class ButtonChanged(_PointerMessage):
     """A button of the mouse is pressed, or let go."""
 
     kind: Literal["button"]
@@ -78,7 +82,7 @@ class ButtonChanged(_OfPointer):
     down: bool
 
 
-class WheelTurned(_OfPointer):
+class WheelTurned(_PointerMessage):
     """The wheel is turned by notches."""
 
     kind: Literal["wheel"]
@@ -86,7 +90,7 @@ class WheelTurned(_OfPointer):
     up: _Turn
 
 
-class KeyChanged(_OfHands):
+class KeyChanged(_HeldMessage):
     """A key is pressed or let go; `key` is its name in browsers, empty if it was a control character."""
 
     kind: Literal["key"]
@@ -119,13 +123,13 @@ class PageChanged(_Message):
     """Size of the page in the device's pixels, how many of these are one of CSS, and its colours."""
 
     kind: Literal["page"]
-    width: int = Field(ge=SMALLEST, le=LARGEST)
-    height: int = Field(ge=SMALLEST, le=LARGEST)
+    width: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
+    height: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
     ratio: float = Field(ge=0.25, le=8.0)
     dark: bool
 
 
-class PictureShown(_Message):
+class FrameShown(_Message):
     """A picture has arrived."""
 
     kind: Literal["shown"]
@@ -161,9 +165,9 @@ class Uploaded(_Message):
     path: str
 
 
-OfHands = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
+InputMessage = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
 """Messages of hands to a window."""
-Message = OfHands | PageChanged | PictureShown | Control | Named | UploadStarted
+Message = InputMessage | PageChanged | FrameShown | Control | Named | UploadStarted
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
 _NAMED_ALIKE = [
     *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
@@ -177,13 +181,13 @@ _UNSHIFTED = str.maketrans('!@#$%^&*()_+{}|:"<>?~', "1234567890-=[]\\;',./`")
 _MODIFIERS = (pygame.KMOD_LSHIFT, pygame.KMOD_LCTRL, pygame.KMOD_LALT, pygame.KMOD_LMETA)
 
 
-class Hands:
+class EventTranslator:
     """Turns what hands do to the page into pygame's events."""
 
     def __init__(self) -> None:
         self._at, self._pressed = (0, 0), 0
 
-    def events(self, message: OfHands | Uploaded) -> Iterator[Event]:
+    def events(self, message: InputMessage | Uploaded) -> Iterator[Event]:
         match message:
             case PointerMoved():
                 yield self._moved(message.x, message.y, message.button)
@@ -199,17 +203,17 @@ class Hands:
                 turned |= {"precise_x": right, "precise_y": up}
                 yield Event(pygame.MOUSEWHEEL, **turned, flipped=False, touch=False)
             case KeyChanged():
-                yield from _key(message)
+                yield from _translate_key(message)
             case TextTyped():
                 for character in message.text:
                     # a telephone's keyboard writes a line break where another presses Enter
                     key = {"\n": "Enter", "\t": "Tab"}.get(character, character)
-                    yield from _key(KeyChanged(kind="key", key=key, down=True))
-                    yield from _key(KeyChanged(kind="key", key=key, down=False))
+                    yield from _translate_key(KeyChanged(kind="key", key=key, down=True))
+                    yield from _translate_key(KeyChanged(kind="key", key=key, down=False))
             case TextPasted():
                 clipboard.put(message.text)
                 for down in (True, False):
-                    yield from _key(KeyChanged(kind="key", key="v", down=down, held=2))
+                    yield from _translate_key(KeyChanged(kind="key", key="v", down=down, held=2))
             case Uploaded():
                 yield Event(pygame.DROPFILE, file=message.path)
             case Left():
@@ -225,11 +229,11 @@ class Hands:
         return Event(pygame.MOUSEMOTION, pos=self._at, rel=rel, buttons=buttons, touch=False)
 
 
-def modifiers(held: int) -> int:
+def get_modifiers(held: int) -> int:
     return sum(mask for k, mask in enumerate(_MODIFIERS) if held >> k & 1)
 
 
-def _key(message: KeyChanged) -> Iterator[Event]:
+def _translate_key(message: KeyChanged) -> Iterator[Event]:
     name, held = message.key, message.held
     if not name:
         return
@@ -240,7 +244,7 @@ def _key(message: KeyChanged) -> Iterator[Event]:
             return  # keys that neither write nor mean anything here
         plain = name.lower().translate(_UNSHIFTED) if held & 1 else name.lower()
         code = ord(plain) if len(plain) == 1 and plain.isascii() else 0
-    pressed: dict[str, Any] = {"key": code, "mod": modifiers(held), "unicode": writes, "scancode": 0}
+    pressed: dict[str, Any] = {"key": code, "mod": get_modifiers(held), "unicode": writes, "scancode": 0}
     yield Event(pygame.KEYDOWN if message.down else pygame.KEYUP, **pressed)
     if message.down and writes:
         yield Event(pygame.TEXTINPUT, text=writes)

@@ -1,4 +1,4 @@
-"""Frames of a window, and what is sent of them to pages that have an earlier one."""
+"""Frames of a window, and their differences, which are sent to pages."""
 
 from __future__ import annotations
 
@@ -16,16 +16,26 @@ if TYPE_CHECKING:
 
 HEADER = struct.Struct("<I7H")
 """Number, width, height; left, top, width and height of what changed; 1 if the frame starts from black."""
-MAX_BASES_BYTES = 1 << 27  # of frames that are kept because some page has them
-_COMPRESSION_LEVEL = 1  # the quickest; most of a change is zeros
+MAX_BASES_BYTES = 1 << 27
+"""Memory of the frames that are kept because a page shows them."""
+_COMPRESSION_LEVEL = 1
+"""The fastest one, as most of a difference is zeros."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Pixels of the window at one moment; `number` grows from frame to frame, from 1."""
+    """The pixels of the window at one time.
+
+    Attributes
+    ----------
+    number : int
+        Increases from frame to frame, starting at 1.
+    pixels : (height, width) array of uint32
+        Colors as 0xRRGGBB.
+    """
 
     number: int
-    pixels: NDArray[np.uint32]  # (height, width), 0xRRGGBB
+    pixels: NDArray[np.uint32]
 
     @classmethod
     def from_surface(cls, surface: pygame.Surface, number: int) -> Frame:
@@ -40,9 +50,9 @@ class Frame:
 def encode_frame(frame: Frame, base: Frame | None) -> bytes:
     """Encode a frame for a browser that shows another one.
 
-    The pixels are those of the smallest box around all that changed, xor those that were there: what stays
-    is 0, which deflate compresses to almost nothing. Text stays as sharp as it is in the window, and all
-    this is several times quicker than PNG.
+    The pixels of the smallest box around all changes are combined with the previous ones by xor: unchanged
+    pixels become 0, which deflate compresses to almost nothing. Text stays as sharp as in the window, and
+    this is several times faster than PNG.
 
     Parameters
     ----------
@@ -62,20 +72,22 @@ def encode_frame(frame: Frame, base: Frame | None) -> bytes:
     change = pixels if base is None or starts_from_black else pixels ^ base.pixels
     rows = np.flatnonzero(change.any(axis=1))
     columns = np.flatnonzero(change.any(axis=0))
-    left, top, right, bottom = 0, 0, 0, 0
+    left = top = box_width = box_height = 0
     if len(rows):
-        left, top, right, bottom = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
-    box: Any = np.ascontiguousarray(change[top:bottom, left:right])
-    header = HEADER.pack(
-        frame.number % 2**32, width, height, left, top, right - left, bottom - top, starts_from_black
-    )
+        left = columns[0]
+        top = rows[0]
+        box_width = columns[-1] + 1 - left
+        box_height = rows[-1] + 1 - top
+    box: Any = np.ascontiguousarray(change[top : top + box_height, left : left + box_width])
+    number = frame.number % 2**32
+    header = HEADER.pack(number, width, height, left, top, box_width, box_height, starts_from_black)
     return header + zlib.compress(box, _COMPRESSION_LEVEL)
 
 
 class BaseFrames:
-    """The frames that pages have, within a bound on the memory of all of them.
+    """The frames that pages show, within a limit on their memory.
 
-    A page whose frame had to be given up gets the next one from black.
+    A page whose frame was dropped gets the next one from black.
     """
 
     def __init__(self, max_bytes: int = MAX_BASES_BYTES) -> None:
@@ -87,20 +99,20 @@ class BaseFrames:
 
     @property
     def n_bytes(self) -> int:
-        """Memory of the frames that are kept, in bytes."""
+        """Memory of the frames, bytes."""
         return sum(frame.pixels.nbytes for frame in self._frames.values())
 
     def add(self, frame: Frame) -> None:
-        """Keep a frame that is sent to a page; give up the oldest ones if that is too much."""
+        """Keep a frame that is sent to a page; drop the oldest ones if they need too much memory."""
         self._frames[frame.number] = frame
         while self.n_bytes > self._max_bytes and len(self._frames) > 1:
             self._frames.popitem(last=False)
 
     def get(self, number: int) -> Frame | None:
-        """Return the frame of a number; None if it is not kept."""
+        """Return the frame with a number; None if it was dropped."""
         return self._frames.get(number)
 
     def keep_only(self, numbers: set[int]) -> None:
-        """Give up all frames that no page has any more."""
+        """Drop all frames except those with these numbers."""
         for number in [number for number in self._frames if number not in numbers]:
             del self._frames[number]

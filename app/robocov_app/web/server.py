@@ -29,7 +29,7 @@ from robocov.errors import InputError
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.input import shown_cursor
 from robocov_app.web import events
-from robocov_app.web.access import cookies_of, link_to, query_of, same, token_in
+from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
     NOT_UNDERSTOOD,
     REPLACED,
@@ -134,14 +134,14 @@ class WebDisplay:
         # the window's side
         self._wanted: events.PageChanged | None = None
         self._given: events.PageChanged | None = None
-        self._hands = events.Hands()
+        self._hands = events.EventTranslator()
         self._held = 0
         self._narrow = False
         self._saved: tuple[str, ...] = ()
         self._saved_looked_at = 0.0
         self._started_at = time()
         # what both sides use
-        self._waiting: deque[events.OfHands | events.Uploaded] = deque()
+        self._waiting: deque[events.InputMessage | events.Uploaded] = deque()
         self._frame: Frame | None = None
         # also a page that is there before the first frame gets all of it
         self._state: dict[str, Any] = {"cursor": "default", "title": "robocov", "saved": ()}
@@ -172,8 +172,8 @@ class WebDisplay:
         self._started.wait()
         if self._trouble is not None:
             raise self._trouble
-        self.link = link_to(self.host, self.port, self.token)
-        self.watch_link = link_to(self.host, self.port, self.watch_token)
+        self.link = build_link(self.host, self.port, self.token)
+        self.watch_link = build_link(self.host, self.port, self.watch_token)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -198,7 +198,7 @@ class WebDisplay:
                     self._called.set()
                     return
                 self._held = held
-                pygame.key.set_mods(events.modifiers(held))
+                pygame.key.set_mods(events.get_modifiers(held))
             for event in self._hands.events(self._waiting.popleft()):
                 pygame.event.post(event)
                 posted = True
@@ -273,11 +273,11 @@ class WebDisplay:
             return await self._download(connection, name)
         if not path.endswith("/"):
             return respond(connection, HTTPStatus.NOT_FOUND, "Nothing is there.\n")
-        given = token_in(request.path)
-        kept = cookies_of(request.headers.get_all("Cookie")).get(self._cookie, "")
+        given = get_token(request.path)
+        kept = parse_cookies(request.headers.get_all("Cookie")).get(self._cookie, "")
         is_given = self._is_known(given)
         # who controls may look at what others see
-        replaces = is_given and not same(kept, self.token)
+        replaces = is_given and not are_equal(kept, self.token)
         cookie = f"{self._cookie}={given}" if replaces else ""
         return respond_with_page(connection, may_be_framed=is_given, cookie=cookie)
 
@@ -295,19 +295,19 @@ class WebDisplay:
         task.add_done_callback(self._background.discard)
 
     def _token_of(self, request: Request) -> str:
-        cookies = cookies_of(request.headers.get_all("Cookie"))
-        return token_in(request.path) or cookies.get(self._cookie, "")
+        cookies = parse_cookies(request.headers.get_all("Cookie"))
+        return get_token(request.path) or cookies.get(self._cookie, "")
 
     def _is_known(self, token: str) -> bool:
-        return same(token, self.token) or same(token, self.watch_token)
+        return are_equal(token, self.token) or are_equal(token, self.watch_token)
 
     # Pages come, take control, and go.
 
     async def _talk(self, connection: ServerConnection) -> None:
         """Exchange messages with a page as long as its connection lasts."""
         assert connection.request is not None
-        is_teacher = same(self._token_of(connection.request), self.token)
-        page_id = query_of(connection.request.path).get("page", "")
+        is_teacher = are_equal(self._token_of(connection.request), self.token)
+        page_id = parse_query(connection.request.path).get("page", "")
         earlier = self._find_page(page_id, is_teacher)
         if earlier is None and not is_teacher:
             watchers = [page for page in self._pages if not page.is_teacher]
@@ -429,7 +429,7 @@ class WebDisplay:
         return 1.0
 
     def _take(self, page: Page, message: events.Message) -> None:
-        if isinstance(message, events.PictureShown):
+        if isinstance(message, events.FrameShown):
             while page.in_flight and page.in_flight.popleft() != message.number:
                 pass
             self._stirred.set()
@@ -439,7 +439,7 @@ class WebDisplay:
             page.name = "".join(filter(str.isprintable, message.name)).strip() or page.name
             self._update_people()
         elif isinstance(message, events.PageChanged):
-            if message.width * message.height > events.MOST_PIXELS:
+            if message.width * message.height > events.MAX_PAGE_PIXELS:
                 raise ValueError("page too large")
             page.size = message
             if page is self._control:

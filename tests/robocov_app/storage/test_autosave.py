@@ -21,7 +21,7 @@ from robocov_app.storage.autosave import (
     is_open_elsewhere,
     remove_draft,
 )
-from robocov_app.web.confined import confined
+from robocov_app.web.confined import confine_files
 
 KIND = "robocov-test"
 
@@ -289,7 +289,7 @@ def test_drafts_are_removed_where_only_one_folder_may_be_used(tmp_path, folder):
     keeper = Autosaver(folder, KIND)
     keeper.save_draft(lambda: {"work": 1})
     assert keeper.flush()
-    with confined(folder):
+    with confine_files(folder):
         keeper.close(discard=True)
     assert list(folder.iterdir()) == []
 

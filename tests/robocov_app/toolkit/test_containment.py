@@ -21,7 +21,7 @@ from robocov_app.toolkit.input import clean_event
 from robocov_app.toolkit.text_edit import MAX_CHARS, TextEdit
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.session.session import Session
-from robocov_app.web.events import MESSAGES, Hands
+from robocov_app.web.events import MESSAGES, EventTranslator
 
 CONTROLS = "".join(map(chr, [*range(32), *range(127, 160)])) + "\u202e\u2066\udcff"
 
@@ -166,7 +166,7 @@ def test_no_control_character_comes_in(tmp_path: Path) -> None:
         set_title(f"a{CONTROLS}b")
         assert pygame.display.get_caption()[0] == "ab"
         message = MESSAGES.validate_json(json.dumps({"kind": "paste", "text": "a\x00b"}))
-        assert list(Hands().events(message))
+        assert list(EventTranslator().events(message))
         assert clipboard.get() == "ab"
 
 

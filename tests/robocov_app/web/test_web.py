@@ -25,15 +25,15 @@ from robocov.mapfile import load_map
 from robocov_app.cli import main
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.input import key_of
-from robocov_app.web.confined import OutsideError, confined
+from robocov_app.web.confined import OutsideError, confine_files
 from robocov_app.web.events import (
     MAX_UPLOAD_BYTES,
     MESSAGES,
     Control,
-    Hands,
+    EventTranslator,
+    FrameShown,
     Named,
     PageChanged,
-    PictureShown,
     PointerMoved,
     Uploaded,
     UploadStarted,
@@ -87,7 +87,7 @@ def test_a_picture_without_a_change_is_empty():
 )
 def test_keys_have_the_names_that_the_window_knows(key, held, name):
     told = json.dumps({"kind": "key", "key": key, "down": True, "held": held})
-    event = next(Hands().events(MESSAGES.validate_json(told)))
+    event = next(EventTranslator().events(MESSAGES.validate_json(told)))
     assert key_of(event) == name
 
 
@@ -110,8 +110,8 @@ def test_whatever_a_page_tells_is_understood_or_refused(told):
         message = MESSAGES.validate_json(json.dumps(told))
     except ValueError:
         return
-    if not isinstance(message, PageChanged | PictureShown | Control | Named | UploadStarted):
-        for event in Hands().events(message):
+    if not isinstance(message, PageChanged | FrameShown | Control | Named | UploadStarted):
+        for event in EventTranslator().events(message):
             assert event.type
 
 
@@ -280,7 +280,7 @@ def test_a_page_that_lost_its_line_is_known_again(display):
 
 
 def test_what_is_held_is_let_go_when_control_passes():
-    hands, at = Hands(), {"kind": "button", "x": 5, "y": 6, "button": 1}
+    hands, at = EventTranslator(), {"kind": "button", "x": 5, "y": 6, "button": 1}
     told = ({**at, "down": True}, {"kind": "blur"}, {"kind": "blur"})
     found = [[each.type for each in hands.events(MESSAGES.validate_json(json.dumps(one)))] for one in told]
     assert found[1:] == [[pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST], [pygame.WINDOWFOCUSLOST]]
@@ -525,7 +525,7 @@ CONTROL_CHARACTERS = st.text(
 def test_events_of_a_window_have_no_control_characters(text, kind):
     told = {"kind": kind, "key": text, "down": True} if kind == "key" else {"kind": kind, "text": text}
     message = MESSAGES.validate_json(json.dumps(told))
-    for event in Hands().events(message):
+    for event in EventTranslator().events(message):
         written = getattr(event, "unicode", "") + getattr(event, "text", "")
         assert all(unicodedata.category(each) != "Cc" for each in written)
     if kind == "paste":
@@ -534,7 +534,7 @@ def test_events_of_a_window_have_no_control_characters(text, kind):
 
 def test_a_telephones_line_break_is_enter():
     message = MESSAGES.validate_json(json.dumps({"kind": "text", "text": "7\n"}))
-    keys = [event.key for event in Hands().events(message) if event.type == pygame.KEYDOWN]
+    keys = [event.key for event in EventTranslator().events(message) if event.type == pygame.KEYDOWN]
     assert keys == [pygame.K_7, pygame.K_RETURN]
 
 
@@ -642,7 +642,7 @@ def test_served_window_uses_the_caches_of_kernels_and_arrays(tmp_path, monkeypat
     try:
         kernels = open_cache_folder()
         (tmp_path / "folder").mkdir()
-        with confined(tmp_path / "folder"):
+        with confine_files(tmp_path / "folder"):
             (tmp_path / "arrays").mkdir()
             for folder in (kernels, tmp_path / "arrays"):
                 (folder / "entry").write_text("")
@@ -656,7 +656,7 @@ def test_a_served_window_reads_and_writes_below_its_folder_alone(tmp_path):
     outside.write_text("{}")
     (folder / "link.json").symlink_to(outside)
     (folder / "own.json").write_text("{}")
-    with confined(folder):
+    with confine_files(folder):
         assert (folder / "own.json").read_text() == "{}"
         (folder / "new").mkdir()
         (folder / "new/other.json").write_text("{}")
