@@ -29,9 +29,12 @@ from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, MAX_POINTS, s
 from robocov_app.formats.geometry.shapes import Shapes, WallLine
 from robocov_app.formats.options import ReadOptions
 
-MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
-MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
-MOST_DRAWN = 200_000  # that are drawn, blocks and all
+MAX_LINES = 8_000_000
+"""Largest number of lines of text: a line of the drawing takes about 24, a vertex 4."""
+MAX_ENTITIES = 50_000
+"""Largest number of entities on all layers: ezdxf takes an eighth of a millisecond and 5 kB for each."""
+MAX_DRAWN_ENTITIES = 200_000
+"""Largest number of entities drawn, including those of inserted blocks."""
 UNITS = {  # of the header's $INSUNITS, with their metres
     1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
     5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
@@ -92,7 +95,7 @@ def flat(points: Sequence[Any]) -> Array:
 
 
 class DxfDrawing:
-    """Goes through the entities and adds them to the shapes; `scale` is metres a unit."""
+    """Adds the entities of a drawing to the shapes; `scale` is the size of a unit in metres."""
 
     def __init__(self, document: Any, shapes: Shapes, scale: float) -> None:
         self.document, self.where, self.shapes, self.scale = document, shapes.where, shapes, scale
@@ -103,6 +106,7 @@ class DxfDrawing:
         self._hidden = {str(layer.dxf.name).casefold() for layer in hidden}
 
     def draw(self) -> None:
+        """Add all entities of the model space to the shapes."""
         space = self.document.modelspace()
         self._require_few(space)
         self._draw(space, "0", ())
@@ -134,17 +138,17 @@ class DxfDrawing:
             return max(rows, 1) * max(columns, 1) * (1 + counted[name])
 
         total = count(space)
-        if total > MOST_DRAWN:
+        if total > MAX_DRAWN_ENTITIES:
             # of blocks in blocks it may be too many for a float
             found = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
-            raise MapError(f"{where}: expected at most {MOST_DRAWN}, got {found}")
+            raise MapError(f"{where}: expected at most {MAX_DRAWN_ENTITIES}, got {found}")
 
     def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
         """Add entities; those on layer 0 of a block are on the layer that it is inserted on."""
         for entity in entities:
             self.drawn += 1
-            if self.drawn > MOST_DRAWN:
-                raise MapError(f"{self.where}: expected at most {MOST_DRAWN} entities, got more")
+            if self.drawn > MAX_DRAWN_ENTITIES:
+                raise MapError(f"{self.where}: expected at most {MAX_DRAWN_ENTITIES} entities, got more")
             try:
                 own = str(entity.dxf.get("layer", "0"))
                 self._one(entity, layer if own == "0" and blocks else own, blocks)
@@ -195,7 +199,7 @@ class DxfDrawing:
             shapes.leave_out(to_one_line(kind)[:40])
 
     def _metres(self, points: Sequence[Any]) -> Array:
-        """Return points of the drawing as (k, 2) m; third coordinates are told of."""
+        """Return points of the drawing as (k, 2) m; third coordinates are counted."""
         heights = np.array([point[2] if len(point) > 2 else 0.0 for point in points])
         self.shapes.tally.add_heights(heights[heights != 0.0])
         return flat(points) * self.scale
@@ -282,6 +286,13 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read a drawing.
+
+    Raises
+    ------
+    MapError
+        If the file is damaged, too large, or contains no map.
+    """
     where = to_one_line(path)
     document = _document(path, where)
     code = document.header.get("$INSUNITS", 0)
@@ -308,12 +319,12 @@ def _document(path: Path, where: str) -> Any:
             raise MapError(
                 f"{where}: expected a DXF with sections, got a file that begins with {content[:20]!r}"
             )
-        if sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1)) > MOST_ENTITIES:
-            raise MapError(f"{where}: expected at most {MOST_ENTITIES} entities, got more")
+        if sum(1 for _ in islice(_ENTITY.finditer(content), MAX_ENTITIES + 1)) > MAX_ENTITIES:
+            raise MapError(f"{where}: expected at most {MAX_ENTITIES} entities, got more")
         points = islice(_POINT.finditer(content), files.MAX_VERTICES + 1)
         files.require_vertices(sum(1 for _ in points), where)
-    if (lines := content.count(b"\n")) > MOST_LINES:
-        raise MapError(f"{where}: expected at most {MOST_LINES}, got {lines} lines")
+    if (lines := content.count(b"\n")) > MAX_LINES:
+        raise MapError(f"{where}: expected at most {MAX_LINES}, got {lines} lines")
     try:
         ezdxf, recover = import_optional("ezdxf", "dxf"), import_optional("ezdxf.recover", "dxf")
     except RobocovError as error:

@@ -1,11 +1,11 @@
 """Worlds of the simulator IR-SIM: https://ir-sim.readthedocs.io/en/stable/yaml_config/configuration.html.
 
-A YAML with the size of the ``world``, perhaps a picture of it, and groups of ``robot`` and ``obstacle``: so
-many of a shape, at given states [x, y, theta] or distributed.
+A YAML contains the size of the ``world``, optionally a picture of it, and groups of ``robot`` and
+``obstacle``: a number of objects of a shape, at given states [x, y, theta] or distributed.
 
-Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
-``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out and
-counted. The states of robots are a start.
+Obstacles are placed where they start, even if they move; lines are walls as wide as the option ``thickness``.
+Objects that collide with nothing, have random shapes or are distributed at random are left out and counted.
+The states of robots are starts.
 """
 
 from __future__ import annotations
@@ -32,16 +32,25 @@ from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outli
 from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.picture import describe_transparency, read_picture
 
-MOST_OBJECTS = 4_000  # robots and obstacles of a world
+MAX_OBJECTS = 4_000
+"""Largest number of robots and obstacles of a world."""
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
-_TRUE = ("true", "yes", "on", "1")
+_TRUE_WORDS = ("true", "yes", "on", "1")
 
 
 def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
     return path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read a world with its robots and obstacles.
+
+    Raises
+    ------
+    MapError
+        If the file is damaged, too large, or contains no map.
+    """
     where = to_one_line(path)
     shapes = Shapes(where, options)
     root = _Node(files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
@@ -49,7 +58,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     size = np.array([world["width"].length(10.0), world["height"].length(10.0)])
     corner = world["offset"].numbers([0.0, 0.0])[:2]
     free = MultiPolygon([shapely.box(*corner, *(corner + size))])
-    if world["obstacle_map"].given:
+    if world["obstacle_map"].is_given:
         light = _picture(world, path, shapes)
         width, height = (size / light.shape[::-1]).tolist()
         free = outline_free_cells(light, (width, height), (float(corner[0]), float(corner[1])), where)
@@ -61,8 +70,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         for group in root[kind].items(one=True):
             number = max(int(group["number"].number(1.0)), 0)
             count += number
-            if count > MOST_OBJECTS:
-                group["number"].refuse(f"a number of at most {MOST_OBJECTS} together")
+            if count > MAX_OBJECTS:
+                group["number"].refuse(f"a number of at most {MAX_OBJECTS} together")
             states = _states(group, number, corner + size / 2, float(size.min() / 2 - 0.5))
             if states is None:
                 shapes.leave_out(kind, "that IR-SIM places at random", number)
@@ -75,10 +84,10 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                 if kind == "robot":
                     shapes.robots.append((float(x), float(y)))
                 elif shapes.accept(labels):
-                    if group["unobstructed"].text().lower() in _TRUE:
+                    if group["unobstructed"].text().lower() in _TRUE_WORDS:
                         shapes.leave_out(kind, "that nothing collides with")
                         continue
-                    moving += group["kinematics"].given
+                    moving += group["kinematics"].is_given
                     figures = group["shape"].items(one=True) or [group["shape"]]
                     drawer.draw(figures[min(k, len(figures) - 1)], build_frame(x, y, turn), labels)
     if moving:
@@ -172,7 +181,7 @@ class _ShapeDrawer:
         files.require_shapes(self.count, self.shapes.where)
         name, at = shape["name"].text("circle").lower(), shape.at.partition(": ")[2]
         shift = np.array([shape["wheelbase"].number(0.0) / 2, 0.0])
-        if shape["random_shape"].text().lower() in _TRUE:
+        if shape["random_shape"].text().lower() in _TRUE_WORDS:
             self.shapes.leave_out("shape", "by chance")
         elif name == "circle":
             centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
@@ -204,24 +213,26 @@ class _ShapeDrawer:
 
 @dataclass(frozen=True)
 class _Node:
-    """A value of the file and its place; what is not given is None."""
+    """A value of the file and its position; None if the file does not contain it."""
 
     value: files.Value | None
     at: str
 
     @property
-    def given(self) -> bool:
+    def is_given(self) -> bool:
+        """Whether the file contains the value."""
         return self.value not in (None, "", "null", "~", "None", [], {})
 
     def __getitem__(self, name: str) -> _Node:
-        if self.given and not isinstance(self.value, dict):
+        """Return the value of a key in a mapping."""
+        if self.is_given and not isinstance(self.value, dict):
             self.refuse("a mapping (name: value)")
         place = self.at if self.at.endswith(": ") else f"{self.at}."
         return _Node(self.value.get(name) if isinstance(self.value, dict) else None, f"{place}{name}")
 
     def items(self, *, one: bool = False) -> list[_Node]:
         """Return the items of a list; where `one` is allowed, anything else is a list of it."""
-        if not self.given:
+        if not self.is_given:
             return []
         if isinstance(self.value, list):
             return [_Node(item, f"{self.at}[{k}]") for k, item in enumerate(self.value)]
@@ -230,27 +241,33 @@ class _Node:
         return [self]
 
     def text(self, default: str = "") -> str:
-        if not self.given:
+        """Return a text; raise MapError if it is a list or mapping."""
+        if not self.is_given:
             return default
         if not isinstance(self.value, str):
             self.refuse("one value")
         return self.value
 
     def number(self, default: float) -> float:
+        """Return a number; raise MapError if it is not one."""
         value = files.parse_number(self.text(str(default)))
         if not abs(value) <= MAX_COORDINATE_M:
             self.refuse("a number within 1e7")
         return value
 
     def length(self, default: float) -> float:
-        files.require_length(value := self.number(default), self.at)
+        """Return a positive length in metres; raise MapError if it is out of range."""
+        value = self.number(default)
+        files.require_length(value, self.at)
         return value
 
     def numbers(self, default: list[float]) -> Array:
+        """Return the numbers of a list; missing ones are as in `default`."""
         values = [item.number(0.0) for item in self.items()]
-        if self.given and len(values) < 2:
+        if self.is_given and len(values) < 2:
             self.refuse(f"a list of {len(default)} numbers")
         return np.array([*values, *default[len(values) :]])
 
-    def refuse(self, wanted: str) -> NoReturn:
-        raise MapError(f"{self.at}: expected {wanted}, got {quote(self.value)}")
+    def refuse(self, expected: str) -> NoReturn:
+        """Raise the MapError of this value."""
+        raise MapError(f"{self.at}: expected {expected}, got {quote(self.value)}")

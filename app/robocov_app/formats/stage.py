@@ -37,8 +37,12 @@ from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outli
 from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.picture import describe_transparency, read_picture
 
-MAX_BYTES = 5_000_000  # largest file of a world, and of all that it includes together, in bytes
-MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000  # words and numbers; models and blocks that macros make of them
+MAX_BYTES = 5_000_000
+"""Largest file of a world, and largest size of all included files together."""
+MAX_TOKENS = 200_000
+"""Largest number of words and numbers."""
+MAX_ENTITIES = 10_000
+"""Largest number of models and blocks, macros expanded."""
 _DARK = 127 / 255  # pixels that are not brighter are solid
 _TOKEN = re.compile(
     r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
@@ -54,8 +58,9 @@ class _Token(NamedTuple):
     text: str
     at: str
 
-    def refuse(self, wanted: str) -> NoReturn:
-        raise MapError(f"{self.at}: expected {wanted}, got {quote(self.text)}")
+    def refuse(self, expected: str) -> NoReturn:
+        """Raise the MapError of this token."""
+        raise MapError(f"{self.at}: expected {expected}, got {quote(self.text)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +73,11 @@ class _Entity:
     inside: list[_Entity] = field(default_factory=list)
 
     def text(self, name: str, default: str = "") -> str:
+        """Return the first value of a property."""
         return self.properties.get(name, [default])[0]
 
     def numbers(self, name: str, default: tuple[float, ...]) -> Array:
-        """Return the values of a property; those that are not written are as in `default`."""
+        """Return the values of a property as numbers; missing ones are as in `default`."""
         given = self.properties.get(name, [])[: len(default)]
         values = np.array([*map(files.parse_number, given), *default[len(given) :]])
         if not (np.abs(values) <= MAX_COORDINATE_M).all():
@@ -79,6 +85,7 @@ class _Entity:
         return values
 
     def number(self, name: str, default: float) -> float:
+        """Return the first value of a property as a number."""
         return float(self.numbers(name, (default,))[0])
 
 
@@ -98,6 +105,13 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read a world with its includes and bitmaps.
+
+    Raises
+    ------
+    MapError
+        If the file is damaged, too large, or contains no map.
+    """
     shapes = Shapes(to_one_line(path), options)
     world = _World(path, shapes)
     world.place(world.root.inside, np.eye(3))
@@ -160,8 +174,8 @@ class _World:
             if include:
                 self._include(token, including)
             elif token[:2] != ("word", "include"):
-                if len(self.tokens) >= MOST_TOKENS:
-                    what = f"more than {MOST_TOKENS} words and numbers"
+                if len(self.tokens) >= MAX_TOKENS:
+                    what = f"more than {MAX_TOKENS} words and numbers"
                     raise MapError(f"{token.at}: expected fewer, got {what}")
                 self.tokens.append(token)
             include = not include and token[:2] == ("word", "include")
@@ -245,8 +259,8 @@ class _World:
             if len(chain) > files.MAX_DEPTH:
                 raise MapError(f"{entity.at}: the model {quote(entity.type)} is made of itself")
         self.entities += 1 + sum(len(part.inside) for part in chain)
-        if self.entities > MOST_ENTITIES:
-            raise MapError(f"{entity.at}: expected at most {MOST_ENTITIES} models and blocks, got more")
+        if self.entities > MAX_ENTITIES:
+            raise MapError(f"{entity.at}: expected at most {MAX_ENTITIES} models and blocks, got more")
         whole = _Entity(chain[-1].type, entity.at)
         for part in reversed(chain):
             whole.properties.update(part.properties)

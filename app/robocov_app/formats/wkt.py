@@ -80,7 +80,8 @@ class WktText:
         self.srid: int | None = None
         self._figures: list[SourceGeometry] = []
 
-    def figures(self) -> list[SourceGeometry]:
+    def parse(self) -> list[SourceGeometry]:
+        """Return all geometries; raise MapError at the first mistake."""
         number = 0
         while self._skip_space() < len(self.text):
             if srid := _SRID.match(self.text, self.at):
@@ -227,10 +228,17 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read the geometries of a file.
+
+    Raises
+    ------
+    MapError
+        If the file is damaged, too large, or contains no map.
+    """
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
-    figures = convert_to_metres(parsed.figures(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
+    figures = convert_to_metres(parsed.parse(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
     if options.outlines is None and any(figure.kind == "polygon" for figure in figures):
         shapes.options = replace(options, outlines="free")
         figures = _exclude_holes(figures, shapes)
@@ -293,6 +301,13 @@ def _find_overlaps(
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    """Write the free space of an environment as polygons with holes.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
     digits = DEFAULT_DIGITS if options.digits is None else options.digits
     free = snap_to_grid(environment.free, digits)
     parts = [_text(part, digits) for part in free]

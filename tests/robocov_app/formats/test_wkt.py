@@ -240,6 +240,6 @@ _GEOMETRY = st.recursive(
 def test_coordinates_are_those_that_shapely_reads(geometry: Any, flat: bool) -> None:
     text = shapely.to_wkt(geometry, rounding_precision=-1)
     shapes = Shapes("plan", ReadOptions())
-    figures = WktText(text, "plan", shapes).figures()
+    figures = WktText(text, "plan", shapes).parse()
     found = [tuple(point) for figure in figures for ring in figure.rings for point in ring.tolist()]
     assert found == [tuple(point) for point in shapely.get_coordinates(shapely.from_wkt(text)).tolist()]
