@@ -20,7 +20,7 @@ from robocov_app.sweep.ledger import RUNS, Ledger
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.sweep.tasks import generate_tasks
-from robocov_app.sweep.worker import EFFORT, made_with
+from robocov_app.sweep.worker import EFFORT_FILE, list_result_versions
 from robocov_app.terminal.interruption import Interruption
 
 TRACKS_FOLDER = "tracks"
@@ -84,7 +84,7 @@ def run_benchmark(
         "suite": identify_suite(),
         "selection": {"quick": selection.quick, "tracks": selection.tracks, "maps": selection.maps},
         "entry": controller.describe(any_study),
-        "versions": made_with(),
+        "versions": list_result_versions(),
         "method": describe_method(),
     }
     _write_result(out / RESULT_FILE, result, rows)
@@ -106,7 +106,7 @@ def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:
         entry = ledger.entry(task)
         if entry is None:
             raise OutputError(f"{folder}: {task.name} was removed by somebody else")
-        effort_path = folder / RUNS / task.name / EFFORT
+        effort_path = folder / RUNS / task.name / EFFORT_FILE
         effort = effort_path.read_bytes() if effort_path.exists() else b"{}"
         yield build_row(track, task, entry, effort)
 

@@ -14,7 +14,7 @@ from robocov_app.sweep.ledger import difference_of
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Count, sweep_progress, worked_off
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import EFFORT, Outcome
+from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption
 
 RunKey: TypeAlias = tuple[str, str, int]
@@ -79,7 +79,7 @@ def verify_result(
 
     def compare(task: Task, outcome: Outcome) -> None:
         key = keys_by_name[task.name]
-        row = build_row(key[0], task, outcome, outcome.files.get(EFFORT, b"{}"))
+        row = build_row(key[0], task, outcome, outcome.files.get(EFFORT_FILE, b"{}"))
         differences.extend(_list_differences(key, rows[key], row))
 
     count = Count(len(sampled))

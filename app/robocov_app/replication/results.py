@@ -366,13 +366,12 @@ def worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: in
     for k in np.argsort(-there.of(contender.key, "gap"), kind="stable").tolist():
         if len(wanted) < count:
             wanted.setdefault(there.scenarios[k].map, there.scenarios[k])
-    environments = {each.name: each.environment for each in study.maps}
     records = {}
     for task in generate_tasks(study):
         scenario = Scenario(task.map, task.start, task.seed)
         own = task.controller == contender.controller and dict(task.gains) == contender.all_gains
         if own and scenario in wanted.values():
-            records[scenario] = worker.simulated(task, environments[task.map]).thin(10.0)
+            records[scenario] = worker.simulate(task).thin(10.0)
     return [(scenario, records[scenario]) for scenario in wanted.values()]
 
 

@@ -22,7 +22,7 @@ from robocov.optional_imports import import_optional
 from robocov_app.jobs.messages import READY, receive
 from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.sweep.tasks import Task
-from robocov_app.sweep.worker import Outcome, failed, perform
+from robocov_app.sweep.worker import Outcome, build_failure, perform
 from robocov_app.terminal.supervision import describe_status
 
 _ENDS = 2  # workers that may end through a task before it counts as failed
@@ -138,7 +138,7 @@ class Executor(ABC):
         if self._ends[task.name] < _ENDS:
             (self._backlog if lost.blamed else self._alone).appendleft(task)
             return None
-        return failed(lost.cause, lost.details)
+        return build_failure(lost.cause, lost.details)
 
 
 class LocalPool(Executor):
@@ -210,7 +210,7 @@ class _Worker:
             with self._starting:
                 if self._stopped:
                     break
-                process = start_process("robocov_app.sweep.worker:Performing", stderr=self.complaints)
+                process = start_process("robocov_app.sweep.worker:TaskService", stderr=self.complaints)
                 self._process = process
             assert process.stdout
             if receive(process.stdout) == READY:

@@ -17,7 +17,7 @@ from robocov.files.folder_lock import lock_folder
 from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import flush_to_disk
 from robocov_app.sweep.tasks import Task
-from robocov_app.sweep.worker import FIGURES, Outcome, made_with
+from robocov_app.sweep.worker import FIGURES, Outcome, list_result_versions
 from robocov_app.terminal.output import write_json
 
 RUNS = "runs"  # name of the folder of the runs' folders
@@ -154,8 +154,11 @@ class Ledger:
 
 def difference_of(versions: Mapping[str, str]) -> str:
     """Return how known versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``."""
-    differing = {name: here for name, here in made_with().items() if versions.get(name, here) != here}
-    return ", ".join(f"{name} {versions[name]} instead of {here}" for name, here in differing.items())
+    differences = []
+    for name, current in list_result_versions().items():
+        if versions.get(name, current) != current:
+            differences.append(f"{name} {versions[name]} instead of {current}")
+    return ", ".join(differences)
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from robocov_app.sweep.ledger import Ledger, difference_of, opened
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import Outcome, perform, prepared
+from robocov_app.sweep.worker import Outcome, perform, prepare_cost
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import echo, format_json
 
@@ -301,7 +301,7 @@ def rehearsed(
     survey = Ledger(folder).survey(generate_tasks(study), **again)
     left = sum(survey.todo)
     chosen = next(compress(generate_tasks(study), survey.todo), None) or next(generate_tasks(study))
-    prepared(chosen)  # once for all runs on a map
+    prepare_cost(chosen)  # once for all runs on a map
     began = time.perf_counter()
     outcome = perform(chosen)
     seconds, size = time.perf_counter() - began, sum(map(len, outcome.files.values()))

@@ -20,7 +20,7 @@ from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
 from robocov_app.sweep.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.tasks import Task
-from robocov_app.sweep.worker import FIGURES, TIMED
+from robocov_app.sweep.worker import FIGURES, MEAN_TIME
 from robocov_app.terminal.output import format_csv_line
 
 PARQUET = "results.parquet"
@@ -50,7 +50,9 @@ _AFTER = (
     Column("run", "string", "", "the run's folder in runs/"),
     Column("error", "string", "", "why the run failed, null if it did not"),
 )
-_TIME = Column(TIMED, "double", "s", "mean time until the first robot is at a place, each at its top speed")
+_TIME = Column(
+    MEAN_TIME, "double", "s", "mean time until the first robot is at a place, each at its top speed"
+)
 _METRICS = (
     Column("sensed_area_m2", "double", "m²", "free area in a robot's sensing range and line of sight"),
     Column("range_area_m2", "double", "m²", "free area in a robot's sensing range, walls or not"),

@@ -89,7 +89,7 @@ class Task:
 
     def build_environment(self) -> Environment:
         """Build the map. The maps of the latest tasks are kept in memory."""
-        return _parse_map(self.document, self.map)
+        return parse_map(self.document, self.map)
 
     def build_scenario(self) -> Scenario:
         """Build the scenario of the run.
@@ -118,7 +118,20 @@ class Task:
 
 
 @lru_cache(MAX_CACHED_MAPS)
-def _parse_map(document: str, name: str) -> Environment:
+def parse_map(document: str, name: str) -> Environment:
+    """Parse the map of a task. The latest maps are kept in memory.
+
+    Parameters
+    ----------
+    document : str
+        The map as JSON.
+    name : str
+        Name of the map, for messages.
+
+    Returns
+    -------
+    Environment
+    """
     return from_json(json.loads(document), name)
 
 

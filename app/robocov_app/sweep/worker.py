@@ -1,13 +1,15 @@
-"""Doing one task: from what a run needs to the files that come of it."""
+"""Execution of one task: from the inputs of a run to its files and its row of the table."""
+
+from __future__ import annotations
 
 import gc
 import io
-import json
 import threading
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -15,25 +17,21 @@ from robocov.controllers import get_information
 from robocov.controllers.teammates import Teammates
 from robocov.controllers.user_modules import provide_modules
 from robocov.cost import CoverageCost
-from robocov.environment import Environment
 from robocov.errors import RobocovError
-from robocov.mapfile import from_json
-from robocov.metrics import compute_cost_history, summarize
+from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
-from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.jobs.messages import Line
 from robocov_app.runs.execution import build_cost_table
 from robocov_app.sweep.controller_files import source_to_json
-from robocov_app.sweep.parameters import build_conditions, build_swept_team
-from robocov_app.sweep.tasks import Task
+from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 
-_REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
-_TIDY = 1000  # steps after which garbage is collected in a long run
-FIGURES = {  # of a run in the table, in this order: kind, unit and meaning
+_COLLECTION_STEPS = 1000
+"""Steps of a long run between two collections of garbage."""
+FIGURES = {
     "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
     "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
     "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
@@ -44,163 +42,234 @@ FIGURES = {  # of a run in the table, in this order: kind, unit and meaning
     "path_length_m": ("double", "m", "distance travelled, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }
-TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
-EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
-POSITION, CELL, REPORT = 20, 5, 28  # bytes of a position, a cell of a map, and a position at some time
-_ONE_AT_A_TIME = threading.Lock()
-_RESULTS = 4  # goes up when the same inputs give other results: since noise and loss draw from NumPy
+"""Figures of a run in the table, in this order: kind of the column, unit and meaning."""
+MEAN_TIME = "mean_time_s"
+"""Further figure of runs in which some robots are faster than others."""
+EFFORT_FILE = "effort.json"
+"""File of a run with metrics. It is not in the table, because computing times differ each time."""
+POSITION_BYTES = 20
+"""Size of a message with the number and the position of a robot."""
+CELL_BYTES = 5
+"""Size of a cell of a map with its number."""
+REPORT_BYTES = 28
+"""Size of the position of a robot at some time."""
+_execution_lock = threading.Lock()
+_RESULTS_VERSION = 4
+"""Increased whenever the same inputs give other results. 4: noise and message loss are drawn with NumPy."""
 
 
 @cache
-def made_with() -> dict[str, str]:
-    """Return the versions that results of this process depend on."""
-    found = dict(list_versions())
-    del found["python"]
-    return found | {"robocov": f"{found['robocov']} (results {_RESULTS})"}
+def list_result_versions() -> dict[str, str]:
+    """Return the versions on which the results of this process depend, by package."""
+    versions = dict(list_versions())
+    del versions["python"]
+    versions["robocov"] = f"{versions['robocov']} (results {_RESULTS_VERSION})"
+    return versions
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a task: files of the run's folder, figures of the table, or why it failed."""
+    """Outcome of a task.
+
+    Attributes
+    ----------
+    files : mapping of str to bytes
+        Files in the folder of the run, by name.
+    figures : mapping of str to float, int or None
+        Figures in the table; none if the run failed.
+    error : str or None
+        Reason why the run failed.
+    versions : mapping of str to str
+        Versions on which the results depend, by package.
+    """
 
     files: Mapping[str, bytes]
     figures: Mapping[str, float | int | None]
     error: str | None = None
-    versions: Mapping[str, str] = field(default_factory=made_with)
+    versions: Mapping[str, str] = field(default_factory=list_result_versions)
 
 
 def perform(task: Task) -> Outcome:
-    """Do a run; what goes wrong in it is a part of the outcome.
+    """Execute a task. Any error of the run is part of the outcome.
 
-    No other thread of this process comes near the physics meanwhile, for which pymunk is not made. What runs
-    leave behind is collected here too: another thread would free bodies amid the next run's steps.
+    Parameters
+    ----------
+    task : Task
+
+    Returns
+    -------
+    Outcome
     """
-    with _ONE_AT_A_TIME:
-        enabled = gc.isenabled()
+    # The physics of pymunk is not made for several threads. Garbage of a run is collected here, because
+    # another thread would free bodies in the middle of the next run's steps.
+    with _execution_lock:
+        was_enabled = gc.isenabled()
         gc.disable()
         try:
-            environment, cost = prepared(task)
-            record, effort = measured(task, environment)
-            history = compute_cost_history(record, cost, task.cost_hz)
-            # of all moments: what is kept of them is for people to look at
-            summary = replace_non_finite(summarize(record, history))
-            path = summary["path_length_m"]
-            figures = {**summary, "path_length_m": sum(path) / len(path)}
-            figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
-            content = record.to_json(summary, lattice=task.lattice)
-            content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
-            content["controller"] |= source_to_json(task.source)
-            kept, arrays = record.thin(task.record_hz), io.BytesIO()
-            np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
-            files = {"run.json": format_json(content).encode(), "record.npz": arrays.getvalue()}
-            files["cost.csv"] = format_csv(*build_cost_table(history)).encode()
-            if task.metrics:
-                figures |= replace_non_finite(compute_final_metrics(record, history))
-                files[EFFORT] = format_json(effort).encode()
-            return Outcome(files, figures)
-        except BaseException as error:  # a user's controller may raise anything
+            return _perform(task)
+        except BaseException as error:  # A controller of the user may raise anything.
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
-            return failed(message, traceback.format_exc())
+            return build_failure(message, traceback.format_exc())
         finally:
-            gc.collect(1)  # what is older than the run is none of its garbage
-            if enabled:
+            # Objects that are older than the run are not its garbage.
+            gc.collect(1)
+            if was_enabled:
                 gc.enable()
 
 
-class Performing:
-    """Does the tasks of a `LocalPool` in a process of its own."""
+def _perform(task: Task) -> Outcome:
+    """Simulate and evaluate a run, and build its files."""
+    cost = prepare_cost(task)
+    record, effort = _simulate_and_measure(task)
+    history = compute_cost_history(record, cost, task.cost_hz)
+    # Figures are computed from all steps, of which the saved record contains only some.
+    summary = replace_non_finite(summarize(record, history))
+    figures = _select_figures(summary)
+    files = _build_files(task, record, history, summary)
+    if task.metrics:
+        figures |= replace_non_finite(compute_final_metrics(record, history))
+        files[EFFORT_FILE] = format_json(effort).encode()
+    return Outcome(files, figures)
+
+
+def _select_figures(summary: Mapping[str, Any]) -> dict[str, float | int | None]:
+    """Return the figures of the table from the summary of a run."""
+    path_lengths = summary["path_length_m"]
+    values = {**summary, "path_length_m": sum(path_lengths) / len(path_lengths)}
+    return {name: values[name] for name in (*FIGURES, MEAN_TIME) if name in values}
+
+
+def _build_files(
+    task: Task, record: Record, history: CostHistory, summary: Mapping[str, Any]
+) -> dict[str, bytes]:
+    """Build the files of a successful run, by name."""
+    content = record.to_json(summary, lattice=task.lattice)
+    content["cost_hz"] = task.cost_hz
+    content["record_hz"] = task.record_hz
+    content["controller"] |= source_to_json(task.source)
+    thinned_record = record.thin(task.record_hz)
+    arrays = io.BytesIO()
+    np.savez_compressed(arrays, **{name: getattr(thinned_record, name) for name in thinned_record.arrays})
+    return {
+        "run.json": format_json(content).encode(),
+        "record.npz": arrays.getvalue(),
+        "cost.csv": format_csv(*build_cost_table(history)).encode(),
+    }
+
+
+class TaskService:
+    """Service of a process that executes the tasks of a `LocalPool`."""
 
     failing = "the run failed"
 
     def __call__(self, questions: list[Task], line: Line) -> Outcome:
+        """Execute the newest task."""
         return perform(questions[-1])
 
 
-def failed(message: str, details: str) -> Outcome:
-    # one line of what files can hold, whatever a controller of a user's says
-    message = " ".join(message.split()).encode(errors="replace").decode() or "it does not say why"
-    return Outcome(
-        {"error.json": format_json({"error": message, "traceback": details}).encode()}, {}, message
-    )
+def build_failure(message: str, details: str) -> Outcome:
+    """Build the outcome of a failed run.
+
+    Parameters
+    ----------
+    message : str
+        Reason of the failure. It may contain anything, as controllers of the user write it.
+    details : str
+        Traceback, or what the process printed last.
+
+    Returns
+    -------
+    Outcome
+        Its error is a single line of valid characters.
+    """
+    line = " ".join(message.split()).encode(errors="replace").decode()
+    error = line or "it does not say why"
+    content = {"error": error, "traceback": details}
+    return Outcome({"error.json": format_json(content).encode()}, {}, error)
 
 
-def simulated(task: Task, environment: Environment) -> Record:
-    return measured(task, environment)[0]
+def simulate(task: Task) -> Record:
+    """Simulate the run of a task, and return all of its steps.
+
+    Raises
+    ------
+    RobocovError
+        If the run is not possible, or its controller fails.
+    """
+    record, _ = _simulate_and_measure(task)
+    return record
 
 
-def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, float | None]]:
-    """Simulate a run, and return the whole of it, and what it took: what ``effort.json`` holds."""
-    scenario = Scenario(
-        environment,
-        task.controller,
-        task.gains,
-        source=task.source,
-        team=build_swept_team(task.robots, task.team),
-        start=task.start,
-        seed=task.seed,
-        duration=task.duration,
-        dt=task.dt,
-        conditions=build_conditions(task.team, task.seed, task.robots),
-    )
+def _simulate_and_measure(task: Task) -> tuple[Record, dict[str, float | None]]:
+    """Simulate a run; return its record, and the content of ``effort.json``."""
+    scenario = task.build_scenario()
     with provide_modules({} if task.source is None else task.source.modules):
         simulation = scenario.build_simulation()
-        telling = Telling(simulation)
+        meter = CommunicationMeter(simulation)
 
-        def count_and_tidy(step: int) -> bool:
-            if step and step % _TIDY == 0:
+        def measure_step(step: int) -> bool:
+            if step and step % _COLLECTION_STEPS == 0:
                 gc.collect(0)
             if step and task.metrics:
-                telling.count()
+                meter.count()
             return False
 
-        record = scenario.run(simulation, should_stop=count_and_tidy)
-    return record, {"deciding_s": simulation.decision_time, "told_bytes": telling.bytes}
+        record = scenario.run(simulation, should_stop=measure_step)
+    return record, {"deciding_s": simulation.decision_time, "told_bytes": meter.bytes}
 
 
-class Telling:
-    """Counts the bytes that robots tell each other, whether they are heard or not.
+class CommunicationMeter:
+    """Counts the bytes that robots send, whether they are received or not.
 
-    A message is a position, `POSITION` bytes with the robot's number, at the rate of the conditions or each
-    control period. Robots that share maps also tell each cell of theirs that has changed, `CELL` bytes with
-    its number, whoever they know it from, and at each plan where they know others to be, `REPORT` bytes each.
-    The bytes are None where a law shares other maps than ours.
+    Each robot sends its position at the rate of the conditions, or in each control step. Robots that share
+    maps also send each cell of their map that has changed, whoever measured it, and with each plan the
+    positions at which they know others to be.
+
+    Attributes
+    ----------
+    bytes : float or None
+        Number of bytes; None if the controller shares maps of another kind.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         rate: float | None = getattr(simulation.conditions, "message_rate", None)
-        self._share = 1.0 if rate is None else min(1.0, rate * simulation.dt)
-        self._sharing = get_information(simulation.controller) == "shared map"
-        self._maps, self._reports = self._known(), self._told()
+        self._messages_per_step = 1.0 if rate is None else min(1.0, rate * simulation.dt)
+        self._shares_maps = get_information(simulation.controller) == "shared map"
+        self._maps = self._get_maps()
+        self._reports = self._get_reports()
         self.bytes: float | None = 0.0
 
-    def _known(self) -> tuple[DiscoveredMap, ...] | None:
-        return getattr(self._simulation.memory, "maps", None) if self._sharing else ()
+    def _get_maps(self) -> tuple[DiscoveredMap, ...] | None:
+        return getattr(self._simulation.memory, "maps", None) if self._shares_maps else ()
 
-    def _told(self) -> tuple[Teammates, ...]:
-        return getattr(self._simulation.memory, "reports", ()) if self._sharing else ()
+    def _get_reports(self) -> tuple[Teammates, ...]:
+        return getattr(self._simulation.memory, "reports", ()) if self._shares_maps else ()
 
     def count(self) -> None:
-        before, self._maps = self._maps, self._known()
-        told, self._reports = self._reports, self._told()
-        if self.bytes is None or before is None or self._maps is None:
+        """Count the bytes of the latest step."""
+        previous_maps = self._maps
+        previous_reports = self._reports
+        self._maps = self._get_maps()
+        self._reports = self._get_reports()
+        if self.bytes is None or previous_maps is None or self._maps is None:
             self.bytes = None
             return
-        self.bytes += self._share * POSITION * int(self._simulation.working.sum())
-        for old, new in zip(before, self._maps, strict=True):
-            if new is not old:
-                self.bytes += CELL * int(np.count_nonzero(new.state != old.state))
-        for last, others in zip(told, self._reports, strict=True):
-            if others is not last:
-                self.bytes += REPORT * len(others.robots)
+        self.bytes += self._messages_per_step * POSITION_BYTES * int(self._simulation.working.sum())
+        for previous_map, current_map in zip(previous_maps, self._maps, strict=True):
+            if current_map is not previous_map:
+                changed_cells = int(np.count_nonzero(current_map.state != previous_map.state))
+                self.bytes += CELL_BYTES * changed_cells
+        for previous_report, report in zip(previous_reports, self._reports, strict=True):
+            if report is not previous_report:
+                self.bytes += REPORT_BYTES * len(report.robots)
 
 
-def prepared(task: Task) -> tuple[Environment, CoverageCost]:
-    """Return the map of a task and its cost, those of the last few maps as they were."""
-    return _prepared(task.document, task.map, task.lattice)
+def prepare_cost(task: Task) -> CoverageCost:
+    """Return the coverage cost of a task's map. The costs of the latest maps are kept in memory."""
+    return _build_cost(task.document, task.map, task.lattice)
 
 
-@lru_cache(_REMEMBERED)
-def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, CoverageCost]:
-    environment = from_json(json.loads(document), name)
-    return environment, CoverageCost(environment, lattice)
+@lru_cache(MAX_CACHED_MAPS)
+def _build_cost(document: str, name: str, lattice: int) -> CoverageCost:
+    return CoverageCost(parse_map(document, name), lattice)

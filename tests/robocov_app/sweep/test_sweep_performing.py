@@ -20,7 +20,7 @@ from robocov.record import ARRAYS, Record
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.table import columns_of
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepared, simulated
+from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepare_cost, simulate
 
 
 def first(study: Study) -> Task:
@@ -35,7 +35,7 @@ def kept(outcome: Outcome, folder: Path) -> Record:
 
 def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
     task = first(small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
-    whole = simulated(task, ROOM)
+    whole = simulate(task)
     outcome = perform(task)
     assert outcome.error is None
     assert list(outcome.files) == ["run.json", "record.npz", "cost.csv"]
@@ -56,7 +56,7 @@ def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
 
 def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: Path) -> None:
     task = first(small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
-    whole = simulated(task, ROOM)
+    whole = simulate(task)
     history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     summary = summarize(whole, history)
     outcome = perform(task)
@@ -129,11 +129,11 @@ def test_a_start_without_room_is_an_outcome() -> None:
 def test_costs_of_the_last_maps_are_remembered() -> None:
     maps = [StudyMap(f"room {k}", replace(ROOM, name=f"room {k}")) for k in range(6)]
     tasks = list(generate_tasks(small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
-    costs = [prepared(task)[1] for task in tasks]
-    assert prepared(tasks[-1])[1] is costs[-1]
-    assert prepared(tasks[0])[1] is not costs[0], "memory does not grow with the number of maps"
+    costs = [prepare_cost(task) for task in tasks]
+    assert prepare_cost(tasks[-1]) is costs[-1]
+    assert prepare_cost(tasks[0]) is not costs[0], "memory does not grow with the number of maps"
     again = replace(tasks[-1], seed=5)
-    assert prepared(again)[1] is costs[-1]
+    assert prepare_cost(again) is costs[-1]
 
 
 @pytest.mark.parametrize("law", ["", "        1 / (own.time == 0.0)\n"])

@@ -26,7 +26,7 @@ from robocov_app.sweep.ledger import opened
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import made_with, perform
+from robocov_app.sweep.worker import list_result_versions, perform
 from robocov_app.terminal.interruption import Interruption
 
 PATIENCE = 60.0
@@ -187,7 +187,7 @@ def test_after_an_upgrade_all_is_done_again_and_a_mixed_table_is_told(
     tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = small_study()
-    old = {**made_with(), "pymunk": "6.0"}
+    old = {**list_result_versions(), "pymunk": "6.0"}
     with opened(tmp_path, study.to_json()) as ledger:
         for task in generate_tasks(study):
             ledger.keep(task, replace(perform(task), versions=old))

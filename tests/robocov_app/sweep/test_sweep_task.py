@@ -14,7 +14,7 @@ from swept import HALL, ROOM, controller, small_study
 from robocov.mapfile import load_map
 from robocov_app.sweep.study import StudyMap
 from robocov_app.sweep.tasks import generate_tasks
-from robocov_app.sweep.worker import simulated
+from robocov_app.sweep.worker import simulate
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
@@ -75,7 +75,7 @@ def test_every_controller_begins_in_the_same_places() -> None:
     )
     starts: dict[int, set[bytes]] = {}
     for task in generate_tasks(study):
-        record = simulated(task, ROOM)
+        record = simulate(task)
         starts.setdefault(task.seed, set()).add(record.positions[0].tobytes())
         assert np.array_equal(record.positions[0], ROOM.start("corner").sample(2, seed=task.seed))
     assert [len(places) for places in starts.values()] == [1, 1]
@@ -88,7 +88,7 @@ def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
     task = next(generate_tasks(study))
     assert pickle.loads(pickle.dumps(task)) == task
     assert task.source is not None and "class Mine" in task.source.text
-    assert len(simulated(task, ROOM)) == 11
+    assert len(simulate(task)) == 11
 
 
 def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) -> None:
