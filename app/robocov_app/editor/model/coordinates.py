@@ -12,131 +12,204 @@ from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import compute_cos_sin
 
-_METRIC = {"": 1.0, "m": 1.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
-_UNITS = _METRIC | {"in": 0.0254, '"': 0.0254, "ft": 0.3048, "'": 0.3048}
+_METRIC_UNITS = {"": 1.0, "m": 1.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
+_INCH_M = 0.0254
+_FOOT_M = 0.3048
+_UNITS = _METRIC_UNITS | {"in": _INCH_M, '"': _INCH_M, "ft": _FOOT_M, "'": _FOOT_M}
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?"
 _LENGTH = re.compile(rf"({_NUMBER})\s*({'|'.join(sorted(_UNITS, key=len, reverse=True))})")
 _FEET_AND_INCHES = re.compile(rf"({_NUMBER})\s*'\s*({_NUMBER})\s*\"")
 _ANGLE = re.compile(rf"({_NUMBER})\s*(°|deg|rad|)")
-_LENGTHS = "type a length, such as 3.2, 120cm or 12'6\""
-_POINTS = "type x and y in metres, such as 3.2 1.5, relative as +0.5 0 or @2<45"
-_SIZES = "type width and height in metres, such as 3 x 2"
+_TYPOGRAPHIC_SIGNS = str.maketrans("−–″”′’∠", "--\"\"''<")
+_LENGTH_HELP = "type a length, such as 3.2, 120cm or 12'6\""
+_POINT_HELP = "type x and y in metres, such as 3.2 1.5, relative as +0.5 0 or @2<45"
+_SIZE_HELP = "type width and height in metres, such as 3 x 2"
+_ANGLE_HELP = "type an angle in degrees, such as 45"
 
 
 def parse_length(text: str, *, now: float | None = None) -> float:
-    """Return a length, m: ``3,2``, ``1200 mm``, ``4'6"``; from `now` also ``+0.5``, ``/2``, ``50%``."""
+    """Return a typed length, m: ``3,2``, ``1200 mm``, ``4'6"``.
+
+    Parameters
+    ----------
+    text : str
+        What was typed.
+    now : float, optional
+        The present length, m, for relative ones: ``+0.5``, ``/2``, ``50%``.
+
+    Raises
+    ------
+    MapError
+        If the text is not a length, or the length is too large.
+    """
     typed = _clean(text)
     sign = typed[:1]
-    if now is not None and sign and sign in "*/×÷":
-        factor = _wanted(_number(typed[1:]), text, _LENGTHS)
-        require(sign not in "/÷" or factor != 0.0, f"{quote(text)}: nothing can be divided by 0")
-        return _limited(now * factor if sign in "*×" else now / factor, text)
+    if now is not None and sign in ("*", "/", "×", "÷"):
+        factor = _require_value(_parse_number(typed[1:]), text, _LENGTH_HELP)
+        if sign in ("*", "×"):
+            return _check_length(now * factor, text)
+        require(factor != 0.0, f"{quote(text)}: nothing can be divided by 0")
+        return _check_length(now / factor, text)
     if now is not None and typed.endswith("%"):
-        return _limited(now * _wanted(_number(typed[:-1]), text, _LENGTHS) / 100.0, text)
-    relative = now if now is not None and sign in ("+", "-") else 0.0
-    return _limited(_wanted(_length(typed), text, _LENGTHS) + relative, text)
+        percent = _require_value(_parse_number(typed[:-1]), text, _LENGTH_HELP)
+        return _check_length(now * percent / 100.0, text)
+    length = _require_value(_parse_length(typed), text, _LENGTH_HELP)
+    if now is not None and sign in ("+", "-"):
+        return _check_length(length + now, text)
+    return _check_length(length, text)
 
 
 def parse_point(text: str, *, last: Point | None = None) -> Point:
-    """Return a place, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``; from `last` ``@2<45``, ``+0.5 0``."""
+    """Return a typed position, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``.
+
+    Parameters
+    ----------
+    text : str
+        What was typed.
+    last : Point, optional
+        The previous point, m, for relative positions: ``@2<45``, ``+0.5 0``.
+
+    Raises
+    ------
+    MapError
+        If the text is not a position, or the position is beyond the reach of maps.
+    """
     typed = _clean(text)
-    relative = typed[:1] in ("@", "+")
-    require(last or not relative, f"{quote(text)}: there is no point before that it could be relative to")
-    length, sign, angle = typed.removeprefix("@").strip().partition("<")
-    if sign:
-        x, y = _polar(_length(length.strip()), _angle(angle), text)
+    is_relative = typed[:1] in ("@", "+")
+    require(last or not is_relative, f"{quote(text)}: there is no point before that it could be relative to")
+    length, angle_sign, angle = typed.removeprefix("@").strip().partition("<")
+    if angle_sign:
+        x, y = _convert_polar(_parse_length(length.strip()), _parse_angle(angle), text)
     else:
-        x, y = (_wanted(value, text, _POINTS) for value in _pair(length, ""))
-    if relative and last is not None:
-        x, y = last[0] + x, last[1] + y
+        x, y = _parse_pair(length, "")
+        _require_value(x, text, _POINT_HELP)
+        _require_value(y, text, _POINT_HELP)
+    if is_relative and last is not None:
+        x += last[0]
+        y += last[1]
     if max(abs(x), abs(y)) > MAX_COORDINATE_M:
         raise MapError(f"{quote(text)}: maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin")
-    return _exact(x), _exact(y)
+    return _round_exactly(x), _round_exactly(y)
 
 
 def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Point:
-    """Return the next point of a line: as `point_of`, a length towards the cursor, or its own at ``<45``."""
+    """Return the next point of a line, m.
+
+    Parameters
+    ----------
+    text : str
+        What was typed: a position as in `parse_point`, a length towards the cursor, or ``<45`` for the
+        cursor's distance at an angle.
+    last : Point or None
+        The previous point of the line, m.
+    towards : Point or None
+        The cursor, m.
+    """
+    if last is None or towards is None:
+        return parse_point(text, last=last)
     typed = _clean(text)
-    if last is not None and towards is not None:
-        dx, dy = towards[0] - last[0], towards[1] - last[1]
-        away, length = math.hypot(dx, dy), _length(typed)
-        if typed[:1] == "<":
-            x, y = _polar(away, _angle(typed[1:]), text)
-            return _exact(last[0] + x), _exact(last[1] + y)
-        if not math.isnan(length):
-            length = _limited(length, text)
-            require(away != 0.0, f"{quote(text)}: point the cursor where the line is to go")
-            return _exact(last[0] + dx / away * length), _exact(last[1] + dy / away * length)
-    return parse_point(text, last=last)
+    dx = towards[0] - last[0]
+    dy = towards[1] - last[1]
+    cursor_distance = math.hypot(dx, dy)
+    if typed[:1] == "<":
+        x, y = _convert_polar(cursor_distance, _parse_angle(typed[1:]), text)
+        return _round_exactly(last[0] + x), _round_exactly(last[1] + y)
+    length = _parse_length(typed)
+    if math.isnan(length):
+        return parse_point(text, last=last)
+    length = _check_length(length, text)
+    require(cursor_distance != 0.0, f"{quote(text)}: point the cursor where the line is to go")
+    x = last[0] + dx / cursor_distance * length
+    y = last[1] + dy / cursor_distance * length
+    return _round_exactly(x), _round_exactly(y)
 
 
 def parse_size(text: str) -> tuple[float, float]:
-    """Return width and height in metres: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both."""
+    """Return a typed width and height, m: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both."""
     typed = _clean(text)
-    both = _length(typed)
-    pair = _pair(typed, "x×*") if math.isnan(both) else (both, both)
-    width, height = (_wanted(value, text, _SIZES) for value in pair)
+    side = _parse_length(typed)
+    width, height = (side, side)
+    if math.isnan(side):
+        width, height = _parse_pair(typed, "x×*")
+    _require_value(width, text, _SIZE_HELP)
+    _require_value(height, text, _SIZE_HELP)
     require(min(width, height) > 0.0, f"{quote(text)}: width and height must be above 0 m")
-    return _limited(width, text), _limited(height, text)
+    return _check_length(width, text), _check_length(height, text)
 
 
 def parse_angle(text: str) -> float:
-    """Return an angle in degrees: ``45``, ``45°``, ``-90``, ``0.5rad``."""
-    return _wanted(_angle(_clean(text)), text, "type an angle in degrees, such as 45")
+    """Return a typed angle, degrees: ``45``, ``45°``, ``-90``, ``0.5rad``."""
+    return _require_value(_parse_angle(_clean(text)), text, _ANGLE_HELP)
 
 
 def _clean(text: str) -> str:
-    return " ".join(text.translate(str.maketrans("−–″”′’∠", "--\"\"''<")).lower().split())
+    """Return a text in lower case, with plain signs and single blanks."""
+    return " ".join(text.translate(_TYPOGRAPHIC_SIGNS).lower().split())
 
 
-def _wanted(value: float, text: str, wanted: str) -> float:
-    require(not math.isnan(value), f"{quote(text)}: {wanted}")
+def _require_value(value: float, text: str, help_text: str) -> float:
+    require(not math.isnan(value), f"{quote(text)}: {help_text}")
     return value
 
 
-def _number(typed: str) -> float:
-    """Return a number; nan, as what reads lengths and angles below, for what is typed in another way."""
+def _parse_number(typed: str) -> float:
+    """Return a number; nan if there is none, as the functions below do for lengths and angles."""
     typed = typed.strip()
-    value = float(typed.replace(",", ".")) if re.fullmatch(_NUMBER, typed) else math.nan
+    if not re.fullmatch(_NUMBER, typed):
+        return math.nan
+    value = float(typed.replace(",", "."))
     return value if math.isfinite(value) else math.nan
 
 
-def _length(typed: str) -> float:
-    if feet := _FEET_AND_INCHES.fullmatch(typed):
-        whole, inches = _number(feet[1]), _number(feet[2])
-        return _exact(math.copysign(abs(whole) * 0.3048 + inches * 0.0254, whole))
+def _parse_length(typed: str) -> float:
+    feet = _FEET_AND_INCHES.fullmatch(typed)
+    if feet:
+        whole = _parse_number(feet[1])
+        inches = _parse_number(feet[2])
+        return _round_exactly(math.copysign(abs(whole) * _FOOT_M + inches * _INCH_M, whole))
     match = _LENGTH.fullmatch(typed)
-    return _exact(_number(match[1]) * _UNITS[match[2]]) if match else math.nan
+    if not match:
+        return math.nan
+    return _round_exactly(_parse_number(match[1]) * _UNITS[match[2]])
 
 
-def _pair(typed: str, signs: str) -> tuple[float, float]:
-    """Return two lengths, parted by a semicolon, a blank, a comma that is no decimal one, or by a sign."""
-    parted = [re.split(rf"\s*[{re.escape(sign)}]\s*", typed) for sign in signs]
-    parted += [re.split(r"\s*;\s*", typed), re.split(r"\s*,\s+|\s+,\s*", typed)]
+def _parse_pair(typed: str, signs: str) -> tuple[float, float]:
+    """Return two lengths between which there is a sign, a semicolon, a comma or a blank.
+
+    A comma between digits is a decimal comma, unless there are decimal points.
+    """
+    splits = [re.split(rf"\s*[{re.escape(sign)}]\s*", typed) for sign in signs]
+    splits.append(re.split(r"\s*;\s*", typed))
+    splits.append(re.split(r"\s*,\s+|\s+,\s*", typed))
     if "." in typed:
-        parted.append(re.split(r"\s*,\s*", typed))
-    parted.append(re.split(r"\s+(?=[+\-.,\d])", typed))  # the unit of a length may stand apart from it
-    fits = [parts for parts in parted if len(parts) == 2 and all(map(_LENGTH.fullmatch, parts))]
-    a, b = fits[0] if fits else ("", "")
-    return _length(a), _length(b)
+        splits.append(re.split(r"\s*,\s*", typed))
+    # A blank may also separate a length from its unit.
+    splits.append(re.split(r"\s+(?=[+\-.,\d])", typed))
+    for parts in splits:
+        if len(parts) == 2 and all(map(_LENGTH.fullmatch, parts)):
+            return _parse_length(parts[0]), _parse_length(parts[1])
+    return math.nan, math.nan
 
 
-def _angle(typed: str) -> float:
+def _parse_angle(typed: str) -> float:
+    """Return an angle in degrees; nan if there is none."""
     match = _ANGLE.fullmatch(typed.strip())
-    value = _number(match[1]) if match else math.nan
-    return math.degrees(value) if match and match[2] == "rad" else value
+    if not match:
+        return math.nan
+    value = _parse_number(match[1])
+    return math.degrees(value) if match[2] == "rad" else value
 
 
-def _polar(length: float, degrees: float, text: str) -> tuple[float, float]:
-    cos, sin = compute_cos_sin(_wanted(degrees, text, _POINTS))
-    return _wanted(length, text, _POINTS) * cos, length * sin
+def _convert_polar(length: float, degrees: float, text: str) -> tuple[float, float]:
+    cos, sin = compute_cos_sin(_require_value(degrees, text, _POINT_HELP))
+    return _require_value(length, text, _POINT_HELP) * cos, length * sin
 
 
-def _exact(value: float) -> float:
+def _round_exactly(value: float) -> float:
     """Return a coordinate without the noise of units: 1.1 inches are 0.02794 m."""
     return round(value, 9) + 0.0
 
 
-def _limited(length: float, text: str) -> float:
+def _check_length(length: float, text: str) -> float:
     require(abs(length) <= MAX_SIZE_M, f"{quote(text)}: expected at most {MAX_SIZE_M / 1000:g} km")
-    return _exact(length)
+    return _round_exactly(length)
