@@ -7,93 +7,148 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray
-from robocov.environment import DiscStart, Point, PointsStart
+from robocov.environment import DiscStart, Point, PointsStart, StartSpec
 from robocov_app.editor.model.geometry import find_nearest_on_edges, to_array
 from robocov_app.editor.model.selection import Edge, Selection, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
+MANY_OBJECTS = 8  # of more objects, only those near the point are searched
+
 
 def find_owners(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
-    """Return the objects that a click may mean: starts, obstacles, and those within `reach` metres."""
-    found: list[Owner] = []
-    discs: list[Owner] = []
-    for name, spec in reversed(sketch.starts):
-        if isinstance(spec, DiscStart):
-            away = math.dist(point, spec.center)
-            if away <= reach or abs(away - spec.radius) <= reach:
-                found.append(name)
-            elif away < spec.radius:
-                discs.append(name)
-        elif isinstance(spec, PointsStart) and any(math.dist(point, at) <= reach for at in spec.positions):
-            found.append(name)
-    near = [item for item in reversed(_items_near(sketch, point, reach)) if item.is_selectable]
-    gaps = [(shapely.distance(item.geometry, shapely.Point(point)), item.key) for item in near]
-    found += [key for gap, key in gaps if gap == 0.0]
-    found += discs
-    found += [key for gap, key in sorted(gaps, key=lambda each: each[0]) if 0.0 < gap <= reach]
+    """Return the objects that a click may mean, the most likely first.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map.
+    point : Point
+        Where the click was, m.
+    reach : float
+        Distance within which an object is meant, m.
+
+    Returns
+    -------
+    tuple of Owner
+        Starts near the point, obstacles on it, starts around it, obstacles near it, and the boundary.
+    """
+    near_starts: list[Owner] = []
+    surrounding_starts: list[Owner] = []
+    for name, start in reversed(sketch.starts):
+        if _is_near_start(start, point, reach):
+            near_starts.append(name)
+        elif isinstance(start, DiscStart) and math.dist(point, start.center) < start.radius:
+            surrounding_starts.append(name)
+    items = [item for item in reversed(_list_items_near(sketch, point, reach)) if item.is_selectable]
+    gaps = [(shapely.distance(item.geometry, shapely.Point(point)), item.key) for item in items]
+    owners = list(near_starts)
+    owners += [key for gap, key in gaps if gap == 0.0]
+    owners += surrounding_starts
+    gaps.sort(key=lambda pair: pair[0])
+    owners += [key for gap, key in gaps if 0.0 < gap <= reach]
     if sketch.boundary is not None and find_edge(sketch, point, reach, [BOUNDARY]) is not None:
-        found.append(BOUNDARY)
-    return tuple(found)
+        owners.append(BOUNDARY)
+    return tuple(owners)
+
+
+def _is_near_start(start: StartSpec, point: Point, reach: float) -> bool:
+    """Return whether the centre or rim of a disc, or a position, is within `reach` metres."""
+    if isinstance(start, DiscStart):
+        distance = math.dist(point, start.center)
+        return distance <= reach or abs(distance - start.radius) <= reach
+    if isinstance(start, PointsStart):
+        return any(math.dist(point, position) <= reach for position in start.positions)
+    return False
 
 
 def find_obstacles(sketch: Sketch, point: Point, reach: float) -> list[int]:
     """Return the keys of the obstacles that a click may mean, see `find_owners`."""
-    return [each for each in find_owners(sketch, point, reach) if isinstance(each, int) and each != BOUNDARY]
+    owners = find_owners(sketch, point, reach)
+    return [owner for owner in owners if isinstance(owner, int) and owner != BOUNDARY]
 
 
 def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
     """Return the nearest edge of some objects within `reach` metres of a point."""
-    best, nearest = reach, None
-    wanted = list(owners)
-    if len(wanted) > 8:  # of many obstacles, only those that may have something within reach
-        near = {item.key for item in _items_near(sketch, point, reach)}
-        wanted = [each for each in wanted if each in near or each not in sketch.index_by_key]
-    for owner in wanted:
-        for ring, points, closed in sketch.list_rings(owner):
-            starts, count = to_array(points), len(points) - (not closed)
-            if count <= 0:
+    searched = list(owners)
+    if len(searched) > MANY_OBJECTS:
+        near = {item.key for item in _list_items_near(sketch, point, reach)}
+        far = sketch.index_by_key.keys() - near
+        searched = [owner for owner in searched if owner not in far]
+    smallest_gap = reach
+    nearest: Edge | None = None
+    for owner in searched:
+        for number, ring, is_closed in sketch.list_rings(owner):
+            edge_count = len(ring) if is_closed else len(ring) - 1
+            if edge_count <= 0:
                 continue
-            feet, away = find_nearest_on_edges(starts[:count], np.roll(starts, -1, axis=0)[:count], point)
-            k = int(away.argmin())
-            if away[k] <= best and (nearest is None or away[k] < best):
-                best = float(away[k])
-                nearest = Edge(owner, ring, k, (float(feet[k, 0]), float(feet[k, 1])))
+            points = to_array(ring)
+            starts = points[:edge_count]
+            ends = np.roll(points, -1, axis=0)[:edge_count]
+            feet, gaps = find_nearest_on_edges(starts, ends, point)
+            index = int(gaps.argmin())
+            if gaps[index] < smallest_gap or (nearest is None and gaps[index] <= reach):
+                smallest_gap = float(gaps[index])
+                nearest = Edge(owner, number, index, (float(feet[index, 0]), float(feet[index, 1])))
     return nearest
 
 
 def find_in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
-    """Return the objects in a box between two corners, m, with `touched` also those that it touches."""
+    """Return the objects in a box.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The map.
+    a, b : Point
+        Opposite corners of the box, m.
+    touched : bool
+        Whether to include objects that the box only touches; the boundary counts only as a whole.
+    """
     box = shapely.box(*np.minimum(a, b), *np.maximum(a, b))
     if touched:
-        places = sketch.tree.query(box, predicate="intersects")
+        indices = sketch.tree.query(box, predicate="intersects")
     else:
-        places = np.flatnonzero(_inside(shapely.bounds(sketch.geometries), a, b).reshape(-1, 2).all(axis=1))
-    items = [sketch.obstacles[k] for k in places.tolist()]
+        corners = _is_in_box(shapely.bounds(sketch.geometries), a, b).reshape(-1, 2)
+        indices = np.flatnonzero(corners.all(axis=1))
+    items = [sketch.obstacles[index] for index in indices.tolist()]
     starts = []
-    for name, spec in sketch.starts:
-        inside = _inside([at for _, at in list_vertices(sketch, name)], a, b)
-        caught = inside.any() if touched else inside.size and inside.all()
-        if touched and isinstance(spec, DiscStart):
-            caught = shapely.distance(box, shapely.Point(spec.center)) <= spec.radius
-        starts += [name] if caught else []
-    ring = _inside(sketch.boundary or (), a, b)
+    for name, start in sketch.starts:
+        if touched and isinstance(start, DiscStart):
+            is_inside = shapely.distance(box, shapely.Point(start.center)) <= start.radius
+        else:
+            is_inside = _is_start_in_box(sketch, name, a, b, touched=touched)
+        if is_inside:
+            starts.append(name)
+    boundary = _is_in_box(sketch.boundary or (), a, b)
     keys = frozenset(item.key for item in items if item.is_selectable)
-    return Selection(keys, starts=frozenset(starts), boundary=bool(ring.size and ring.all()))
+    has_boundary = bool(boundary.size and boundary.all())
+    return Selection(keys, starts=frozenset(starts), boundary=has_boundary)
+
+
+def _is_start_in_box(sketch: Sketch, name: str, a: Point, b: Point, *, touched: bool) -> bool:
+    """Return whether all points of a start, or with `touched` any of them, are in a box."""
+    inside = _is_in_box([position for _, position in list_vertices(sketch, name)], a, b)
+    if touched:
+        return bool(inside.any())
+    return bool(inside.size and inside.all())
 
 
 def find_vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner]) -> Selection:
     """Return the vertices of some objects in a box between two corners, m."""
     pairs = [pair for owner in owners for pair in list_vertices(sketch, owner)]
-    inside = np.flatnonzero(_inside([at for _, at in pairs], a, b)).tolist()
-    return Selection(vertices=frozenset(pairs[k][0] for k in inside))
+    inside = _is_in_box([position for _, position in pairs], a, b)
+    return Selection(vertices=frozenset(pairs[k][0] for k in np.flatnonzero(inside).tolist()))
 
 
-def _inside(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
-    at = to_array(points)
-    return np.asarray(((at >= np.minimum(a, b)) & (at <= np.maximum(a, b))).all(axis=1))
+def _is_in_box(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
+    """Return for each of (k, 2) points, m, whether it is in a box."""
+    coordinates = to_array(points)
+    is_inside = (coordinates >= np.minimum(a, b)) & (coordinates <= np.maximum(a, b))
+    return np.asarray(is_inside.all(axis=1))
 
 
-def _items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
+def _list_items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
+    """Return the obstacles whose bounding boxes are within `reach` metres, from the bottom to the top."""
     x, y = point
     near = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
-    return [sketch.obstacles[k] for k in sorted(near.tolist())]
+    return [sketch.obstacles[index] for index in sorted(near.tolist())]

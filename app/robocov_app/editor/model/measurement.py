@@ -143,6 +143,7 @@ class MeasurementWire(Wire):
         self._known: dict[int, Item] = {}
 
     def encode(self, question: tuple[Sketch, float]) -> Question:
+        """Return a question with only those obstacles that the process does not know."""
         sketch, radius = question
         changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
         self._known = {item.key: item for item in sketch.obstacles}

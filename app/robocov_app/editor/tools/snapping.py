@@ -302,6 +302,7 @@ class _SnapSearch:
         return -lines, -len(snap.guides), math.dist(self.point, snap.point)
 
     def list_marks(self, *kinds: PointKind) -> Iterator[Snap]:
+        """Yield the snaps to the nearest marks of some kinds."""
         for kind in kinds:
             if kind not in self.settings.kinds:
                 continue
@@ -310,6 +311,7 @@ class _SnapSearch:
                 yield _snap_to_mark(kind, mark)
 
     def list_marks_and_crossings(self) -> Iterator[Snap]:
+        """Yield the snaps to centres, middles of edges and crossings of edges."""
         yield from self.list_marks("centre", "middle")
         if "crossing" in self.settings.kinds:
             for edge, other in combinations(self.list_edges(), 2):
@@ -318,6 +320,7 @@ class _SnapSearch:
                     yield _snap_to_mark("crossing", crossing)
 
     def list_line_snaps(self) -> Iterator[Snap]:
+        """Yield the snaps to lines, their crossings, and the grid on lines."""
         lines: list[_SnapLine] = []
         for line in self.list_lines():
             for other in lines:
@@ -353,6 +356,7 @@ class _SnapSearch:
             yield from islice(self.list_edges(), MAX_EDGE_LINES)
 
     def list_grid_snaps(self) -> Iterator[Snap]:
+        """Yield the snaps to grid points, then to grid lines."""
         grid = self.settings.grid
         if "grid" not in self.settings.kinds or grid <= 0.0:
             return
@@ -365,6 +369,7 @@ class _SnapSearch:
                 return
 
     def list_edges(self) -> Iterator[_SnapLine]:
+        """Yield the edges near the point as lines."""
         for start, end in self.targets.list_edges_near(self.point, self.settings.reach):
             length = math.dist(start, end)
             if length > 0.0:
