@@ -126,8 +126,7 @@ def begun(
     """Return a simulation that begins so, or goes on `later`; StartError, ParameterError as `Simulation`."""
     scenario = Scenario(
         setup.solid,
-        setup.law.name,
-        setup.law.gains,
+        setup.law.made(),
         team=setup.team,
         starts=positions,
         velocities=velocities,
@@ -135,7 +134,7 @@ def begun(
         dt=dt,
         conditions=setup.conditions,
     )
-    return scenario.build_simulation(setup.law.made(), **later)
+    return scenario.build_simulation(**later)
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
