@@ -77,7 +77,7 @@ def _list_words(hint: Any) -> list[str]:
 
 @dataclass(frozen=True)
 class ReadOptions(Options):
-    """Options for reading a map that its file does not contain; the format decides about None."""
+    """Options for reading a map that its file does not contain; the format chooses what is not given."""
 
     cell: float | None = None
     """Side of a cell or pixel, or width of a tile, in metres. By default MovingAI's and Tiled's have 1."""
@@ -192,7 +192,7 @@ class ReadOptions(Options):
 
 @dataclass(frozen=True)
 class WriteOptions(Options):
-    """Options for writing a map; the format decides about None."""
+    """Options for writing a map; the format chooses what is not given."""
 
     cell: float | None = None
     """Side of a cell, or of a pixel, in metres; 0.05 by default. Walls that are thinner stay whole."""
