@@ -298,7 +298,7 @@ class RandomEvents:
 
     def send_message(self) -> None:
         message = page_events.MESSAGES.validate_python(self.random.choice(MESSAGES))
-        for event in self.page.events(message):  # type: ignore[arg-type]
+        for event in self.page.translate(message):  # type: ignore[arg-type]
             pygame.event.post(event)
 
     def quit(self) -> None:

@@ -1,8 +1,8 @@
-"""Messages of a page, checked; and pygame's events made of them."""
+"""Messages of a page, validated, and their translation to events of pygame."""
 
 import unicodedata
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import pygame
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter
@@ -10,15 +10,13 @@ from pygame.event import Event
 
 from robocov_app.toolkit import clipboard
 
-MIN_PAGE_SIDE_PX, MAX_PAGE_SIDE_PX, MAX_PAGE_PIXELS = (
-    200,
-    7680,
-    4096 * 2304,
-)  # a page's sides, and its area, in pixels
-
+MIN_PAGE_SIDE_PX = 200
+MAX_PAGE_SIDE_PX = 7680
+MAX_PAGE_PIXELS = 4096 * 2304
 MAX_UPLOAD_BYTES = 1 << 24
+MAX_FILE_NAME_CHARACTERS = 300
+"""Longer than any file system allows, so that such names are rejected with a message."""
 _STRIPPED_CATEGORIES = ("Cc", "Cs")
-MAX_FILE_NAME_CHARACTERS = 300  # longer than what any file system takes, so that it is refused with a message
 
 
 def strip_controls(text: str, keep: str = "") -> str:
@@ -27,9 +25,9 @@ def strip_controls(text: str, keep: str = "") -> str:
     Parameters
     ----------
     text : str
-        Text that came in from a page.
+        Text from a page.
     keep : str
-        Control characters that stay, such as line breaks in a text that is pasted.
+        Control characters that stay, such as line breaks in pasted text.
 
     Returns
     -------
@@ -68,14 +66,14 @@ class _PointerMessage(_HeldMessage):
 
 
 class PointerMoved(_PointerMessage):
-    """The pointer is elsewhere; `button` is held meanwhile, 0 for none."""
+    """The pointer has moved while `button` was held; 0 for none."""
 
     kind: Literal["move"]
     button: int = Field(default=0, ge=0, le=3)
 
 
 class ButtonChanged(_PointerMessage):
-    """A button of the mouse is pressed, or let go."""
+    """A mouse button is pressed or released."""
 
     kind: Literal["button"]
     button: int = Field(ge=1, le=3)
@@ -83,7 +81,7 @@ class ButtonChanged(_PointerMessage):
 
 
 class WheelTurned(_PointerMessage):
-    """The wheel is turned by notches."""
+    """The wheel is turned by a number of notches."""
 
     kind: Literal["wheel"]
     right: _Turn = 0.0
@@ -91,7 +89,7 @@ class WheelTurned(_PointerMessage):
 
 
 class KeyChanged(_HeldMessage):
-    """A key is pressed or let go; `key` is its name in browsers, empty if it was a control character."""
+    """A key is pressed or released; `key` is its name in browsers, empty for control characters."""
 
     kind: Literal["key"]
     key: Annotated[str, Field(min_length=1, max_length=20), _Line]
@@ -99,28 +97,28 @@ class KeyChanged(_HeldMessage):
 
 
 class TextTyped(_Message):
-    """A text is typed without keys: on a phone, or put together from several."""
+    """Text is typed without keys: on a phone, or composed of several keys."""
 
     kind: Literal["text"]
     text: Annotated[str, Field(max_length=1000), _Lines]
 
 
 class TextPasted(_Message):
-    """A text is pasted from the clipboard of who controls."""
+    """Text is pasted from the clipboard of the user in control."""
 
     kind: Literal["paste"]
     text: Annotated[str, Field(max_length=100_000), _Lines]
 
 
 class Left(_Message):
-    """The pointer has left the page, or the page is not typed into any more."""
+    """The pointer has left the page, or the page has lost the keyboard focus."""
 
     kind: Literal["leave", "blur"]
     held: Literal[0] = 0
 
 
 class PageChanged(_Message):
-    """Size of the page in the device's pixels, how many of these are one of CSS, and its colours."""
+    """The page has another size, in device pixels, pixel ratio (to those of CSS), or color scheme."""
 
     kind: Literal["page"]
     width: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
@@ -130,28 +128,28 @@ class PageChanged(_Message):
 
 
 class FrameShown(_Message):
-    """A picture has arrived."""
+    """A frame has arrived."""
 
     kind: Literal["shown"]
     number: int = Field(ge=0, lt=2**32)
 
 
 class Control(_Message):
-    """Request to hand control to the page of a number; 0 asks for it."""
+    """Control is handed to the page with a number; 0 requests control."""
 
     kind: Literal["control"]
     to: int = Field(ge=0, lt=2**31)
 
 
 class Named(_Message):
-    """The name of who looks at a page."""
+    """The user of a page has entered a name."""
 
     kind: Literal["name"]
     name: Annotated[str, Field(max_length=40), _Line]
 
 
 class UploadStarted(_Message):
-    """A file follows in binary messages: its name, and its size in bytes."""
+    """A file follows in binary messages; its size is in bytes."""
 
     kind: Literal["upload"]
     name: Annotated[str, Field(max_length=MAX_FILE_NAME_CHARACTERS), _Line]
@@ -159,92 +157,147 @@ class UploadStarted(_Message):
 
 
 class Uploaded(_Message):
-    """A file that has been put into the folder, to be opened."""
+    """A file was saved in the folder and is to be opened."""
 
     kind: Literal["uploaded"] = "uploaded"
     path: str
 
 
 InputMessage = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
-"""Messages of hands to a window."""
+"""Messages with input for a window."""
 Message = InputMessage | PageChanged | FrameShown | Control | Named | UploadStarted
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
-_NAMED_ALIKE = [
+_KEYS_WITH_SAME_NAME = [
     *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
-    *("Escape", "Backspace", "Tab", "Delete", "Insert", *(f"F{k}" for k in range(1, 13))),
+    *("Escape", "Backspace", "Tab", "Delete", "Insert"),
+    *(f"F{number}" for number in range(1, 13)),
 ]
-_KEYS = {name: getattr(pygame, f"K_{name.removeprefix('Arrow').upper()}") for name in _NAMED_ALIKE}
-_KEYS |= {"Enter": pygame.K_RETURN, "Shift": pygame.K_LSHIFT, "Control": pygame.K_LCTRL}
-_KEYS |= {"Alt": pygame.K_LALT, "Meta": pygame.K_LMETA}
-# pygame names keys by what they are without Shift, browsers by what they write
+_KEYS = {
+    **{name: getattr(pygame, f"K_{name.removeprefix('Arrow').upper()}") for name in _KEYS_WITH_SAME_NAME},
+    "Enter": pygame.K_RETURN,
+    "Shift": pygame.K_LSHIFT,
+    "Control": pygame.K_LCTRL,
+    "Alt": pygame.K_LALT,
+    "Meta": pygame.K_LMETA,
+}
+"""Keys of pygame by their names in browsers."""
+# pygame names keys by their characters without Shift, browsers by the characters that they write.
 _UNSHIFTED = str.maketrans('!@#$%^&*()_+{}|:"<>?~', "1234567890-=[]\\;',./`")
+_CHARACTER_KEYS = {"\n": "Enter", "\t": "Tab"}
+"""The on-screen keyboard of a phone writes these characters instead of pressing keys."""
+_SHIFT = 0b0001
+_CTRL = 0b0010
+_CTRL_OR_META = 0b1010
 _MODIFIERS = (pygame.KMOD_LSHIFT, pygame.KMOD_LCTRL, pygame.KMOD_LALT, pygame.KMOD_LMETA)
+"""Modifiers of pygame by the bits of `held`."""
 
 
 class EventTranslator:
-    """Turns what hands do to the page into pygame's events."""
+    """Translates messages of a page to events of pygame; remembers the pointer and its button."""
 
     def __init__(self) -> None:
-        self._at, self._pressed = (0, 0), 0
+        self._position = (0, 0)
+        self._pressed_button = 0
 
-    def events(self, message: InputMessage | Uploaded) -> Iterator[Event]:
+    def translate(self, message: InputMessage | Uploaded) -> Iterator[Event]:
+        """Yield the events that a message stands for."""
         match message:
             case PointerMoved():
-                yield self._moved(message.x, message.y, message.button)
+                yield self._move(message.x, message.y, message.button)
             case ButtonChanged():
-                yield self._moved(message.x, message.y, 0 if message.down else message.button)
-                kind = pygame.MOUSEBUTTONDOWN if message.down else pygame.MOUSEBUTTONUP
-                self._pressed = message.button * message.down
-                yield Event(kind, pos=self._at, button=message.button, touch=False)
+                yield from self._change_button(message)
             case WheelTurned():
-                yield self._moved(message.x, message.y, 0)
-                right, up = message.right, message.up
-                turned: dict[str, Any] = {"x": round(right), "y": round(up)}
-                turned |= {"precise_x": right, "precise_y": up}
-                yield Event(pygame.MOUSEWHEEL, **turned, flipped=False, touch=False)
+                yield self._move(message.x, message.y, 0)
+                yield Event(
+                    pygame.MOUSEWHEEL,
+                    x=round(message.right),
+                    y=round(message.up),
+                    precise_x=message.right,
+                    precise_y=message.up,
+                    flipped=False,
+                    touch=False,
+                )
             case KeyChanged():
                 yield from _translate_key(message)
             case TextTyped():
                 for character in message.text:
-                    # a telephone's keyboard writes a line break where another presses Enter
-                    key = {"\n": "Enter", "\t": "Tab"}.get(character, character)
-                    yield from _translate_key(KeyChanged(kind="key", key=key, down=True))
-                    yield from _translate_key(KeyChanged(kind="key", key=key, down=False))
+                    yield from _press_key(_CHARACTER_KEYS.get(character, character))
             case TextPasted():
                 clipboard.put(message.text)
-                for down in (True, False):
-                    yield from _translate_key(KeyChanged(kind="key", key="v", down=down, held=2))
+                yield from _press_key("v", held=_CTRL)
             case Uploaded():
                 yield Event(pygame.DROPFILE, file=message.path)
             case Left():
-                if message.kind == "blur" and self._pressed:  # it will be let go elsewhere
-                    yield Event(pygame.MOUSEBUTTONUP, pos=self._at, button=self._pressed, touch=False)
-                    self._pressed = 0
-                yield Event(pygame.WINDOWLEAVE if message.kind == "leave" else pygame.WINDOWFOCUSLOST)
+                yield from self._leave(message)
 
-    def _moved(self, x: float, y: float, button: int) -> Event:
-        before, self._at = self._at, (round(x), round(y))
-        rel = self._at[0] - before[0], self._at[1] - before[1]
-        buttons = tuple(int(button == k) for k in (1, 2, 3))
-        return Event(pygame.MOUSEMOTION, pos=self._at, rel=rel, buttons=buttons, touch=False)
+    def _change_button(self, message: ButtonChanged) -> Iterator[Event]:
+        if message.down:
+            yield self._move(message.x, message.y, 0)
+            self._pressed_button = message.button
+            kind = pygame.MOUSEBUTTONDOWN
+        else:
+            yield self._move(message.x, message.y, message.button)
+            self._pressed_button = 0
+            kind = pygame.MOUSEBUTTONUP
+        yield Event(kind, pos=self._position, button=message.button, touch=False)
+
+    def _leave(self, message: Left) -> Iterator[Event]:
+        if message.kind == "leave":
+            yield Event(pygame.WINDOWLEAVE)
+            return
+        if self._pressed_button:
+            # The page will not see that the button is released.
+            yield Event(pygame.MOUSEBUTTONUP, pos=self._position, button=self._pressed_button, touch=False)
+            self._pressed_button = 0
+        yield Event(pygame.WINDOWFOCUSLOST)
+
+    def _move(self, x: float, y: float, button: int) -> Event:
+        previous_x, previous_y = self._position
+        self._position = (round(x), round(y))
+        return Event(
+            pygame.MOUSEMOTION,
+            pos=self._position,
+            rel=(self._position[0] - previous_x, self._position[1] - previous_y),
+            buttons=tuple(int(button == number) for number in (1, 2, 3)),
+            touch=False,
+        )
 
 
 def get_modifiers(held: int) -> int:
-    return sum(mask for k, mask in enumerate(_MODIFIERS) if held >> k & 1)
+    """Return the modifiers of pygame for those that a page reports as held."""
+    return sum(modifier for bit, modifier in enumerate(_MODIFIERS) if held >> bit & 1)
+
+
+def _press_key(name: str, held: int = 0) -> Iterator[Event]:
+    """Yield the events of a key that is pressed and released."""
+    yield from _translate_key(KeyChanged(kind="key", key=name, down=True, held=held))
+    yield from _translate_key(KeyChanged(kind="key", key=name, down=False, held=held))
 
 
 def _translate_key(message: KeyChanged) -> Iterator[Event]:
-    name, held = message.key, message.held
+    name = message.key
     if not name:
         return
-    writes = name if len(name) == 1 and not held & 0b1010 else ""
-    code = _KEYS.get(name)
-    if code is None:
-        if len(name) > 1:
-            return  # keys that neither write nor mean anything here
-        plain = name.lower().translate(_UNSHIFTED) if held & 1 else name.lower()
-        code = ord(plain) if len(plain) == 1 and plain.isascii() else 0
-    pressed: dict[str, Any] = {"key": code, "mod": get_modifiers(held), "unicode": writes, "scancode": 0}
-    yield Event(pygame.KEYDOWN if message.down else pygame.KEYUP, **pressed)
-    if message.down and writes:
-        yield Event(pygame.TEXTINPUT, text=writes)
+    is_character = len(name) == 1
+    if name not in _KEYS and not is_character:
+        return  # A key without a meaning in the window.
+    text = name if is_character and not message.held & _CTRL_OR_META else ""
+    yield Event(
+        pygame.KEYDOWN if message.down else pygame.KEYUP,
+        key=_get_key_code(name, message.held),
+        mod=get_modifiers(message.held),
+        unicode=text,
+        scancode=0,
+    )
+    if message.down and text:
+        yield Event(pygame.TEXTINPUT, text=text)
+
+
+def _get_key_code(name: str, held: int) -> int:
+    """Return the key of pygame with a name in browsers; 0 for a character without a key."""
+    if name in _KEYS:
+        return int(_KEYS[name])
+    character = name.lower()
+    if held & _SHIFT:
+        character = character.translate(_UNSHIFTED)
+    return ord(character) if len(character) == 1 and character.isascii() else 0

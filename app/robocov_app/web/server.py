@@ -134,7 +134,7 @@ class WebDisplay:
         # the window's side
         self._wanted: events.PageChanged | None = None
         self._given: events.PageChanged | None = None
-        self._hands = events.EventTranslator()
+        self._translator = events.EventTranslator()
         self._held = 0
         self._narrow = False
         self._saved: tuple[str, ...] = ()
@@ -199,7 +199,7 @@ class WebDisplay:
                     return
                 self._held = held
                 pygame.key.set_mods(events.get_modifiers(held))
-            for event in self._hands.events(self._waiting.popleft()):
+            for event in self._translator.translate(self._waiting.popleft()):
                 pygame.event.post(event)
                 posted = True
 

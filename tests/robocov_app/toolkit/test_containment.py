@@ -166,7 +166,7 @@ def test_no_control_character_comes_in(tmp_path: Path) -> None:
         set_title(f"a{CONTROLS}b")
         assert pygame.display.get_caption()[0] == "ab"
         message = MESSAGES.validate_json(json.dumps({"kind": "paste", "text": "a\x00b"}))
-        assert list(EventTranslator().events(message))
+        assert list(EventTranslator().translate(message))
         assert clipboard.get() == "ab"
 
 

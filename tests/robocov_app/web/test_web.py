@@ -87,7 +87,7 @@ def test_a_picture_without_a_change_is_empty():
 )
 def test_keys_have_the_names_that_the_window_knows(key, held, name):
     told = json.dumps({"kind": "key", "key": key, "down": True, "held": held})
-    event = next(EventTranslator().events(MESSAGES.validate_json(told)))
+    event = next(EventTranslator().translate(MESSAGES.validate_json(told)))
     assert key_of(event) == name
 
 
@@ -111,7 +111,7 @@ def test_whatever_a_page_tells_is_understood_or_refused(told):
     except ValueError:
         return
     if not isinstance(message, PageChanged | FrameShown | Control | Named | UploadStarted):
-        for event in EventTranslator().events(message):
+        for event in EventTranslator().translate(message):
             assert event.type
 
 
@@ -282,7 +282,7 @@ def test_a_page_that_lost_its_line_is_known_again(display):
 def test_what_is_held_is_let_go_when_control_passes():
     hands, at = EventTranslator(), {"kind": "button", "x": 5, "y": 6, "button": 1}
     told = ({**at, "down": True}, {"kind": "blur"}, {"kind": "blur"})
-    found = [[each.type for each in hands.events(MESSAGES.validate_json(json.dumps(one)))] for one in told]
+    found = [[each.type for each in hands.translate(MESSAGES.validate_json(json.dumps(one)))] for one in told]
     assert found[1:] == [[pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST], [pygame.WINDOWFOCUSLOST]]
 
 
@@ -525,7 +525,7 @@ CONTROL_CHARACTERS = st.text(
 def test_events_of_a_window_have_no_control_characters(text, kind):
     told = {"kind": kind, "key": text, "down": True} if kind == "key" else {"kind": kind, "text": text}
     message = MESSAGES.validate_json(json.dumps(told))
-    for event in EventTranslator().events(message):
+    for event in EventTranslator().translate(message):
         written = getattr(event, "unicode", "") + getattr(event, "text", "")
         assert all(unicodedata.category(each) != "Cc" for each in written)
     if kind == "paste":
@@ -534,7 +534,7 @@ def test_events_of_a_window_have_no_control_characters(text, kind):
 
 def test_a_telephones_line_break_is_enter():
     message = MESSAGES.validate_json(json.dumps({"kind": "text", "text": "7\n"}))
-    keys = [event.key for event in EventTranslator().events(message) if event.type == pygame.KEYDOWN]
+    keys = [event.key for event in EventTranslator().translate(message) if event.type == pygame.KEYDOWN]
     assert keys == [pygame.K_7, pygame.K_RETURN]
 
 
