@@ -75,12 +75,35 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
     _report_deviation(layout.deviation, drawing.free, conversion)
     environment = _to_environment(layout, drawing.free, conversion)
     _report_unreachable(environment, conversion)
+    return environment, _build_report(
+        environment,
+        read=read,
+        drawing=drawing,
+        layout=layout,
+        cleaned=cleaned,
+        selection=selection,
+        conversion=conversion,
+    )
+
+
+def _build_report(
+    environment: Environment,
+    *,
+    read: MultiPolygon,
+    drawing: SimplifiedSpace,
+    layout: MapLayout,
+    cleaned: Cleaned,
+    selection: PartSelection,
+    conversion: Conversion,
+) -> ImportReport:
+    """Build the report on a conversion from the results of its steps."""
+    foreign = conversion.foreign
     vertex_count = count_vertices(environment)
     if vertex_count > MANY_VERTICES:
         conversion.notes.append(describe_vertex_count(vertex_count))
     width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
-    report = ImportReport(
-        source=where,
+    return ImportReport(
+        source=conversion.where,
         format=foreign.format,
         vertices_read=foreign.vertices_read,
         vertices_kept=vertex_count,
@@ -99,7 +122,6 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
         changed=tuple(conversion.changed),
         notes=tuple(conversion.notes),
     )
-    return environment, report
 
 
 def _remove_hairs(free: MultiPolygon, conversion: Conversion) -> Cleaned:
