@@ -10,7 +10,7 @@ import pytest
 from robocov.errors import OutputError
 from robocov.files.folder_lock import lock_folder
 from robocov_app.replication.plan import BeyondPlan, Plan
-from robocov_app.replication.results import RunnerOptions
+from robocov_app.replication.runner import RunnerOptions
 from robocov_app.terminal.interruption import Interruption
 
 TINY = Plan(

@@ -16,8 +16,10 @@ from robocov_app.terminal.output import BOLD, RIGHT, echo, print_answer, print_t
 
 if TYPE_CHECKING:
     from robocov_app.replication.claims import Claim
+    from robocov_app.replication.forecast import Forecast
     from robocov_app.replication.plan import Plan
-    from robocov_app.replication.results import BeyondResults, Forecast, PaperResults, RunnerOptions
+    from robocov_app.replication.results import BeyondResults, PaperResults
+    from robocov_app.replication.runner import RunnerOptions
 
 FAILED = 1
 """Exit status of a study with failed runs."""
@@ -98,8 +100,9 @@ class _Outcome:
 
 def command(options: Arguments) -> int:
     """Run `robocov paper`, and return its exit status."""
+    from robocov_app.replication.forecast import forecast_study
     from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
+    from robocov_app.replication.runner import RunnerOptions, StudyInterrupted, open_folder
     from robocov_app.sweep.executors import processors
 
     plan = QUICK if options.quick else FULL
@@ -115,14 +118,14 @@ def command(options: Arguments) -> int:
             keep_versions=options.keep_versions,
         )
         if not options.json:
-            expected = forecast(
+            expected = forecast_study(
                 out, plan, workers, claims=options.includes_claims, beyond=options.includes_beyond
             )
             text = _describe_forecast(expected, workers, on_cluster=bool(options.scheduler))
             echo(f"paper ({plan.name}): {text}", to_stderr=True, flush=True)
         try:
             outcome = _run_study(options, plan, runner)
-        except Interrupted:
+        except StudyInterrupted:
             return _print_interruption(options)
     _print_outcome(options, plan, outcome)
     return FAILED if outcome.failed else 0
@@ -136,7 +139,9 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
         return f"all {expected.runs:,} runs are done"
     finished = expected.runs - expected.left
     reused = f", {finished:,} of them done already" if finished else ""
-    seconds_per_run = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in expected.each.items())
+    seconds_per_run = ", ".join(
+        f"{name} {seconds:.2f} s" for name, seconds in expected.seconds_per_run.items()
+    )
     time = f"{duration(expected.seconds)} on {workers} processes"
     if on_cluster:
         time = f"{duration(expected.seconds * workers)} of computing, on a Dask cluster"
@@ -151,10 +156,11 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
 
     Raises
     ------
-    robocov_app.replication.results.Interrupted
+    robocov_app.replication.runner.StudyInterrupted
         If the user stops the study.
     """
-    from robocov_app.replication import claims, pages, results
+    from robocov_app.replication import execution, figure_files, pages
+    from robocov_app.replication.claims import judge_beyond_claims, judge_paper_claims
 
     out = options.out
     paper: PaperResults | None = None
@@ -162,21 +168,25 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
     paper_claims: list[Claim] = []
     beyond_claims: list[Claim] = []
     if options.includes_claims:
-        paper = results.run_paper(out, plan, runner)
-        paper_claims = claims.paper_claims(paper.convex, paper.claims, paper.gains)
-        pages.save_claims(out, paper_claims)
-    figure_runs = results.run_figures(out, plan, runner) if paper is None else paper.figures
+        paper = execution.run_paper(out, plan, runner)
+        paper_claims = judge_paper_claims(paper.convex, paper.claims, paper.gains)
+        pages.write_claims(out, paper_claims)
+    figure_runs = execution.run_figures(out, plan, runner) if paper is None else paper.figures
     if options.includes_beyond:
-        beyond = results.run_beyond(out, plan, runner, paper)
-        beyond_claims = list(claims.beyond_claims(beyond))
-        pages.save_claims(out, (*paper_claims, *beyond_claims))
-    first = results.partition_record()
-    images = pages.save_paper_figures(out, figure_runs, first, paper, quiet=options.json)
+        beyond = execution.run_beyond(out, plan, runner, paper)
+        beyond_claims = list(judge_beyond_claims(beyond))
+        pages.write_claims(out, (*paper_claims, *beyond_claims))
+    figures = figure_files.save_paper_figures(
+        out, figure_runs, execution.record_partition(), paper, quiet=options.json
+    )
     if beyond is not None:
-        beyond_images = pages.save_beyond_figures(out, beyond, quiet=options.json)
-        pages.save(out / pages.BEYOND_PAGE, pages.beyond_page(beyond_images, beyond))
-    page = pages.paper_page(plan, images, figure_runs, first, paper, paper_claims, beyond_claims)
-    pages.save(out / pages.PAGE, page)
+        beyond_figures = figure_files.save_beyond_figures(out, beyond, quiet=options.json)
+        beyond_page = pages.build_beyond_page(beyond_figures, beyond)
+        pages.write_text(out / pages.BEYOND_PAGE_FILE, beyond_page)
+    page = pages.build_paper_page(
+        plan, figures, figure_runs, results=paper, claims=paper_claims, beyond=beyond_claims
+    )
+    pages.write_text(out / pages.PAGE_FILE, page)
     return _Outcome(
         paper=paper,
         beyond=beyond,
@@ -228,6 +238,6 @@ def _print_claims(claims: Sequence[Claim]) -> None:
     for claim in claims:
         measured = "–"
         if claim.criteria:
-            measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}"
-        rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
+            measured = f"{claim.criteria[0].measure}: {claim.criteria[0].result_text}"
+        rows.append((claim.text, claim.verdict, measured, str(claim.runs)))
     print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)

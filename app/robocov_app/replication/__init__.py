@@ -1,1 +1,1 @@
-"""The paper again: its figures on environments of the same kinds, and its claims over many maps."""
+"""The paper's figures on environments of the same kinds, and its claims tested on many maps."""

@@ -11,19 +11,24 @@ from robocov.controllers import CONTROLLERS, get_gain_values, make_controller
 from robocov.controllers.gains import Value, format_value
 
 ASSETS = Path(__file__).parent / "assets"
+"""Folder of templates, captions and gain grids."""
 
-PAPER = ("rapf", "rpf", "lloyd")  # controllers of the paper's claims
-OURS = ("atlas", "atlas-shared")  # the project's own controllers; the goals are for the first
+PAPER = ("rapf", "rpf", "lloyd")
+"""Controllers of the paper's claims."""
+OURS = ("atlas", "atlas-shared")
+"""The project's own controllers. The goals are for the first."""
 
-BestGains: TypeAlias = Mapping[str, Mapping[str, Value]]  # of controllers that were tuned
+BestGains: TypeAlias = Mapping[str, Mapping[str, Value]]
+"""The best gains of controllers that were tuned, by controller."""
 
-# Potential parameters of both RAPF and RPF, as in the paper, which does not print its own: the repulsion then
-# holds a robot that is pulled with 1 N about 0.83 m off a wall.
 SHARED: Mapping[str, Value] = {"k_rep": 1.0, "rho_0": 2.0}
-# RAPF's k_att beside them: a metre from its goal a robot is pulled with 3 N, enough for full speed
-SHARED_ATTRACTION = 3.0
+"""Potential parameters of both RAPF and RPF, as in the paper, which does not print its own.
 
-# labels of the contenders of the paper's claims, in the order of tables
+The repulsion then holds a robot that is pulled with 1 N about 0.83 m away from a wall.
+"""
+SHARED_ATTRACTION = 3.0
+"""RAPF's k_att: at a distance of 1 m from its goal a robot is pulled with 3 N, enough for full speed."""
+
 LABELS = {
     "rapf-shared": "RAPF, shared gains",
     "rapf-best": "RAPF, its best gains",
@@ -32,11 +37,23 @@ LABELS = {
     "rpf-shared": "RPF, shared gains",
     "rpf-best": "RPF, its best gains",
 }
+"""Labels of the contenders of the paper's claims, in the order of tables."""
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A controller with the gains that differ from its defaults; `key` names it in files."""
+    """A controller with its gains.
+
+    Parameters
+    ----------
+    key : str
+        Name in files.
+    label : str
+        Name in figures and pages.
+    controller : str
+    gains : Mapping
+        Gains that differ from the defaults.
+    """
 
     key: str
     label: str
@@ -45,90 +62,154 @@ class Contender:
 
     @property
     def all_gains(self) -> dict[str, Value]:
+        """All gains, those that have their defaults included."""
         return dict(get_gain_values(make_controller(self.controller, self.gains)))
 
     @property
     def gains_text(self) -> str:
-        """All gains of the potential: "(k_rep 1, rho_0 2, no limit)"."""
-        return potential_text(self.all_gains, "no limit")
+        """All gains of the potential as text: "(k_rep 1, rho_0 2, no limit)"."""
+        return format_potential(self.all_gains, "no limit")
 
 
-def of_paper(key: str, gains: Mapping[str, Value]) -> Contender:
-    return Contender(key, LABELS[key], key.partition("-")[0], dict(gains))
+def build_paper_contender(key: str, gains: Mapping[str, Value]) -> Contender:
+    """Build a contender of the paper's claims from its key in `LABELS`."""
+    return Contender(key, LABELS[key], controller=key.partition("-")[0], gains=dict(gains))
 
 
-def with_gains(name: str, gains: Mapping[str, Value]) -> Contender:
-    return Contender(name, CONTROLLERS[name].label, name, dict(gains))
+def build_contender(name: str, gains: Mapping[str, Value]) -> Contender:
+    """Build a contender whose key is the name of its controller."""
+    return Contender(name, CONTROLLERS[name].label, controller=name, gains=dict(gains))
 
 
-RAPF_SHARED = of_paper("rapf-shared", {**SHARED, "k_att": SHARED_ATTRACTION, "attraction_limit": None})
-RPF_SHARED = of_paper("rpf-shared", SHARED)
-LLOYD = of_paper("lloyd", {})
-RAPF_DEFAULT = of_paper("rapf-default", {})
-UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)  # the paper's whose gains no grid chooses
+RAPF_SHARED = build_paper_contender(
+    "rapf-shared", {**SHARED, "k_att": SHARED_ATTRACTION, "attraction_limit": None}
+)
+RPF_SHARED = build_paper_contender("rpf-shared", SHARED)
+LLOYD = build_paper_contender("lloyd", {})
+RAPF_DEFAULT = build_paper_contender("rapf-default", {})
+UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)
+"""Contenders of the paper's claims whose gains are fixed."""
 
-# RAPF with each target in its cell
 TARGETS = (
     Contender("centroid", "the centroid", "rapf", {}),
     Contender("median", "the geometric median", "rapf", {"target": "median"}),
     Contender("sensing", "a sensor's best place, h = 1 m", "rapf", {"target": "sensing"}),
 )
+"""RAPF with each kind of target in its cell."""
 
-# controllers of teams with mixed speeds, with each kind of cells
 TEAMS = tuple(
     Contender(f"{name}-{cells}", f"{CONTROLLERS[name].label}, cells by {cells}", name, {"cells": cells})
-    for name in ("rapf", "lloyd")
-    for cells in ("distance", "time")
+    for name, cells in product(("rapf", "lloyd"), ("distance", "time"))
 )
+"""Controllers of teams with mixed speeds, with each kind of cells."""
 
-OWN = tuple(with_gains(name, {}) for name in OURS)
-
-
-def grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
-    return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
+OWN = tuple(build_contender(name, {}) for name in OURS)
+"""Contenders of our own controllers."""
 
 
-# sets of gains that are tried of each baseline
-GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
-    name: tuple(each for part in parts for each in grid(**part))
-    for name, parts in tomllib.loads((ASSETS / "grids.toml").read_text(encoding="utf-8")).items()
-}
+def combine_gains(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
+    """Return all combinations of gains.
+
+    Examples
+    --------
+    >>> combine_gains(k_rep=(1.0, 3.0), rho_0=(2.0,))
+    ({'k_rep': 1.0, 'rho_0': 2.0}, {'k_rep': 3.0, 'rho_0': 2.0})
+    """
+    return tuple(dict(zip(values, combination, strict=True)) for combination in product(*values.values()))
 
 
-def baselines(best: BestGains) -> tuple[Contender, ...]:
-    others = [name for name in CONTROLLERS if name not in (*PAPER, *OURS)]
-    return tuple(with_gains(name, best.get(name, {})) for name in others)
+def _load_gain_grids() -> dict[str, tuple[dict[str, Value], ...]]:
+    grids: dict[str, tuple[dict[str, Value], ...]] = {}
+    document = tomllib.loads((ASSETS / "grids.toml").read_text(encoding="utf-8"))
+    for name, parts in document.items():
+        sets: list[dict[str, Value]] = []
+        for part in parts:
+            sets.extend(combine_gains(**part))
+        grids[name] = tuple(sets)
+    return grids
 
 
-def paper_contenders(best: BestGains) -> tuple[Contender, ...]:
+GAIN_GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = _load_gain_grids()
+"""Sets of gains that are tried for each baseline."""
+
+
+def build_baselines(best: BestGains) -> tuple[Contender, ...]:
+    """Build the contenders of all controllers by other authors that the paper does not compare.
+
+    Parameters
+    ----------
+    best : Mapping
+        Their best gains. A controller without any keeps its defaults.
+
+    Returns
+    -------
+    tuple of Contender
+    """
+    names = [name for name in CONTROLLERS if name not in (*PAPER, *OURS)]
+    return tuple(build_contender(name, best.get(name, {})) for name in names)
+
+
+def build_paper_contenders(best: BestGains) -> tuple[Contender, ...]:
+    """Build the contenders of the paper's claims.
+
+    Parameters
+    ----------
+    best : Mapping
+        The best gains of RAPF and RPF. If it is empty, the contenders at the best gains are left out.
+
+    Returns
+    -------
+    tuple of Contender
+    """
     if not best:
         return UNTUNED
-    rapf, rpf = (of_paper(f"{name}-best", best[name]) for name in ("rapf", "rpf"))
+    rapf = build_paper_contender("rapf-best", best["rapf"])
+    rpf = build_paper_contender("rpf-best", best["rpf"])
     return (RAPF_SHARED, rapf, RAPF_DEFAULT, RPF_SHARED, rpf, LLOYD)
 
 
-def strongest(contenders: Sequence[Contender]) -> list[Contender]:
-    """Return RAPF at its best gains, or where those are not known with its default ones, and LA."""
-    by_key = {each.key: each for each in contenders}
+def select_strongest(contenders: Sequence[Contender]) -> list[Contender]:
+    """Return RAPF at its best gains, or at its defaults if those are not known, and LA."""
+    by_key = {contender.key: contender for contender in contenders}
     rapf = by_key.get("rapf-best") or by_key.get("rapf-default")
-    return [each for each in (rapf, by_key.get("lloyd")) if each is not None]
+    return [contender for contender in (rapf, by_key.get("lloyd")) if contender is not None]
 
 
-def distinct_gains(contenders: Sequence[Contender]) -> dict[str, list[dict[str, Value]]]:
-    """Return all sets of gains by controller, each once: a controller's best gains may be the shared ones."""
-    found: dict[str, list[dict[str, Value]]] = {}
-    for each in contenders:
-        sets = found.setdefault(each.controller, [])
-        sets += [each.all_gains] * (each.all_gains not in sets)
-    return found
+def collect_gain_sets(contenders: Sequence[Contender]) -> dict[str, list[dict[str, Value]]]:
+    """Return all sets of gains by controller.
+
+    Each set is listed once: the best gains of a controller may be the shared ones.
+    """
+    gain_sets: dict[str, list[dict[str, Value]]] = {}
+    for contender in contenders:
+        sets = gain_sets.setdefault(contender.controller, [])
+        if contender.all_gains not in sets:
+            sets.append(contender.all_gains)
+    return gain_sets
 
 
-def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
-    """Return gains of the potential, numbers all: "(k_rep 1, rho_0 2)"; `no_limit`: unlimited attraction."""
-    known = {name: each for name, each in gains.items() if not isinstance(each, str) and name != "height"}
-    parts = [
-        no_limit if each is None and name == "attraction_limit" else f"{name} {format_value(each)}"
-        for name, each in known.items()
-        if each is not None or no_limit
-    ]
-    return f"({', '.join(parts)})"
+def format_potential(gains: Mapping[str, Value], no_limit: str = "") -> str:
+    """Return the numeric gains of a potential as text.
+
+    Parameters
+    ----------
+    gains : Mapping
+    no_limit : str
+        Text for an unlimited attraction. If it is empty, gains without a value are left out.
+
+    Examples
+    --------
+    >>> format_potential({"k_rep": 1.0, "rho_0": 2.0, "attraction_limit": None})
+    '(k_rep 1, rho_0 2)'
+    """
+    texts = []
+    for name, value in gains.items():
+        if isinstance(value, str) or name == "height":
+            continue
+        if value is None and not no_limit:
+            continue
+        if value is None and name == "attraction_limit":
+            texts.append(no_limit)
+        else:
+            texts.append(f"{name} {format_value(value)}")
+    return f"({', '.join(texts)})"

@@ -1,4 +1,4 @@
-"""Tables of what every contender reached, side by side, and what is said of each controller."""
+"""Evidence on every controller: summaries of its outcomes, comparisons, and what is known of it."""
 
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,166 +11,286 @@ import numpy as np
 from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
 from robocov.controllers.gains import format_value
 from robocov_app.figures.statistics import Interval, bootstrap, group_by, median_time
-from robocov_app.replication.claims import amount, capitalised, share_above_zero
+from robocov_app.replication.claims.explanations import compute_positive_fraction
 from robocov_app.replication.contenders import ASSETS, OWN, Contender
-from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
+from robocov_app.replication.formatting import NO_VALUE, capitalize, format_amount
+from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
 from robocov_app.replication.results import IDEAL, BeyondResults, Degradation
-from robocov_app.replication.studies import AXES, WORSE
+from robocov_app.replication.studies import AXES, STRONG_INDEX
 
-WORST_MAPS = 3  # so many maps are named on which a controller does worst
-MEDIANS = ("final", "over_run", "path", "work")  # of a law, in a table
-OFTEN = 0.05  # a failure is told of a controller when it happens in more than 5 % of its runs
+_MAX_WORST_MAPS = 3
+"""Number of maps that are named as the worst of a controller."""
+_MEDIAN_MEASURES = ("final", "over_run", "path", "work")
+_MIN_REPORTED_FRACTION = 0.05
+"""A failure is reported if it happens in more than this fraction of the runs."""
 
 
-class Account(NamedTuple):
-    """A controller: the `information` it goes by, its source in short and in full, and what it does."""
+class ControllerProfile(NamedTuple):
+    """What is known of a controller."""
 
     controller: str
     label: str
     information: str
-    short: str
+    """The information that it uses."""
+    short_source: str
     source: str
-    does: str
+    behavior: str
 
 
 @dataclass(frozen=True)
-class LawRow:
-    """Results of one contender over all scenarios."""
+class ContenderSummary:
+    """Summary of the outcomes of one contender.
+
+    Parameters
+    ----------
+    contender : Contender
+    runs : int
+    gap : Interval
+        Median of J / J_ref - 1.
+    quartiles : tuple of float
+        Quartiles of the gap.
+    contact_fraction : float
+        Fraction of runs in which a robot touches something.
+    stuck_fraction : float
+        Fraction of runs that end with a robot stuck; nan if the controller has no goals.
+    rest_fraction : float
+        Fraction of runs that come to rest.
+    rest_time : float
+        Median time until rest by Kaplan and Meier, s; inf if most runs do not come to rest.
+    medians : Mapping
+        Medians of J at the end (``final``) and over the run (``over_run``), of the path length of a robot, m
+        (``path``), and of the work of the team, J (``work``).
+    """
 
     contender: Contender
     runs: int
-    gap: Interval  # median of J/J_ref - 1
+    gap: Interval
     quartiles: tuple[float, float]
-    touched: float  # share of runs in which a robot touches something
-    stuck: float  # that end with a robot stuck; nan where a law has no goals
-    settled: float  # that come to rest
-    settling: float  # s, median time until they do, by Kaplan and Meier; inf where most do not
-    medians: Mapping[str, float]  # of J at the end (final), its mean over_run, a robot's path, m; of work, J
+    contact_fraction: float
+    stuck_fraction: float
+    rest_fraction: float
+    rest_time: float
+    medians: Mapping[str, float]
+
+
+class Duel(NamedTuple):
+    """Comparison of one of our controllers with a contender."""
+
+    own_label: str
+    label: str
+    pairs: PairedComparison
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Evidence on a registered controller."""
+class ControllerEvidence:
+    """Evidence on a registered controller.
 
-    account: Account
-    rows: Sequence[LawRow]  # of its contenders; what follows is of the best, the first
-    maps: Mapping[str, float]  # median gaps
-    duels: Sequence[tuple[str, str, Comparison]]  # labels of one of ours and of a contender
-    fails: str  # where it does, in words
-    gains: str
+    Parameters
+    ----------
+    profile : ControllerProfile
+    summaries : sequence of ContenderSummary
+        Summaries of its contenders. Everything else is of the first, the best.
+    medians_by_map : Mapping
+        Median gap on each map.
+    duels : sequence of Duel
+    failures : str
+        Where it fails, in sentences.
+    tuning : str
+        How its gains were tuned, in a sentence; empty if they were not.
+    """
+
+    profile: ControllerProfile
+    summaries: Sequence[ContenderSummary]
+    medians_by_map: Mapping[str, float]
+    duels: Sequence[Duel]
+    failures: str
+    tuning: str
 
 
 @cache
-def account_of(controller: str) -> Account:
-    """Return what is said of a controller; of one that nothing is known of, its own summary."""
-    kind = load_controller_class(controller)
-    known = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8")).get(controller, {})
-    source = known.get("source", "")
-    if not known.get("read", True):
+def load_profile(controller: str) -> ControllerProfile:
+    """Return the profile of a controller. Without an entry in the file it is its own summary."""
+    controller_class = load_controller_class(controller)
+    profiles = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8"))
+    entry = profiles.get(controller, {})
+    source = entry.get("source", "")
+    if not entry.get("read", True):
         source = source.removesuffix(".") + "; made from what is generally known of it, not from its text."
-    does = known.get("does") or f"{capitalised(kind.summary).rstrip('.')}."
-    return Account(controller, kind.label, get_information(kind), known.get("short", "–"), source, does)
+    behavior = entry.get("does") or f"{capitalize(controller_class.summary).rstrip('.')}."
+    return ControllerProfile(
+        controller=controller,
+        label=controller_class.label,
+        information=get_information(controller_class),
+        short_source=entry.get("short", NO_VALUE),
+        source=source,
+        behavior=behavior,
+    )
 
 
-def law_rows(outcomes: Outcomes, contenders: Iterable[Contender], duration: float) -> list[LawRow]:
-    rows = []
-    for each in contenders:
-        fine = outcomes.measured("gap", each.key)
-        if not fine.scenarios:
+def summarize_contenders(
+    outcomes: Outcomes, contenders: Iterable[Contender], duration: float
+) -> list[ContenderSummary]:
+    """Summarize the outcomes of contenders.
+
+    Parameters
+    ----------
+    outcomes : Outcomes
+    contenders : iterable of Contender
+        Those without any gap are left out.
+    duration : float
+        Duration of the runs, s.
+
+    Returns
+    -------
+    list of ContenderSummary
+    """
+    summaries = []
+    for contender in contenders:
+        known = outcomes.select_finite("gap", contender.key)
+        if not known.instances:
             continue
-        gap, settled = fine.of(each.key, "gap"), fine.of(each.key, "settled")
-        low, high = np.quantile(gap, [0.25, 0.75]).tolist()
-        rest = settled[np.isfinite(settled)]
-        rows.append(
-            LawRow(
-                each,
-                runs=len(gap),
-                gap=bootstrap(gap, clusters=fine.maps),
+        gaps = known.get_values(contender.key, "gap")
+        low, high = np.quantile(gaps, [0.25, 0.75]).tolist()
+        settled = known.get_values(contender.key, "settled")
+        rest_times = settled[np.isfinite(settled)]
+        censored = np.full(len(settled) - len(rest_times), duration)
+        medians = {name: np.median(known.get_values(contender.key, name)) for name in _MEDIAN_MEASURES}
+        summaries.append(
+            ContenderSummary(
+                contender,
+                runs=len(gaps),
+                gap=bootstrap(gaps, clusters=known.maps),
                 quartiles=(low, high),
-                touched=share_above_zero(fine.of(each.key, "contacts")),
-                stuck=share_above_zero(fine.of(each.key, "stuck")),
-                settled=len(rest) / len(settled),
-                settling=median_time(rest, np.full(len(settled) - len(rest), duration)),
-                medians={name: np.median(fine.of(each.key, name)) for name in MEDIANS},
+                contact_fraction=compute_positive_fraction(known.get_values(contender.key, "contacts")),
+                stuck_fraction=compute_positive_fraction(known.get_values(contender.key, "stuck")),
+                rest_fraction=len(rest_times) / len(settled),
+                rest_time=median_time(rest_times, censored),
+                medians=medians,
             )
         )
-    return rows
+    return summaries
 
 
-def ranked_rows(results: BeyondResults) -> list[LawRow]:
-    rows = law_rows(results.outcomes, results.contenders, results.plan.duration)
-    return sorted(rows, key=lambda row: row.gap.estimate)
+def rank_contenders(results: BeyondResults) -> list[ContenderSummary]:
+    """Return the summaries of all contenders, the lowest median gap first."""
+    summaries = summarize_contenders(results.outcomes, results.contenders, results.plan.duration)
+    return sorted(summaries, key=lambda summary: summary.gap.estimate)
 
 
-def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
-    own = group_by(rows, lambda row: row.contender.controller)
-    return [
-        Evidence(
-            account_of(name),
-            each,
-            maps=results.outcomes.median_by_map(each[0].contender.key),
-            duels=duels(results, each),
-            fails=failure_text(results.outcomes, each[0]),
-            gains=gains_text(name, results.gains[name]) if name in results.gains else "",
+def collect_evidence(
+    results: BeyondResults, summaries: Iterable[ContenderSummary]
+) -> list[ControllerEvidence]:
+    """Collect the evidence on every controller, in the order of the summaries."""
+    by_controller = group_by(summaries, lambda summary: summary.contender.controller)
+    evidence = []
+    for name, own_summaries in by_controller.items():
+        best = own_summaries[0]
+        tuning = describe_tuning(name, results.gains[name]) if name in results.gains else ""
+        evidence.append(
+            ControllerEvidence(
+                load_profile(name),
+                own_summaries,
+                medians_by_map=results.outcomes.compute_medians_by_map(best.contender.key),
+                duels=_list_duels(results, own_summaries),
+                failures=describe_failures(results.outcomes, best),
+                tuning=tuning,
+            )
         )
-        for name, each in own.items()
-    ]
+    return evidence
 
 
-def duels(results: BeyondResults, rows: Sequence[LawRow]) -> list[tuple[str, str, Comparison]]:
-    both = [(ours, row.contender) for ours in OWN for row in rows if row.contender.key != ours.key]
-    pairs = [(a.label, b.label, results.outcomes.compared(a.key, b.key)) for a, b in both]
-    return [(first, second, found) for first, second, found in pairs if found is not None]
+def _list_duels(results: BeyondResults, summaries: Sequence[ContenderSummary]) -> list[Duel]:
+    duels = []
+    for own in OWN:
+        for summary in summaries:
+            other = summary.contender
+            if other.key == own.key:
+                continue
+            pairs = results.outcomes.compare(own.key, other.key)
+            if pairs is not None:
+                duels.append(Duel(own.label, other.label, pairs))
+    return duels
 
 
-def conditions_rows(results: BeyondResults, rows: Iterable[LawRow]) -> dict[str, list[Degradation]]:
-    """Return by controller, in the order of `rows`, what it bears: no disturbance, then one of each kind."""
-    known = {(each.controller, each.axis, each.value): each for each in results.degradations}
-    wanted = (IDEAL, None), *((axis, values[WORSE]) for axis, values in AXES.items())
-    names = dict.fromkeys(row.contender.controller for row in rows)
-    return {name: [known[name, *at] for at in wanted] for name in names}
+def collect_degradations(
+    results: BeyondResults, summaries: Iterable[ContenderSummary]
+) -> dict[str, list[Degradation]]:
+    """Return the degradations of each controller: without any disturbance, then with strong ones.
+
+    Parameters
+    ----------
+    results : BeyondResults
+    summaries : iterable of ContenderSummary
+        They give the order of the controllers.
+
+    Returns
+    -------
+    dict
+        Degradations by controller.
+    """
+    by_value = {(each.controller, each.axis, each.value): each for each in results.degradations}
+    names = dict.fromkeys(summary.contender.controller for summary in summaries)
+    degradations = {}
+    for name in names:
+        strong = [by_value[name, axis, values[STRONG_INDEX]] for axis, values in AXES.items()]
+        degradations[name] = [by_value[name, IDEAL, None], *strong]
+    return degradations
 
 
-def failure_text(outcomes: Outcomes, law: LawRow) -> str:
-    key = law.contender.key
-    medians = sorted(outcomes.median_by_map(key).items(), key=lambda item: -item[1])[:WORST_MAPS]
-    highest = ", ".join(f"{name} {amount(high, '%')}" for name, high in medians)
-    gap = outcomes.of(key, "gap")
-    worst = int(np.nanargmax(gap))
-    words = f"Highest medians: {highest}. Worst run: {amount(gap[worst], '%')} above the reference"
-    troubles = "; ".join(
-        f"{words} in {amount(share, '%')} of the runs"
-        for share, words in (
-            (law.touched, "robots touch a wall or each other"),
-            (law.stuck, "a robot is stuck away from its goal"),
-            (1.0 - law.settled, "the team is not at rest at the end"),
-        )
-        if share > OFTEN
+def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
+    """Return in sentences where a contender is worst, and how often its runs fail."""
+    key = summary.contender.key
+    medians = outcomes.compute_medians_by_map(key)
+    worst_maps = sorted(medians.items(), key=lambda item: -item[1])[:_MAX_WORST_MAPS]
+    highest = ", ".join(f"{name} {format_amount(median, '%')}" for name, median in worst_maps)
+    gaps = outcomes.get_values(key, "gap")
+    worst = int(np.nanargmax(gaps))
+    text = (
+        f"Highest medians: {highest}. Worst run: {format_amount(gaps[worst], '%')} above the reference "
+        f"({outcomes.instances[worst]})."
     )
-    if not troubles and law.touched == 0.0:
-        troubles = "No contact in any run"
-    words = f"{words} ({outcomes.scenarios[worst]})."
-    return f"{words} {capitalised(troubles)}." if troubles else words
+    failures = _list_failures(summary)
+    return f"{text} {failures}" if failures else text
 
 
-def gains_text(controller: str, grid: GainOutcomes) -> str:
-    grid = grid.complete
-    if not grid.scenarios:
+def _list_failures(summary: ContenderSummary) -> str:
+    failures = (
+        (summary.contact_fraction, "robots touch a wall or each other"),
+        (summary.stuck_fraction, "a robot is stuck away from its goal"),
+        (1.0 - summary.rest_fraction, "the team is not at rest at the end"),
+    )
+    texts = []
+    for fraction, description in failures:
+        if fraction > _MIN_REPORTED_FRACTION:
+            texts.append(f"{description} in {format_amount(fraction, '%')} of the runs")
+    if texts:
+        return f"{capitalize('; '.join(texts))}."
+    return "No contact in any run." if summary.contact_fraction == 0.0 else ""
+
+
+def describe_tuning(controller: str, outcomes: GainOutcomes) -> str:
+    """Return in a sentence which gains of a controller were the best, and by how much."""
+    grid = outcomes.select_complete()
+    if not grid.instances:
         return "Gains: its defaults; in every scenario of the tuning some run failed."
-    best, worst = grid.best(), int(np.argmax(grid.excess.mean(axis=1)))
+    best = grid.find_best()
+    worst = int(np.argmax(grid.excess.mean(axis=1)))
     varied = [name for name in grid.gains[best] if len({gains[name] for gains in grid.gains}) > 1]
     values = ", ".join(f"{name} {format_value(grid.gains[best][name])}" for name in varied)
-    usual = dict(get_gain_values(make_controller(controller)))
-    own = next((k for k, gains in enumerate(grid.gains) if dict(gains) == usual), None)
-    means = [amount(mean) for mean in grid.excess.mean(axis=1)]
+    defaults = dict(get_gain_values(make_controller(controller)))
+    default_rows = [k for k, gains in enumerate(grid.gains) if dict(gains) == defaults]
+    default_row = default_rows[0] if default_rows else None
+    means = [format_amount(mean) for mean in grid.excess.mean(axis=1)]
 
-    def ratio(row: int) -> str:
-        return f"median ratio {amount(float(np.median(grid.excess[best] / grid.excess[row])))}"
+    def describe_ratio(row: int) -> str:
+        ratio = float(np.median(grid.excess[best] / grid.excess[row]))
+        return f"median ratio {format_amount(ratio)}"
 
-    words = (
-        f"Gains: {values}{', as by default' if own == best else ''}: of {len(grid.gains)} sets the best on "
+    as_default = ", as by default" if default_row == best else ""
+    text = (
+        f"Gains: {values}{as_default}: of {len(grid.gains)} sets the best on "
         f"{len(set(grid.maps))} maps of the tuning, mean J/J_ref {means[best]}"
     )
-    if own is not None and own != best:
-        words += f"; with its defaults {means[own]}, {ratio(own)}"
-    return f"{words}; with the worst set {means[worst]}, {ratio(worst)}."
+    if default_row is not None and default_row != best:
+        text += f"; with its defaults {means[default_row]}, {describe_ratio(default_row)}"
+    return f"{text}; with the worst set {means[worst]}, {describe_ratio(worst)}."

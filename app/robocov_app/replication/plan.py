@@ -6,97 +6,174 @@ from typing import Any
 
 from robocov_app.replication.contenders import OURS
 
-ROBOTS = 6  # as in the paper
-PARTITION_SEED = 56  # of the robots in figure 1: none hides the centre of mass of its cell
+ROBOTS = 6
+"""Size of the team, as in the paper."""
+PARTITION_SEED = 56
+"""Seed of the robots in figure 1, where none hides the center of mass of its cell."""
 
-# Kinds of starts, the same on all maps: a disc near the lower left corner, as in the paper's figures 4 and 6,
-# one near the middle, or anywhere in the free space; in convex regions also the smallest disc that holds six
-# robots with a little room, near the corner. All but the last are clustered.
 KINDS = ("corner", "centre", "uniform")
+"""Kinds of starts, the same on all maps.
+
+"corner": a disc near the lower left corner, as in the paper's figures 4 and 6. "centre": a disc near the
+middle. "uniform": anywhere in the free space.
+"""
 CONVEX_KINDS = ("corner", "centre", "tight", "uniform")
+"""Kinds of starts in convex regions. "tight": near the corner, the smallest disc for six robots."""
 
-# bundled maps of the study: all that are not convex, but for ``campus``, which is 120 m wide: at 1 m/s the
-# robots would not have arrived when the run ends
 NON_CONVEX = (
-    *("blocks-a", "blocks-b", "l-shape", "rooms", "trap", "gaps", "cave", "courtyard", "corridor"),
-    *("museum", "office", "warehouse", "city"),
+    "blocks-a",
+    "blocks-b",
+    "l-shape",
+    "rooms",
+    "trap",
+    "gaps",
+    "cave",
+    "courtyard",
+    "corridor",
+    "museum",
+    "office",
+    "warehouse",
+    "city",
 )
-CONVEX = ("square", "pentagon")  # bundled maps of the convex case
-UNSEEN = ("blocks", "rooms", "caves", "mazes")  # families of generated maps that no claim is tested on
+"""Bundled maps of the study: all that are not convex, except for ``campus``. It is 120 m wide: at 1 m/s the
+robots would not have arrived when the run ends."""
+CONVEX = ("square", "pentagon")
+"""Bundled maps of the convex case."""
+UNSEEN = ("blocks", "rooms", "caves", "mazes")
+"""Kinds of generated maps on which no claim of the paper is tested."""
 
-# Of every controller's team. The sensors reach as far as the longest repulsion of the grids, so that `rho_0`
-# alone says how far an obstacle acts; robots hear each other everywhere.
-TEAM: Mapping[str, Any] = {"radius": 0.1, "max_speed": 1.0, "max_acceleration": 2.0, "viscosity": 2.0} | {
+TEAM: Mapping[str, Any] = {
+    "radius": 0.1,
+    "max_speed": 1.0,
+    "max_acceleration": 2.0,
+    "viscosity": 2.0,
     "sensing_range": 6.0,
     "communication_range": None,
 }
+"""Team of every controller.
+
+The sensors reach as far as the longest repulsion of the gain grids, so that `rho_0` alone limits the range of
+obstacles. Communication is unlimited.
+"""
 
 
 @dataclass(frozen=True)
 class BeyondPlan:
-    """Extent of the study beyond the paper; by default the full one, ours as often as RAPF."""
+    """Extent of the study beyond the paper, by default of the full one.
 
-    # of baselines and ours: bundled maps, seeds of generated ones, kinds and seeds of starts, of the claims'
+    Our own controller runs as often as RAPF.
+
+    Parameters
+    ----------
+    bundled, generated, starts, seeds : tuple
+        Bundled maps, seeds of generated maps, kinds and seeds of starts for the baselines and our own
+        controllers. They are among those of the paper's claims.
+    own_seeds, shared_seeds : tuple of int
+        Seeds of starts for our own controller, and for the one that shares its map.
+    tuning : tuple of int
+        Seeds of the generated maps on which the gains of the baselines are tuned, among those of the paper's
+        tuning. Without any, the baselines keep their default gains.
+    unseen : tuple of int
+        Seeds of maps of other kinds than those of the claims, `UNSEEN`, on which our own controller is
+        judged again, next to RAPF and LA.
+    maps, map_starts : tuple
+        Seeds of generated maps, and kinds of starts, for targets, density and mixed teams.
+    conditions_maps : tuple of str
+        Maps for disturbances: all but the largest.
+    conditions_seeds : int
+        Number of seeds for disturbances.
+    conditions_duration : float
+        Duration of these runs, s.
+    probe : float
+        Duration of the runs by which the computing time is estimated, s. Controllers that plan compute most
+        at first: shorter runs make them appear slower than they are.
+    worst : int
+        Number of our worst runs that are shown, on different maps.
+    warm_up : int
+        Number of steps before those that are timed.
+    blocks : int
+        Number of blocks of steps that are timed.
+    large, huge : int
+        Sizes of teams whose steps are timed, in addition to `ROBOTS`.
+    """
+
     bundled: tuple[str, ...] = NON_CONVEX
     generated: tuple[int, ...] = tuple(range(1, 21))
     starts: tuple[str, ...] = KINDS
     seeds: tuple[int, ...] = (0,)
-    own_seeds: tuple[int, ...] = (0, 1, 2, 3)  # of our own controller
-    shared_seeds: tuple[int, ...] = (0,)  # of that which shares its map
-    # generated maps of the baselines' grids, among those of the paper's; without any they keep their defaults
+    own_seeds: tuple[int, ...] = (0, 1, 2, 3)
+    shared_seeds: tuple[int, ...] = (0,)
     tuning: tuple[int, ...] = (101, 102, 103, 104)
-    # seeds of maps of other families than those of the claims, `UNSEEN`: our own controller is judged there
-    # once more, beside RAPF and LA
     unseen: tuple[int, ...] = (301, 302, 303)
-    # targets, density and mixed teams
     maps: tuple[int, ...] = tuple(range(1, 13))
     map_starts: tuple[str, ...] = KINDS
-    # disturbances
-    conditions_maps: tuple[str, ...] = NON_CONVEX[:-1]  # but for the largest
-    conditions_seeds: int = 3  # how many
-    conditions_duration: float = 60.0  # s
-    # s of the runs by which the time of the others is estimated: controllers that plan compute most at first,
-    # and by short ones are taken for slower than they are
+    conditions_maps: tuple[str, ...] = NON_CONVEX[:-1]
+    conditions_seeds: int = 3
+    conditions_duration: float = 60.0
     probe: float = 60.0
-    worst: int = 4  # how many of our worst runs are shown, on different maps
-    warm_up: int = 100  # steps before those that are timed
-    blocks: int = 5  # blocks of steps that are timed
-    large: int = 50  # sizes of teams whose steps are timed, beside `ROBOTS`
+    worst: int = 4
+    warm_up: int = 100
+    blocks: int = 5
+    large: int = 50
     huge: int = 200
 
-    def seeds_of(self, controller: str) -> tuple[int, ...]:
-        return dict(zip(OURS, (self.own_seeds, self.shared_seeds), strict=True)).get(controller, self.seeds)
+    def get_seeds(self, controller: str) -> tuple[int, ...]:
+        """Return the seeds of the starts of a controller."""
+        own_seeds = dict(zip(OURS, (self.own_seeds, self.shared_seeds), strict=True))
+        return own_seeds.get(controller, self.seeds)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Extent of a study; by default the full one: 100 non-convex maps, 100 convex regions, 12 for gains."""
+    """Extent of a study, by default of the full one: 100 non-convex maps, 100 convex regions, 12 for gains.
 
-    name: str  # "full" or "quick"
+    Parameters
+    ----------
+    name : str
+        "full" or "quick".
+    beyond : BeyondPlan
+    duration : float
+        Duration of every run, s.
+    dt : float
+        Control period, s.
+    lattice : int
+        Sites along a side of the lattice of the coverage cost.
+    bundled, generated, seeds : tuple
+        Bundled maps, seeds of generated maps, and seeds of the starts for the claims. Together they are 100
+        maps, see `NEARLY_ALWAYS` in `robocov_app.replication.claims.thresholds`.
+    tuning, tuning_starts, tuning_seed : tuple, tuple and int
+        Seeds of the generated maps for the gain grids, none of them in `generated`, kinds of starts, and a
+        seed of the starts that no claim uses.
+    k_rep, rho_0, k_att : tuple of float
+        Gains in the grids.
+    convex_generated, convex_seeds : tuple of int
+        Seeds of the convex regions next to the bundled ones, and seeds of the starts there.
+    restarts : int
+        Restarts of the search for the reference placement.
+    """
+
+    name: str
     beyond: BeyondPlan
-    duration: float = 120.0  # s, of every run
-    dt: float = 0.02  # s, its control period
-    lattice: int = 128  # of the coverage cost
-    # of the claims: bundled maps, seeds of generated ones, seeds of the starts; 100 maps, see `NEARLY_ALWAYS`
+    duration: float = 120.0
+    dt: float = 0.02
+    lattice: int = 128
     bundled: tuple[str, ...] = NON_CONVEX
     generated: tuple[int, ...] = tuple(range(1, 88))
     seeds: tuple[int, ...] = (0, 1, 2, 3)
-    # of the grids of gains: generated maps, none of them in `generated`, a seed of starts that no claim has
     tuning: tuple[int, ...] = tuple(range(101, 113))
     tuning_starts: tuple[str, ...] = ("corner", "uniform")
     tuning_seed: int = 1000
     k_rep: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0)
     rho_0: tuple[float, ...] = (1.0, 2.0, 3.0, 6.0)
     k_att: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0)
-    # convex regions beside the bundled ones, and seeds of the starts there
     convex_generated: tuple[int, ...] = tuple(range(98))
     convex_seeds: tuple[int, ...] = (0, 1)
-    restarts: int = 24  # of the search for the centralised reference
+    restarts: int = 24
 
 
 FULL = Plan("full", BeyondPlan())
+"""The full study."""
 
-# enough to see that everything works, too little to decide much; ends within four minutes
 QUICK = Plan(
     name="quick",
     duration=60.0,
@@ -128,3 +205,4 @@ QUICK = Plan(
         blocks=1,
     ),
 )
+"""The quick study: enough to see that everything works, too little to decide much. It takes four minutes."""

@@ -1,4 +1,4 @@
-"""Times of a step of every controller, beside RAPF's, measured in turn; kept in a file."""
+"""Computing times of a step of every controller, measured in turn with RAPF's; stored in a file."""
 
 import hashlib
 import json
@@ -19,99 +19,164 @@ from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.plan import TEAM, Plan
 from robocov_app.sweep.parameters import build_swept_team
 
-YARDSTICK = "rapf"  # the controller whose steps the others' are measured by
-MAP = "campus"  # where steps are timed: the largest of the bundled maps has room for large teams
-BLOCK = 50  # steps that are timed together: what is done now and then, a scan or a plan, counts by its share
-FILE = "steps.json"
-_FINE = 1e-5  # s: what a clock has to tell apart, a block of the quickest steps being some milliseconds
-_HEAD = {"format": "robocov-steps", "version": 1}
+BASELINE = "rapf"
+"""Controller whose steps the others' are compared with."""
+TIMING_MAP = "campus"
+"""Map on which steps are timed: the largest bundled one, which has space for large teams."""
+STEPS_PER_BLOCK = 50
+"""Number of steps that are timed together, so that occasional scans and plans count by their share."""
+STEP_TIMES_FILE = "steps.json"
 UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
+"""Interval of an unknown value."""
+_MAX_CLOCK_RESOLUTION_S = 1e-5
+"""A block of the quickest steps takes a few milliseconds."""
+_HEAD = {"format": "robocov-steps", "version": 1}
 
 
 @dataclass(frozen=True)
 class StepTimes:
-    """Time of a step, s, in each of some blocks of `BLOCK` steps, by controller; all were timed in turn."""
+    """Computing times of steps of one team, measured in turn for all controllers.
+
+    Parameters
+    ----------
+    robots : int
+        Size of the team.
+    dt : float
+        Simulation time of a step, s.
+    seconds : Mapping
+        Mean computing time of a step in each block, s, by controller.
+    """
 
     robots: int
-    dt: float  # s, simulated time of a step
+    dt: float
     seconds: Mapping[str, tuple[float, ...]]
 
-    def ratio_interval(self, controller: str) -> Interval:
-        own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
-        return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
+    def compute_ratio(self, controller: str) -> Interval:
+        """Return the ratio of the step time of a controller to that of RAPF."""
+        times = self.seconds.get(controller)
+        baseline_times = self.seconds.get(BASELINE)
+        if not times or not baseline_times:
+            return UNKNOWN
+        return bootstrap(np.array(times) / np.array(baseline_times))
 
-    def real_time(self, controller: str) -> Interval:
-        """Return the time of a step by the simulated one."""
-        own = self.seconds.get(controller)
-        return bootstrap(np.array(own) / self.dt) if own else UNKNOWN
+    def compute_real_time_factor(self, controller: str) -> Interval:
+        """Return the ratio of computing time to simulation time."""
+        times = self.seconds.get(controller)
+        return bootstrap(np.array(times) / self.dt) if times else UNKNOWN
 
 
-def step_times(
+def measure_step_times(
     folder: Path,
-    wanted: Mapping[int, Sequence[str]],
+    controllers_by_size: Mapping[int, Sequence[str]],
     plan: Plan,
     *,
-    stopped: Callable[[], bool] = lambda: False,
+    is_stopped: Callable[[], bool] = lambda: False,
     clock: Callable[[], float] | None = None,
 ) -> dict[int, StepTimes]:
-    """Return how long steps of controllers take, by the size of the team: as kept in `folder`, else timed.
+    """Return the step times of controllers, stored ones and new ones.
 
-    Times that were kept are those of the machine that measured them. `stopped` is asked between two blocks;
-    what is whole by then is returned. `clock` returns seconds; by default those that this process computes,
-    where the system counts them finely: what else is going on then hardly matters.
+    Stored times are those of the machine that measured them.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the file.
+    controllers_by_size : Mapping
+        Controllers to time by the size of the team.
+    plan : Plan
+    is_stopped : callable
+        Called between two blocks. If it returns True, only complete measurements are returned.
+    clock : callable, optional
+        Returns a time in s. By default the processor time of this process where the system measures it
+        finely: other processes hardly disturb it.
+
+    Returns
+    -------
+    dict
+        Step times by the size of the team.
     """
-    found, path = {}, folder / FILE
-    kept = _kept(path)
+    path = folder / STEP_TIMES_FILE
+    stored = _load_entries(path)
     if clock is None:
-        fine = time.get_clock_info("process_time").resolution <= _FINE
-        clock = time.process_time if fine else time.perf_counter
-    for robots, controllers in wanted.items():
-        names = list(dict.fromkeys((YARDSTICK, *controllers)))
-        gains = {name: dict(get_gain_values(make_controller(name))) for name in names}
-        blocks = plan.beyond.warm_up, plan.beyond.blocks
-        content = [robots, plan.dt, dict(TEAM), *blocks, gains, list_versions()["robocov"]]
-        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-        entry = kept.get(str(robots))
+        resolution = time.get_clock_info("process_time").resolution
+        clock = time.process_time if resolution <= _MAX_CLOCK_RESOLUTION_S else time.perf_counter
+    step_times = {}
+    for robots, controllers in controllers_by_size.items():
+        names = list(dict.fromkeys((BASELINE, *controllers)))
+        digest = _compute_digest(robots, names, plan)
+        entry = stored.get(str(robots))
         if entry is None or entry["digest"] != digest:
-            seconds = _timed(robots, names, plan, stopped, clock)
+            seconds = _measure(robots, names, plan, is_stopped, clock)
             if seconds is None:
                 break
-            kept[str(robots)] = entry = {"digest": digest, "seconds_per_step": seconds}
-            document = {**_HEAD, "map": MAP, "dt_s": plan.dt, "steps_per_block": BLOCK, "robots": kept}
-            with replace_file(path) as part:
-                part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        taken = {name: tuple(own) for name, own in entry["seconds_per_step"].items()}
-        found[robots] = StepTimes(robots, plan.dt, taken)
-    return found
+            entry = {"digest": digest, "seconds_per_step": seconds}
+            stored[str(robots)] = entry
+            _save_entries(path, stored, plan)
+        times = {name: tuple(seconds) for name, seconds in entry["seconds_per_step"].items()}
+        step_times[robots] = StepTimes(robots, plan.dt, times)
+    return step_times
 
 
-def _timed(
-    robots: int, names: Sequence[str], plan: Plan, stopped: Callable[[], bool], clock: Callable[[], float]
+def _compute_digest(robots: int, controllers: Sequence[str], plan: Plan) -> str:
+    """Return a hash of everything that step times depend on, except for the machine."""
+    gains = {name: dict(get_gain_values(make_controller(name))) for name in controllers}
+    content = [
+        robots,
+        plan.dt,
+        dict(TEAM),
+        plan.beyond.warm_up,
+        plan.beyond.blocks,
+        gains,
+        list_versions()["robocov"],
+    ]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _measure(
+    robots: int,
+    controllers: Sequence[str],
+    plan: Plan,
+    is_stopped: Callable[[], bool],
+    clock: Callable[[], float],
 ) -> dict[str, list[float]] | None:
-    scenario = Scenario(MAP, team=build_swept_team(robots, TEAM), start="uniform", dt=plan.dt)
-    runs = {name: scenario.replace(controller=name).build_simulation() for name in names}
-    for run in runs.values():
+    """Return the step times of controllers in each block, s; None if it was stopped."""
+    scenario = Scenario(TIMING_MAP, team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
+    simulations = {name: scenario.replace(controller=name).build_simulation() for name in controllers}
+    for simulation in simulations.values():
         for _ in range(plan.beyond.warm_up):
-            run.step()
-    taken: dict[str, list[float]] = {name: [] for name in runs}
+            simulation.step()
+    seconds: dict[str, list[float]] = {name: [] for name in simulations}
     for _ in range(plan.beyond.blocks):
-        for name, run in runs.items():
-            if stopped():
+        for name, simulation in simulations.items():
+            if is_stopped():
                 return None
-            begin = clock()
-            for _ in range(BLOCK):
-                run.step()
-            taken[name].append((clock() - begin) / BLOCK)
-    return taken
+            start = clock()
+            for _ in range(STEPS_PER_BLOCK):
+                simulation.step()
+            seconds[name].append((clock() - start) / STEPS_PER_BLOCK)
+    return seconds
 
 
-def _kept(path: Path) -> dict[str, Any]:
+def _load_entries(path: Path) -> dict[str, Any]:
+    """Return the stored measurements by the size of the team, none if the file cannot be read."""
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["format"] == _HEAD["format"]:
-            found = {}
+            entries = {}
             for robots, entry in dict(content["robots"]).items():
-                times = {name: list(map(float, own)) for name, own in entry["seconds_per_step"].items()}
-                found[robots] = {"digest": str(entry["digest"]), "seconds_per_step": times}
-            return found
+                times = {name: list(map(float, block)) for name, block in entry["seconds_per_step"].items()}
+                entries[robots] = {"digest": str(entry["digest"]), "seconds_per_step": times}
+            return entries
     return {}
+
+
+def _save_entries(path: Path, entries: Mapping[str, Any], plan: Plan) -> None:
+    document = {
+        **_HEAD,
+        "map": TIMING_MAP,
+        "dt_s": plan.dt,
+        "steps_per_block": STEPS_PER_BLOCK,
+        "robots": entries,
+    }
+    with replace_file(path) as part:
+        part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")

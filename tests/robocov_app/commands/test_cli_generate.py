@@ -15,7 +15,7 @@ from robocov.mapfile import dump_map, list_bundled_maps, load_map
 from robocov_app.cli import main
 from robocov_app.commands.maps.generate import KindName
 from robocov_app.replication.plan import QUICK
-from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
+from robocov_app.replication.study_maps import build_claim_maps, build_convex_maps, build_generated_maps
 
 
 def test_every_kind_can_be_asked_for() -> None:
@@ -83,7 +83,7 @@ def test_overwriting_replaces_maps_and_nothing_else(
 @pytest.mark.slow
 def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
-    every = *claim_maps(QUICK), *generated_maps(QUICK.tuning), *convex_maps(QUICK)
+    every = *build_claim_maps(QUICK), *build_generated_maps(QUICK.tuning), *build_convex_maps(QUICK)
     maps = {each.name: each.environment for each in every}
     drawn = {name: environment for name, environment in maps.items() if name not in list_bundled_maps()}
     assert len(drawn) == sum(map(len, (QUICK.generated, QUICK.tuning, QUICK.convex_generated)))

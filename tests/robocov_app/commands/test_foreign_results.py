@@ -14,7 +14,7 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.notebook import record_html, record_png
 from robocov_app.replication.contenders import Contender
-from robocov_app.replication.outcomes import read_outcomes
+from robocov_app.replication.outcome_tables import read_outcomes
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study_file import read_study
 from robocov_app.viewer.session.recorded import LostController

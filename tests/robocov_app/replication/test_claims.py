@@ -1,4 +1,4 @@
-"""Each claim on made-up outcomes whose truth is known: it holds, partly, not at all, or cannot be told."""
+"""Each claim on artificial outcomes whose truth is known: it holds, partly, not at all, or is undecided."""
 
 from itertools import permutations
 
@@ -8,22 +8,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication import claims
-from robocov_app.replication.claims import (
-    Claim,
-    Criterion,
-    amount,
-    gains_choice,
-    gains_result,
-    regrets,
-    same_scenarios,
-    verdict_counts,
+from robocov_app.replication.claims import Claim, Criterion, judge_paper_claims, summarize_verdicts
+from robocov_app.replication.claims.convex_claims import judge_convex_final, judge_convex_spreading
+from robocov_app.replication.claims.gain_claims import (
+    compute_regrets,
+    judge_gains_choice,
+    judge_gains_result,
+    select_common_instances,
 )
+from robocov_app.replication.claims.nonconvex_claims import (
+    judge_against_lloyd,
+    judge_against_rpf,
+    judge_gap,
+    judge_lloyd_stuck,
+)
+from robocov_app.replication.claims.start_claims import judge_starts_cost, judge_starts_placement
+from robocov_app.replication.claims.thresholds import REGISTERED
+from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.outcomes import (
     GainOutcomes,
     Outcomes,
-    Scenario,
-    matched_distance,
+    ProblemInstance,
+    compute_matched_distance,
 )
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
@@ -32,15 +38,18 @@ STARTS = ("corner", "centre", "uniform")
 FEW, MANY = 11, 30
 
 
-def scenarios(maps: int, seeds: int = 2) -> tuple[Scenario, ...]:
+def build_instances(maps: int, seeds: int = 2) -> tuple[ProblemInstance, ...]:
     return tuple(
-        Scenario(f"map {m}", start, seed) for m in range(maps) for start in STARTS for seed in range(seeds)
+        ProblemInstance(f"map {m}", start, seed)
+        for m in range(maps)
+        for start in STARTS
+        for seed in range(seeds)
     )
 
 
-def outcomes(maps: int = MANY, measure: str = "final", **levels: float | list[float]) -> Outcomes:
-    """Outcomes in which each law reaches its level (by start, where there are three), by a map's size."""
-    where = scenarios(maps)
+def build_outcomes(maps: int = MANY, measure: str = "final", **levels: float | list[float]) -> Outcomes:
+    """Build outcomes in which the cost of each contender is its level times the size of the map."""
+    where = build_instances(maps)
     rng = np.random.default_rng(5)
     size = np.array([1.0 + int(s.map.split()[1]) for s in where])
     values = {}
@@ -67,7 +76,7 @@ class TestVerdicts:
     )
     def test_a_criterion(self, bounds, interval, met):
         low, high = interval
-        assert Criterion("x", Interval((low + high) / 2, low, high), *bounds).met is met
+        assert Criterion("x", Interval((low + high) / 2, low, high), *bounds).is_met is met
 
     @pytest.mark.parametrize(
         ("outcomes", "verdict"),
@@ -82,7 +91,7 @@ class TestVerdicts:
             ("", "undecided"),
         ],
     )
-    def test_what_the_criteria_say_together(self, outcomes, verdict):
+    def test_the_verdict_follows_from_all_criteria(self, outcomes, verdict):
         interval = {"yes": (0.1, 0.2), "no": (2.0, 3.0), "open": (0.5, 1.5)}
         criteria = tuple(
             Criterion("x", Interval(1.0, *interval[word]), 0.0, 1.0) for word in outcomes.split()
@@ -96,21 +105,21 @@ class TestVerdicts:
             Criterion("x", Interval(0.5, 0.4, 0.6, np.array(drawn)), high=1.0)
             for drawn in ([0.5, 0.5, 0.5], [0.5, 2.0, 0.5])
         )
-        claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted=adjusted)
-        assert (claim.verdict, claim.p) == (verdict, 0.5)
-        assert claim.p_text == ("p = 0.5" if adjusted is None else f"p = 0.5, by Holm {adjusted}")
+        claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted_p_value=adjusted)
+        assert (claim.verdict, claim.p_value) == (verdict, 0.5)
+        assert claim.p_value_text == ("p = 0.5" if adjusted is None else f"p = 0.5, by Holm {adjusted}")
 
     def test_registered_claims_are_adjusted_together(self):
-        there = outcomes(rapf_shared=0.7, rpf_shared=1.0, lloyd=1.0)
-        both = {"rapf": grid(0.02), "rpf": grid(0.9)}
-        found = {claim.key: claim for claim in claims.paper_claims(there, there, both)}
-        assert {key for key, claim in found.items() if claim.adjusted is not None} == set(claims.REGISTERED)
+        convex = build_outcomes(rapf_shared=0.7, rpf_shared=1.0, lloyd=1.0)
+        gains = {"rapf": build_gain_outcomes(0.02), "rpf": build_gain_outcomes(0.9)}
+        found = {claim.key: claim for claim in judge_paper_claims(convex, convex, gains)}
+        assert {key for key, claim in found.items() if claim.adjusted_p_value is not None} == set(REGISTERED)
         # two p-values are the least there are of 200 samples, the others 1
-        assert found["gains-result"].p == pytest.approx(1 / 201)
-        assert found["gains-result"].adjusted == pytest.approx(7 / 201)
-        assert found["nonconvex-final-best"].adjusted == 1.0  # without a run
+        assert found["gains-result"].p_value == pytest.approx(1 / 201)
+        assert found["gains-result"].adjusted_p_value == pytest.approx(7 / 201)
+        assert found["nonconvex-final-best"].adjusted_p_value == 1.0  # without a run
 
-    def test_json_has_what_was_promised(self):
+    def test_json_has_the_promised_keys(self):
         criterion = Criterion("ratio", Interval(0.9, 0.8, 0.95), high=1.0)
         found = Claim("k", 2, "It is lower.", "VI", (criterion,), 40, 12, "Why.").to_json()
         assert found["claim"] == "It is lower."
@@ -130,14 +139,14 @@ class TestVerdicts:
         ],
     )
     def test_amounts(self, value, unit, text):
-        assert amount(value, unit) == text
+        assert format_amount(value, unit) == text
 
     @pytest.mark.parametrize(
         ("low", "high", "text"),
         [(-np.inf, 0.05, "at most 5 %"), (0.9, np.inf, "at least 90 %"), (0.1, 0.2, "between 10 % and 20 %")],
     )
-    def test_what_is_wanted_in_words(self, low, high, text):
-        assert Criterion("x", Interval(0.0, 0.0, 0.0), low, high, "%").wanted == text
+    def test_the_range_as_text(self, low, high, text):
+        assert Criterion("x", Interval(0.0, 0.0, 0.0), low, high, "%").range_text == text
 
 
 class TestConvex:
@@ -145,30 +154,30 @@ class TestConvex:
         ("level", "verdict"), [(1.004, "holds"), (0.97, "holds partly"), (1.2, "does not hold")]
     )
     def test_final_cost(self, level, verdict):
-        assert claims.convex_final(outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
+        assert judge_convex_final(build_outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
 
     @pytest.mark.parametrize(
         ("level", "verdict"), [(0.9, "holds"), (1.02, "does not hold"), (1.0, "undecided")]
     )
     def test_spreading(self, level, verdict):
-        found = outcomes(measure="early", rapf_shared=level, lloyd=1.0)
+        found = build_outcomes(measure="early", rapf_shared=level, lloyd=1.0)
         if verdict == "undecided":  # wins on half of the maps, by as much as it loses on the others
             values = dict(found.values)
             odd = np.array([int(map_.split()[1]) % 2 for map_ in found.maps])
             values["rapf-shared", "early"] = values["lloyd", "early"] * np.where(odd, 1.1, 1 / 1.1)
-            found = Outcomes(found.scenarios, values)
-        assert claims.convex_spreading(found).verdict == verdict
+            found = Outcomes(found.instances, values)
+        assert judge_convex_spreading(found).verdict == verdict
 
     def test_only_starts_close_together_count(self):
-        found = outcomes(measure="early", rapf_shared=[0.9, 0.9, 5.0], lloyd=1.0)
-        claim = claims.convex_spreading(found)
+        found = build_outcomes(measure="early", rapf_shared=[0.9, 0.9, 5.0], lloyd=1.0)
+        claim = judge_convex_spreading(found)
         assert claim.verdict == "holds"
         assert claim.runs == 2 * MANY * 2 * 2
 
 
 class TestNonConvex:
     @pytest.mark.parametrize(
-        ("level", "verdict", "gains", "moment"),
+        ("level", "verdict", "gains", "period"),
         [
             (0.7, "holds", "shared", "final"),
             (0.97, "holds partly", "best", "final"),
@@ -176,15 +185,17 @@ class TestNonConvex:
             ([0.6, 0.6, 1.2], "holds partly", "best", "motion"),
         ],
     )
-    def test_against_rpf(self, gains, moment, level, verdict):
-        measure = {"final": "final", "motion": "first_minute"}[moment]
+    def test_against_rpf(self, gains, period, level, verdict):
+        measure = {"final": "final", "motion": "first_minute"}[period]
         laws = {f"rapf_{gains}": level, f"rpf_{gains}": 1.0}
-        claim = claims.against_rpf(outcomes(measure=measure, **laws), gains, moment)
+        claim = judge_against_rpf(build_outcomes(measure=measure, **laws), gains, period)
         assert claim.verdict == verdict
-        assert claim.key == f"nonconvex-{moment}-{gains}"
+        assert claim.key == f"nonconvex-{period}-{gains}"
 
-    def test_where_it_loses_is_told(self):
-        claim = claims.against_rpf(outcomes(rapf_shared=[0.6, 0.7, 1.2], rpf_shared=1.0), "shared", "final")
+    def test_losses_are_described(self):
+        claim = judge_against_rpf(
+            build_outcomes(rapf_shared=[0.6, 0.7, 1.2], rpf_shared=1.0), "shared", "final"
+        )
         assert "corner 0.6, centre 0.7, uniform 1.2" in claim.explanation
         assert f"RAPF loses {MANY * 2} of {MANY * 6}" in claim.explanation
         assert "start uniform" in claim.explanation
@@ -193,17 +204,17 @@ class TestNonConvex:
         ("level", "verdict"), [(0.8, "holds"), (0.99, "holds partly"), (1.1, "does not hold")]
     )
     def test_against_lloyd(self, level, verdict):
-        assert claims.against_lloyd(outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
+        assert judge_against_lloyd(build_outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
 
     def test_few_maps_decide_nothing(self):
-        claim = claims.against_rpf(outcomes(FEW, rapf_shared=0.5, rpf_shared=1.0), "shared", "final")
+        claim = judge_against_rpf(build_outcomes(FEW, rapf_shared=0.5, rpf_shared=1.0), "shared", "final")
         assert (claim.verdict, claim.maps) == ("undecided", FEW)
 
     def test_runs_that_failed_drop_out_in_pairs(self):
-        whole = outcomes(rapf_shared=0.5, rpf_shared=1.0)
+        whole = build_outcomes(rapf_shared=0.5, rpf_shared=1.0)
         whole.values["rapf-shared", "final"][3] = np.nan
         whole.values["rpf-shared", "final"][[3, 7]] = np.nan
-        claim = claims.against_rpf(whole, "shared", "final")
+        claim = judge_against_rpf(whole, "shared", "final")
         assert claim.runs == 2 * (MANY * 6 - 2)
         assert claim.criteria[0].interval.estimate == pytest.approx(0.5, rel=0.01)
 
@@ -219,14 +230,14 @@ class TestStarts:
         ],
     )
     def test_cost(self, rapf, rpf, verdict):
-        assert claims.starts_cost(outcomes(rapf_shared=rapf, rpf_shared=rpf)).verdict == verdict
+        assert judge_starts_cost(build_outcomes(rapf_shared=rapf, rpf_shared=rpf)).verdict == verdict
 
     @pytest.mark.parametrize(
         ("ours", "theirs", "verdict"),
         [(0.1, 3.0, "holds"), (2.0, 3.5, "holds partly"), (3.5, 2.0, "does not hold")],
     )
     def test_placement(self, ours, theirs, verdict):
-        found = outcomes(rapf_shared=1.0, rpf_shared=1.0)
+        found = build_outcomes(rapf_shared=1.0, rpf_shared=1.0)
         rng = np.random.default_rng(1)
         shift = np.array([STARTS.index(start) for start in found.starts], dtype=float)
         base = np.stack([4.0 * np.arange(6.0), np.zeros(6)], axis=1)
@@ -237,7 +248,7 @@ class TestStarts:
             for law, reach in (("rapf-shared", ours), ("rpf-shared", theirs))
         }
         shares = dict.fromkeys(found.maps, 4.0)
-        claim = claims.starts_placement(Outcomes(found.scenarios, {**found.values, **places}, shares))
+        claim = judge_starts_placement(Outcomes(found.instances, {**found.values, **places}, shares))
         assert claim.verdict == verdict
         assert claim.criteria[0].interval.estimate == pytest.approx(ours / 4.0, rel=0.1)
 
@@ -248,12 +259,12 @@ class TestStuckAndGap:
         [(1.0, 0.5, "holds"), (1.0, 0.05, "holds partly"), (0.1, 0.05, "does not hold")],
     )
     def test_stuck(self, share, gap, verdict):
-        where = scenarios(MANY, 4)
+        where = build_instances(MANY, 4)
         count = (np.arange(len(where)) % 10 < 10 * share) * 2.0
         values = {("lloyd", "stuck"): count, ("lloyd", "gap"): np.full(len(where), gap)}
-        claim = claims.lloyd_stuck(Outcomes(where, values))
+        claim = judge_lloyd_stuck(Outcomes(where, values))
         assert claim.verdict == verdict
-        assert f"{amount(float(count.mean()))} robots" in claim.explanation
+        assert f"{format_amount(float(count.mean()))} robots" in claim.explanation
 
     @pytest.mark.parametrize(
         ("law", "gap", "verdict"),
@@ -266,18 +277,18 @@ class TestStuckAndGap:
         ],
     )
     def test_gap(self, law, gap, verdict):
-        where = scenarios(MANY)
+        where = build_instances(MANY)
         rng = np.random.default_rng(0)
         values = {(law, "gap"): gap + 0.01 * rng.standard_normal(len(where))}
-        assert claims.gap_to_reference(Outcomes(where, values), law).verdict == verdict
+        assert judge_gap(Outcomes(where, values), law).verdict == verdict
 
 
-def grid(spread: float, maps: int = MANY, own_best: bool = False) -> GainOutcomes:
-    """Nine sets of gains; the fifth is best everywhere, or another one on each map."""
-    where = scenarios(maps, 1)
+def build_gain_outcomes(spread: float, maps: int = MANY, is_map_dependent: bool = False) -> GainOutcomes:
+    """Build outcomes of nine sets of gains; the fifth is the best everywhere, or another one on each map."""
+    where = build_instances(maps, 1)
     gains = tuple({"k_rep": a, "k_att": b} for a in (0.1, 1.0, 10.0) for b in (1.0, 3.0, 30.0))
     rng = np.random.default_rng(2)
-    best = [int(s.map.split()[1]) % 9 if own_best else 4 for s in where]
+    best = [int(s.map.split()[1]) % 9 if is_map_dependent else 4 for s in where]
     worse = np.abs(np.arange(9)[:, None] - np.array(best)[None]) / 8.0
     return GainOutcomes(where, gains, 1.0 + spread * worse + 1e-4 * rng.random((9, len(where))))
 
@@ -293,7 +304,7 @@ class TestGains:
         ],
     )
     def test_result(self, rapf, rpf, verdict):
-        claim = gains_result(grid(rapf), grid(rpf))
+        claim = judge_gains_result(build_gain_outcomes(rapf), build_gain_outcomes(rpf))
         assert claim.verdict == verdict
         assert claim.runs == 2 * 9 * MANY * 3
 
@@ -302,47 +313,53 @@ class TestGains:
         [(False, True, "holds"), (False, False, "holds partly"), (True, False, "does not hold")],
     )
     def test_choice(self, rapf, rpf, verdict):
-        claim = gains_choice(grid(0.9, own_best=rapf), grid(0.9, own_best=rpf))
+        claim = judge_gains_choice(
+            build_gain_outcomes(0.9, is_map_dependent=rapf), build_gain_outcomes(0.9, is_map_dependent=rpf)
+        )
         assert claim.verdict == verdict
 
     def test_regret_is_nothing_where_one_set_is_best_everywhere(self):
-        found, maps = regrets(grid(0.9))
+        found, maps = compute_regrets(build_gain_outcomes(0.9))
         assert found == pytest.approx(np.zeros(MANY * 3))
         assert len(set(maps)) == MANY
 
-    def test_regret_does_not_favour_what_was_chosen_by_chance(self):
+    def test_regret_does_not_favor_gains_chosen_by_chance(self):
         """Where gains make no difference, knowing the map is worth nothing: the mean regret is zero."""
-        where = scenarios(40, 1)
+        where = build_instances(40, 1)
         noise = 1.0 + 0.05 * np.random.default_rng(4).standard_normal((9, len(where)))
-        found, _ = regrets(GainOutcomes(where, tuple({"k": float(k)} for k in range(9)), noise))
+        found, _ = compute_regrets(GainOutcomes(where, tuple({"k": float(k)} for k in range(9)), noise))
         assert abs(found.mean()) < 3 * found.std() / np.sqrt(len(found))
 
-    def test_scenarios_with_a_failed_run_do_not_count(self):
-        broken = grid(0.02)
+    def test_instances_with_a_failed_run_do_not_count(self):
+        broken = build_gain_outcomes(0.02)
         broken.excess[2, 5] = np.nan
-        claim = gains_result(*same_scenarios(broken, grid(0.9)))
+        claim = judge_gains_result(*select_common_instances(broken, build_gain_outcomes(0.9)))
         assert claim.runs == 2 * 9 * (MANY * 3 - 1)
-        assert broken.best() == 4
+        assert broken.find_best() == 4
 
 
 @pytest.mark.parametrize(
     "claim",
     [
-        claims.convex_final,
-        claims.convex_spreading,
-        lambda o: claims.against_rpf(o, "best", "motion"),
-        claims.against_lloyd,
-        claims.starts_cost,
-        claims.starts_placement,
-        claims.lloyd_stuck,
-        lambda o: claims.gap_to_reference(o, "lloyd"),
+        judge_convex_final,
+        judge_convex_spreading,
+        lambda o: judge_against_rpf(o, "best", "motion"),
+        judge_against_lloyd,
+        judge_starts_cost,
+        judge_starts_placement,
+        judge_lloyd_stuck,
+        lambda o: judge_gap(o, "lloyd"),
     ],
 )
-def test_nothing_to_go_by_is_undecided(claim):
+def test_without_any_run_claims_are_undecided(claim):
     found = claim(Outcomes((), {}))
     assert (found.verdict, found.runs, found.to_json()["estimate"]) == ("undecided", 0, None)
     nothing = GainOutcomes((), ({"k_rep": 1.0},), np.empty((1, 0)))
-    assert gains_result(nothing, nothing).verdict == gains_choice(nothing, nothing).verdict == "undecided"
+    assert (
+        judge_gains_result(nothing, nothing).verdict
+        == judge_gains_choice(nothing, nothing).verdict
+        == "undecided"
+    )
 
 
 places = st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=1, max_size=5)
@@ -350,7 +367,7 @@ places = st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=1, max
 
 class TestMatchedDistance:
     @given(st.data())
-    def test_is_the_least_over_all_ways_to_match(self, data):
+    def test_is_the_minimum_over_all_permutations(self, data):
         first = np.array(data.draw(places))
         second = np.array(
             data.draw(st.lists(st.tuples(*[st.floats(-9, 9)] * 2), min_size=len(first), max_size=len(first)))
@@ -358,29 +375,29 @@ class TestMatchedDistance:
         least = min(
             np.hypot(*(first - second[list(order)]).T).mean() for order in permutations(range(len(first)))
         )
-        assert matched_distance(first, second) == pytest.approx(least, abs=1e-9)
+        assert compute_matched_distance(first, second) == pytest.approx(least, abs=1e-9)
 
     @given(places, st.randoms())
-    def test_it_does_not_matter_who_is_where(self, positions, random):
+    def test_does_not_depend_on_the_order_of_robots(self, positions, random):
         first = np.array(positions)
         second = first.copy().tolist()
         random.shuffle(second)
-        assert matched_distance(first, np.array(second)) == pytest.approx(0.0, abs=1e-9)
+        assert compute_matched_distance(first, np.array(second)) == pytest.approx(0.0, abs=1e-9)
 
     def test_only_pairs_of_different_starts_count(self):
         ends = np.array([[[0.0, 0.0]], [[9.0, 0.0]], [[1.0, 0.0]], [[np.nan, 0.0]]])
         starts = (("m", "a"), ("m", "a"), ("m", "b"), ("m", "b"), ("n", "a"), ("o", "b"))
         found = Outcomes(
-            tuple(Scenario(name, start, k) for k, (name, start) in enumerate(starts)),
+            tuple(ProblemInstance(name, start, k) for k, (name, start) in enumerate(starts)),
             {("lloyd", "placement"): np.concatenate([ends, ends[:2]])},
             dict.fromkeys("mno", 3.0),
         )
-        assert found.placement_spreads("lloyd") == {"m": pytest.approx(1.5)}
-        assert found.placement_spreads("rapf") == {}
+        assert found.compute_placement_spreads("lloyd") == {"m": pytest.approx(1.5)}
+        assert found.compute_placement_spreads("rapf") == {}
 
 
-def test_how_many_claims_hold_is_told_in_words():
-    def of(*verdicts):
+def test_the_summary_counts_verdicts():
+    def build_claims(*verdicts):
         kinds = {
             "holds": Interval(0.5, 0.4, 0.6),
             "not": Interval(2.0, 1.9, 2.1),
@@ -388,7 +405,7 @@ def test_how_many_claims_hold_is_told_in_words():
         }
         return [Claim("k", 1, "", "", (Criterion("", kinds[word], high=1.0),), 12, 12) for word in verdicts]
 
-    assert verdict_counts(of("holds", "holds", "open")) == "Of 3 claims 2 hold, 1 is undecided."
-    assert verdict_counts(of("holds", "not", "open", "open")) == (
+    assert summarize_verdicts(build_claims("holds", "holds", "open")) == "Of 3 claims 2 hold, 1 is undecided."
+    assert summarize_verdicts(build_claims("holds", "not", "open", "open")) == (
         "Of 4 claims 1 holds, 1 does not hold, 2 are undecided."
     )

@@ -12,11 +12,11 @@ from robocov.voronoi import partition
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.page import tone
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.replication.figures import FIGURES, WIDE, draw_figure
+from robocov_app.replication.paper_figures import FIGURES, WIDE_PX, draw_figure
 from robocov_app.replication.results import FigureRun
 
 
-def shown(environment, controller: str, final: float, seed: int = 0) -> FigureRun:
+def build_figure_run(environment, controller: str, final: float, seed: int = 0) -> FigureRun:
     time = np.linspace(0.0, 60.0, 121)
     cost = final + 3.0 * np.exp(-time / 8)
     record = replace(run_of(environment, 6, seed=seed, controller=controller), label=controller.upper())
@@ -24,21 +24,21 @@ def shown(environment, controller: str, final: float, seed: int = 0) -> FigureRu
 
 
 RUNS = {
-    "convex/rapf": shown(SQUARE, "rapf", 1.3),
-    "convex/lloyd": shown(SQUARE, "lloyd", 1.31, 1),
-    "a/rapf": shown(ROOMS, "rapf", 1.8),
-    "a/rpf": shown(ROOMS, "rpf", 3.5, 1),
-    "b/rapf": shown(HALL, "rapf", 2.2),
-    "b/rpf": shown(HALL, "rpf", 3.9, 1),
-    "other/rapf": shown(HALL, "rapf", 2.0, 2),
-    "other/rpf": shown(HALL, "rpf", 4.3, 3),
+    "convex/rapf": build_figure_run(SQUARE, "rapf", 1.3),
+    "convex/lloyd": build_figure_run(SQUARE, "lloyd", 1.31, 1),
+    "a/rapf": build_figure_run(ROOMS, "rapf", 1.8),
+    "a/rpf": build_figure_run(ROOMS, "rpf", 3.5, 1),
+    "b/rapf": build_figure_run(HALL, "rapf", 2.2),
+    "b/rpf": build_figure_run(HALL, "rpf", 3.9, 1),
+    "other/rapf": build_figure_run(HALL, "rapf", 2.0, 2),
+    "other/rpf": build_figure_run(HALL, "rpf", 4.3, 3),
 }
 PARTITION = run_of(SQUARE, 6)
 
 
 @pytest.mark.parametrize("number", range(1, 9))
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_nothing_covers_or_cuts_anything(number, theme):
+def test_no_text_is_covered_or_cut_off(number, theme):
     figure = draw_figure(number, RUNS, PARTITION, theme)
     if number not in (3, 5, 7):
         all_clear(figure)
@@ -108,10 +108,10 @@ def test_cost_curves(number, case, other):
     figure.canvas.draw()
     for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label):
         box = text.get_window_extent()
-        assert box.x0 >= 0 and box.x1 <= WIDE and box.y0 >= 0 and box.y1 <= 1050
+        assert box.x0 >= 0 and box.x1 <= WIDE_PX and box.y0 >= 0 and box.y1 <= 1050
 
 
-def test_the_legend_names_centroids_only_where_some_are_seen():
+def test_the_legend_names_centroids_only_if_some_are_visible():
     def words(runs):
         (legend,) = draw_figure(2, runs, PARTITION, "light").legends
         return [text.get_text() for text in legend.get_texts()]

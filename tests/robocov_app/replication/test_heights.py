@@ -5,32 +5,32 @@ import pytest
 
 from robocov.observation.region import Region
 from robocov_app.render.theme import DARK, LIGHT, contrast
-from robocov_app.replication.figures import PENTAGON, best_at_heights, plot_heights
+from robocov_app.replication.height_plot import PENTAGON, draw_heights, find_sensor_optima
 
 HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
 
 
 def test_rows_go_from_one_limit_to_the_other() -> None:
-    rows = best_at_heights(HEIGHTS)
+    rows = find_sensor_optima(HEIGHTS)
     assert [row.height for row in rows] == [0.0, *HEIGHTS, np.inf]
-    away = [row.from_centroid for row in rows]
+    away = [row.distance for row in rows]
     assert away == sorted(away, reverse=True)
     assert (rows[-1].x, rows[-1].y) == pytest.approx(tuple(Region(np.array(PENTAGON)).centroid))
     assert away[-1] == 0.0
     assert rows[0].x == pytest.approx(rows[1].x, abs=1e-6)
-    assert all(0.0 < row.missed < 4e-4 for row in rows[1:-1] if row.height < 10.0)
-    assert np.isnan([rows[0].missed, rows[-1].missed]).all()
+    assert all(0.0 < row.loss < 4e-4 for row in rows[1:-1] if row.height < 10.0)
+    assert np.isnan([rows[0].loss, rows[-1].loss]).all()
 
 
 def test_the_best_place_at_a_height() -> None:
-    row = best_at_heights((1.0,))[1]
-    assert (row.x, row.y, row.from_centroid) == pytest.approx((2.0849, 1.6650, 0.05609), abs=6e-5)
-    assert row.missed == pytest.approx(0.000284, abs=1e-6)
+    row = find_sensor_optima((1.0,))[1]
+    assert (row.x, row.y, row.distance) == pytest.approx((2.0849, 1.6650, 0.05609), abs=6e-5)
+    assert row.loss == pytest.approx(0.000284, abs=1e-6)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_the_plot_shows_the_path_in_its_frame(theme) -> None:
-    figure = plot_heights((900, 380), theme, 0.8)
+    figure = draw_heights((900, 380), theme, 0.8)
     cell, frame, distance = figure.axes
     path = frame.lines[0]
     low, high = frame.get_xlim()

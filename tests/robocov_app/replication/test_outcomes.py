@@ -14,31 +14,31 @@ from robocov.controllers import get_gain_values, make_controller
 from robocov.mapfile import load_map
 from robocov.metrics import CostHistory
 from robocov_app.evaluation.reference_search import ReferencePlacement
-from robocov_app.replication import results, studies
-from robocov_app.replication.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, of_paper
-from robocov_app.replication.evidence import gains_text
+from robocov_app.replication import degradations, studies, study_maps
+from robocov_app.replication.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, build_paper_contender
+from robocov_app.replication.degradations import read_degradations
+from robocov_app.replication.evidence import describe_tuning
+from robocov_app.replication.outcome_tables import read_gain_outcomes, read_outcomes
 from robocov_app.replication.outcomes import (
     GainOutcomes,
-    Scenario,
-    best_gains,
-    joined,
-    mean_until,
-    read_gain_outcomes,
-    read_outcomes,
+    ProblemInstance,
+    compute_mean_until,
+    find_best_gains,
+    merge_outcomes,
 )
-from robocov_app.replication.results import read_degradations
 from robocov_app.sweep.ledger import _check_sum
 from robocov_app.sweep.sweeping import sweep
 
 REFERENCES = {"blocks-a": ReferencePlacement(1.5, ((1.0, 1.0),), 1.0)}
-SAME = of_paper("rapf-best", RAPF_SHARED.gains)
+SAME = build_paper_contender("rapf-best", RAPF_SHARED.gains)
 CONTENDERS = (RAPF_SHARED, SAME, RPF_SHARED, LLOYD)
 
 
 @pytest.fixture(scope="module")
 def study():
     plan = replace(TINY, duration=1.0)
-    return studies.contest(plan, (studies.bundled("blocks-a"),), CONTENDERS, ("corner", "uniform"), (0, 1))
+    maps = (study_maps.load_study_map("blocks-a"),)
+    return studies.build_contest(plan, maps, CONTENDERS, ("corner", "uniform"), (0, 1))
 
 
 @pytest.fixture(scope="module")
@@ -48,125 +48,127 @@ def folder(study, tmp_path_factory):
     return target
 
 
-def rows_of(folder):
+def read_rows(folder):
     with (folder / "results.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 
 def test_every_value_is_that_of_its_run(study, folder):
     outcomes = read_outcomes(folder, study, REFERENCES)
-    assert outcomes.scenarios == tuple(
-        Scenario("blocks-a", start, seed) for start in ("corner", "uniform") for seed in (0, 1)
+    assert outcomes.instances == tuple(
+        ProblemInstance("blocks-a", start, seed) for start in ("corner", "uniform") for seed in (0, 1)
     )
-    rows = rows_of(folder)
+    rows = read_rows(folder)
     assert len(rows) == 12
     for row in rows:
-        k = outcomes.scenarios.index(Scenario(row["map"], row["start"], int(row["seed"])))
+        k = outcomes.instances.index(ProblemInstance(row["map"], row["start"], int(row["seed"])))
         law = {"rapf": "rapf-shared", "rpf": "rpf-shared", "lloyd": "lloyd"}[row["controller"]]
         final = float(row["mean_distance_m"])
-        assert outcomes.of(law, "final")[k] == final
-        assert outcomes.of(law, "gap")[k] == pytest.approx(final / 1.5 - 1.0)
-        assert outcomes.of(law, "contacts")[k] == float(row["contacts"])
-        assert outcomes.of(law, "work")[k] == float(row["work_J"]) > 0.0
-        stuck = outcomes.of(law, "stuck")[k]
+        assert outcomes.get_values(law, "final")[k] == final
+        assert outcomes.get_values(law, "gap")[k] == pytest.approx(final / 1.5 - 1.0)
+        assert outcomes.get_values(law, "contacts")[k] == float(row["contacts"])
+        assert outcomes.get_values(law, "work")[k] == float(row["work_J"]) > 0.0
+        stuck = outcomes.get_values(law, "stuck")[k]
         assert np.isnan(stuck) if row["stuck_robots"] == "" else stuck == float(row["stuck_robots"])
         with np.load(folder / "runs" / row["run"] / "record.npz") as record:
             assert outcomes.values[law, "placement"][k] == pytest.approx(record["positions"][-1])
         # a run of a second is averaged over all of it
         whole = float(row["mean_distance_over_run_m"])
-        assert outcomes.of(law, "first_minute")[k] == pytest.approx(whole, rel=1e-9)
-    assert (outcomes.of("rapf-best", "final") == outcomes.of("rapf-shared", "final")).all()
-    assert np.isnan(outcomes.of("rapf-default", "final")).all()
-    assert outcomes.sides["blocks-a"] == pytest.approx(np.sqrt(load_map("blocks-a").free_area / 6))
+        assert outcomes.get_values(law, "first_minute")[k] == pytest.approx(whole, rel=1e-9)
+    assert (outcomes.get_values("rapf-best", "final") == outcomes.get_values("rapf-shared", "final")).all()
+    assert np.isnan(outcomes.get_values("rapf-default", "final")).all()
+    assert outcomes.share_sides["blocks-a"] == pytest.approx(np.sqrt(load_map("blocks-a").free_area / 6))
 
 
 def test_a_run_that_failed_is_nan(study, folder, tmp_path):
     broken = tmp_path / "sweep"
     shutil.copytree(folder, broken)
-    row = next(row for row in rows_of(folder) if row["controller"] == "lloyd")
+    row = next(row for row in read_rows(folder) if row["controller"] == "lloyd")
     entry = broken / "runs" / row["run"] / "row.json"
     content = json.loads(entry.read_text()) | {"figures": {}, "error": "it fell over"}
     content["check_sum"] = _check_sum({key: value for key, value in content.items() if key != "check_sum"})
     entry.write_text(json.dumps(content))
     sweep(study.study, broken, workers=1, quiet=True)
     outcomes = read_outcomes(broken, study, REFERENCES)
-    assert np.isnan(outcomes.of("lloyd", "final")).tolist() == [True, False, False, False]
+    assert np.isnan(outcomes.get_values("lloyd", "final")).tolist() == [True, False, False, False]
     assert np.isnan(outcomes.values["lloyd", "placement"][0]).all()
-    assert np.isfinite(outcomes.of("rapf-shared", "final")).all()
+    assert np.isfinite(outcomes.get_values("rapf-shared", "final")).all()
 
 
 def test_without_a_reference_there_is_no_gap(study, folder):
     outcomes = read_outcomes(folder, study, {})
-    assert np.isnan(outcomes.of("lloyd", "gap")).all()
-    assert np.isfinite(outcomes.of("lloyd", "final")).all()
+    assert np.isnan(outcomes.get_values("lloyd", "gap")).all()
+    assert np.isfinite(outcomes.get_values("lloyd", "final")).all()
 
 
-def test_gains_are_told_apart(study, folder):
+def test_sets_of_gains_are_distinguished(study, folder):
     grids = read_gain_outcomes(folder, study.study, REFERENCES)
     plain = read_outcomes(folder, study, REFERENCES)
     assert set(grids) == {"rapf", "rpf", "lloyd"}
     for law, key in (("rapf", "rapf-shared"), ("rpf", "rpf-shared")):
         assert grids[law].excess.shape == (1, 4)
-        assert grids[law].excess[0] == pytest.approx(plain.of(key, "gap") + 1.0)
+        assert grids[law].excess[0] == pytest.approx(plain.get_values(key, "gap") + 1.0)
         assert grids[law].gains[0]["k_rep"] == 1.0
-    assert TINY.tuning_seed not in {scenario.seed for scenario in grids["rapf"].scenarios}
+    assert TINY.tuning_seed not in {scenario.seed for scenario in grids["rapf"].instances}
 
 
 @given(st.lists(st.floats(0.5, 9.0), min_size=2, max_size=40), st.floats(0.1, 30.0))
 def test_the_mean_over_time_is_that_of_the_curve(values, until):
     time = np.arange(len(values)) * 0.5
     cost = np.array(values)
-    found = mean_until(CostHistory(time, cost, cost, cost), until)
+    found = compute_mean_until(CostHistory(time, cost, cost, cost), until)
     end = min(until, time[-1])
     fine = np.linspace(0.0, end, 20_001)
     assert found == pytest.approx(np.interp(fine, time, cost).mean(), rel=2e-3)
     assert cost.min() - 1e-9 <= found <= cost.max() + 1e-9
 
 
-def test_a_moment_has_its_own_value():
+def test_the_mean_of_a_single_sample_is_its_value():
     one = np.array([2.5])
-    assert mean_until(CostHistory(np.zeros(1), one, one, one), 20.0) == 2.5
+    assert compute_mean_until(CostHistory(np.zeros(1), one, one, one), 20.0) == 2.5
 
 
 def test_outcomes_are_joined_by_scenario(study, folder):
     whole = read_outcomes(folder, study, REFERENCES)
-    left, right = whole.where([True, True, False, False]), whole.where([False, False, True, True])
-    again = joined([left, right])
-    assert again.scenarios == whole.scenarios
+    left, right = whole.select([True, True, False, False]), whole.select([False, False, True, True])
+    again = merge_outcomes([left, right])
+    assert again.instances == whole.instances
     for key, values in whole.values.items():
         assert np.array_equal(again.values[key], values, equal_nan=True)
-    half = joined([right, left]).where([True, True, False, False])
-    assert half.scenarios == right.scenarios
+    half = merge_outcomes([right, left]).select([True, True, False, False])
+    assert half.instances == right.instances
 
 
 DEFAULTS = get_gain_values(make_controller("range-limited"))
 
 
-def grid(*excess: tuple[float, ...]) -> GainOutcomes:
-    """Return what two or more sets of `range-limited` reached, the defaults the first of them."""
+def build_gain_outcomes(*excess: tuple[float, ...]) -> GainOutcomes:
+    """Build outcomes of two or more sets of gains of `range-limited`, the defaults first."""
     sets = [DEFAULTS, *({**DEFAULTS, "interaction_range": 20.0 + k} for k in range(1, len(excess)))]
-    scenarios = tuple(Scenario(f"map-{k}", "corner", 0) for k in range(len(excess[0])))
+    scenarios = tuple(ProblemInstance(f"map-{k}", "corner", 0) for k in range(len(excess[0])))
     return GainOutcomes(scenarios, tuple(sets), np.array(excess))
 
 
 def test_the_set_with_the_least_mean_is_taken():
-    found = {"range-limited": grid((1.2, 1.2, 1.2), (1.0, 1.0, 1.7), (1.1, 1.1, 1.3))}
-    assert best_gains(found) == {"range-limited": {**DEFAULTS, "interaction_range": 22.0}}
+    found = {"range-limited": build_gain_outcomes((1.2, 1.2, 1.2), (1.0, 1.0, 1.7), (1.1, 1.1, 1.3))}
+    assert find_best_gains(found) == {"range-limited": {**DEFAULTS, "interaction_range": 22.0}}
 
 
-def test_without_a_scenario_in_which_every_run_was_well_the_defaults_stay():
-    found = grid((1.2, np.nan), (np.nan, 1.1))
-    assert best_gains({"range-limited": found}) == {}
-    assert gains_text("range-limited", found).startswith("Gains: its defaults; in every scenario")
+def test_without_an_instance_where_all_runs_finished_the_defaults_stay():
+    found = build_gain_outcomes((1.2, np.nan), (np.nan, 1.1))
+    assert find_best_gains({"range-limited": found}) == {}
+    assert describe_tuning("range-limited", found).startswith("Gains: its defaults; in every scenario")
 
 
-def test_it_is_told_what_tuning_was_worth():
-    better = gains_text("range-limited", grid((1.2, 1.2, 1.5), (1.5, 1.8, 2.1), (0.9, 1.2, 1.2)))
+def test_the_benefit_of_tuning_is_described():
+    better = describe_tuning(
+        "range-limited", build_gain_outcomes((1.2, 1.2, 1.5), (1.5, 1.8, 2.1), (0.9, 1.2, 1.2))
+    )
     assert better == (
         "Gains: interaction_range 22: of 3 sets the best on 3 maps of the tuning, mean J/J_ref 1.100; "
         "with its defaults 1.3, median ratio 0.8; with the worst set 1.8, median ratio 0.6."
     )
-    usual = gains_text("range-limited", grid((1.2, 1.2, 1.2), (1.8, 2.4, np.nan)))
+    usual = describe_tuning("range-limited", build_gain_outcomes((1.2, 1.2, 1.2), (1.8, 2.4, np.nan)))
     assert usual.startswith(
         f"Gains: interaction_range {DEFAULTS['interaction_range']:g}, as by default: of 2 sets "
     )
@@ -199,8 +201,8 @@ class TestDegradations:
                 "conditions": (("rapf", "lloyd"), 2, axes),
                 "conditions-others": (("rpf",), 1, {"loss": (0.0, 0.6)}),
             }
-            monkeypatch.setattr(studies, "disturbed", lambda plan: parts)
-            monkeypatch.setattr(results, "read_results", Table)
+            monkeypatch.setattr(studies, "list_disturbances", lambda plan: parts)
+            monkeypatch.setattr(degradations, "read_results", Table)
             found = read_degradations(tmp_path, TINY)
             return {(each.axis, each.value, each.controller): each for each in found}
 

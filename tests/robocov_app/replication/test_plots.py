@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.figures import plot_degradations
+from robocov_app.replication.degradation_plot import draw_degradations
 from robocov_app.replication.results import Degradation
 
 
-def found() -> list[Degradation]:
+def build_degradations() -> list[Degradation]:
     rows = []
     for axis, values in (
         ("loss", (0.0, 0.5)),
@@ -23,8 +23,8 @@ def found() -> list[Degradation]:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_panel_for_each_thing_and_a_curve_for_each_controller(theme: str) -> None:
-    figure = plot_degradations(found(), theme=theme)
+def test_each_disturbance_has_a_panel_and_each_controller_a_curve(theme: str) -> None:
+    figure = draw_degradations(build_degradations(), theme=theme)
     panels = figure.axes
     assert [axes.get_title(loc="left") for axes in panels] == [
         "Messages lost",
@@ -48,8 +48,8 @@ def test_a_panel_for_each_thing_and_a_curve_for_each_controller(theme: str) -> N
         assert one.x0 >= 0 and one.x1 <= figure.bbox.x1
 
 
-def test_what_has_no_ratio_is_left_out() -> None:
+def test_degradations_without_a_ratio_are_left_out() -> None:
     nothing = Interval(float("nan"), float("nan"), float("nan"))
-    rows = [replace(each, ratio=nothing) if each.value == 0.1 else each for each in found()]
-    figure = plot_degradations(rows)
+    rows = [replace(each, ratio=nothing) if each.value == 0.1 else each for each in build_degradations()]
+    figure = draw_degradations(rows)
     assert figure.axes[2].get_ylim() == figure.axes[0].get_ylim()

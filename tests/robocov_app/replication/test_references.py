@@ -20,7 +20,7 @@ HALL = Environment("hall", ((0, 0), (9, 0), (9, 3), (0, 3)), (), {"spread": Unif
 MAPS = (StudyMap("square", SQUARE), StudyMap("hall", HALL))
 
 
-def found(folder, maps=MAPS, restarts=2, stop=None, **other):
+def search(folder, maps=MAPS, restarts=2, stop=None, **other):
     plan = replace(QUICK, lattice=other.pop("lattice", 16), restarts=restarts)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(references, "ROBOTS", other.get("robots", 3))
@@ -30,7 +30,7 @@ def found(folder, maps=MAPS, restarts=2, stop=None, **other):
 
 @pytest.mark.slow
 def test_each_map_has_its_reference_and_its_file(tmp_path):
-    answers = found(tmp_path / "references")
+    answers = search(tmp_path / "references")
     assert set(answers) == {"square", "hall"}
     for each in MAPS:
         answer = answers[each.name]
@@ -44,16 +44,16 @@ def test_each_map_has_its_reference_and_its_file(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_there_is_not_searched_for_again(tmp_path):
-    first = found(tmp_path)
+def test_stored_references_are_reused(tmp_path):
+    first = search(tmp_path)
     path = tmp_path / "hall.json"
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"mean_distance_m": 0.125}))
-    assert found(tmp_path)["hall"].mean_distance == 0.125
+    assert search(tmp_path)["hall"].mean_distance == 0.125
     # another search is another question, and so is a file that cannot be read
-    assert found(tmp_path, restarts=3)["hall"].mean_distance == pytest.approx(first["hall"].mean_distance)
+    assert search(tmp_path, restarts=3)["hall"].mean_distance == pytest.approx(first["hall"].mean_distance)
     path.write_text("{")
-    assert found(tmp_path)["hall"] == first["hall"]
+    assert search(tmp_path)["hall"] == first["hall"]
 
 
 def test_starts_are_no_part_of_the_question():
@@ -66,17 +66,17 @@ def test_starts_are_no_part_of_the_question():
 
 
 @pytest.mark.slow
-def test_a_map_without_room_is_named(tmp_path):
+def test_the_error_names_a_map_without_space(tmp_path):
     tight = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)), ())
     with pytest.raises(OutputError, match=r"reference of map 'closet': robots: expected at most about 0"):
-        found(tmp_path, maps=(StudyMap("closet", tight),), radius=0.6)
+        search(tmp_path, maps=(StudyMap("closet", tight),), radius=0.6)
 
 
-def test_whoever_stops_need_not_wait(tmp_path):
+def test_an_interruption_ends_the_search_at_once(tmp_path):
     stop = Interruption()
     timer = threading.Timer(0.5, lambda: setattr(stop, "requested", True))
     timer.start()
-    answers = found(tmp_path, maps=MAPS[:1], restarts=5000, robots=40, lattice=64, stop=stop)
+    answers = search(tmp_path, maps=MAPS[:1], restarts=5000, robots=40, lattice=64, stop=stop)
     timer.join()
     assert answers == {}
     assert not list(tmp_path.iterdir())

@@ -10,21 +10,21 @@ from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonO
 from robocov.errors import StartError
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.figures.statistics import share
-from robocov_app.replication import studies
-from robocov_app.replication.claims import ALPHA, LEAST_MAPS, NEARLY_ALWAYS, REGISTERED
+from robocov_app.replication import studies, study_maps
+from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS, NEARLY_ALWAYS, REGISTERED
 from robocov_app.replication.contenders import (
-    GRIDS,
+    GAIN_GRIDS,
     LLOYD,
     OURS,
     PAPER,
     RAPF_SHARED,
     RPF_SHARED,
     UNTUNED,
-    baselines,
-    distinct_gains,
-    paper_contenders,
+    build_baselines,
+    build_paper_contenders,
+    collect_gain_sets,
 )
-from robocov_app.replication.evidence import account_of
+from robocov_app.replication.evidence import load_profile
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, FULL, KINDS, NON_CONVEX, QUICK, TEAM, UNSEEN
 from robocov_app.sweep.parameters import TEAM_PARAMETERS as TEAM_PARAMETERS
 from robocov_app.sweep.tasks import generate_tasks
@@ -33,7 +33,7 @@ BEST = {
     "rapf": {"k_rep": 0.3, "rho_0": 3.0, "k_att": 30.0, "attraction_limit": None},
     "rpf": {"k_rep": 10.0, "rho_0": 6.0},
 }
-PAPERS = paper_contenders(BEST)
+PAPERS = build_paper_contenders(BEST)
 
 both = pytest.mark.parametrize(
     "plan", [pytest.param(FULL, marks=pytest.mark.slow), QUICK], ids=["full", "quick"]
@@ -43,7 +43,7 @@ both = pytest.mark.parametrize(
 class TestMaps:
     @pytest.mark.parametrize("name", [*NON_CONVEX, *CONVEX])
     def test_every_kind_of_start_has_room_on_every_map(self, name):
-        environment = studies.bundled(name, CONVEX_KINDS).environment
+        environment = study_maps.load_study_map(name, CONVEX_KINDS).environment
         assert tuple(environment.starts) == CONVEX_KINDS
         for kind, spec in environment.starts.items():
             assert environment.start(kind).sample(6, seed=1).shape == (6, 2)
@@ -58,7 +58,7 @@ class TestMaps:
     def test_clustered_starts_are_as_near_as_can_be(self):
         ring = ((0, 0), (8, 0), (8, 6), (0, 6))
         pillar = Environment("pillar", ring, (CircleObstacle((4.0, 3.0), 1.0),))
-        starts = studies.with_kinds_of_starts(pillar).starts
+        starts = study_maps.replace_starts(pillar).starts
         assert starts["corner"] == DiscStart((0.8, 0.8), 0.8)
         centre = starts["centre"]
         assert isinstance(centre, DiscStart)
@@ -67,29 +67,32 @@ class TestMaps:
     def test_narrow_maps_get_smaller_discs_and_too_narrow_ones_none(self):
         for width, radius in ((1.3, 0.6), (1.0, 0.45)):
             alley = Environment("alley", ((0, 0), (9, 0), (9, width), (0, width)))
-            spec = studies.with_kinds_of_starts(alley).starts["corner"]
+            spec = study_maps.replace_starts(alley).starts["corner"]
             assert isinstance(spec, DiscStart)
             assert spec.radius == radius
         block = PolygonObstacle(((0.5, 0.5), (8.5, 0.5), (8.5, 8.5), (0.5, 8.5)))
         ring = Environment("ring", ((0, 0), (9, 0), (9, 9), (0, 9)), (block,))
         with pytest.raises(StartError, match=r"map 'ring': no free disc of 0\.45 m radius"):
-            studies.with_kinds_of_starts(ring)
+            study_maps.replace_starts(ring)
 
     @pytest.mark.parametrize("seed", range(6))
     def test_convex_regions_are_convex_large_and_the_same_every_time(self, seed):
-        region = studies.convex_region(seed).environment
+        region = study_maps.generate_convex_region(seed).environment
         polygon = region.boundary_polygon
         assert polygon.is_valid and polygon.equals(polygon.convex_hull)
         assert polygon.area >= 40.0 and region.blocked.is_empty
-        assert region == studies.convex_region(seed).environment
-        assert region.boundary != studies.convex_region(seed + 1).environment.boundary
+        assert region == study_maps.generate_convex_region(seed).environment
+        assert region.boundary != study_maps.generate_convex_region(seed + 1).environment.boundary
         assert not polygon.buffer(-1.8).is_empty  # no strip
 
     @pytest.mark.parametrize("seed", [1, 2, 3, pytest.param(101, marks=pytest.mark.slow)])
     def test_generated_maps_are_as_they_are_described(self, seed):
-        each = studies.generated(seed)
+        each = study_maps.generate_study_map(seed)
         environment = each.environment
-        assert environment == studies.generated(seed).environment and each.name == f"generated-{seed}"
+        assert (
+            environment == study_maps.generate_study_map(seed).environment
+            and each.name == f"generated-{seed}"
+        )
         assert tuple(environment.starts) == KINDS
         assert 4 <= len(environment.obstacles) <= 8
         assert 0.155 <= 1.0 - environment.free_area / environment.area <= 0.255
@@ -109,16 +112,16 @@ class TestMaps:
         assert plan.tuning_seed not in plan.seeds
         tuned, tested = (
             {each.environment.obstacles for each in among}
-            for among in (studies.generated_maps(plan.tuning), studies.claim_maps(plan))
+            for among in (study_maps.build_generated_maps(plan.tuning), study_maps.build_claim_maps(plan))
         )
         assert not tuned & tested
         # a claim on gains is judged on these maps; regrets need two starts
-        assert len(plan.tuning) >= LEAST_MAPS and len(plan.tuning_starts) >= 2
+        assert len(plan.tuning) >= MIN_MAPS and len(plan.tuning_starts) >= 2
 
     @both
     def test_every_claim_of_the_paper_has_maps_enough(self, plan):
-        assert len(studies.claim_maps(plan)) >= LEAST_MAPS
-        assert len(studies.convex_maps(plan)) >= LEAST_MAPS
+        assert len(study_maps.build_claim_maps(plan)) >= MIN_MAPS
+        assert len(study_maps.build_convex_maps(plan)) >= MIN_MAPS
 
     def test_nearly_always_can_be_shown_on_the_maps_of_the_full_study(self):
         for count in (len(FULL.bundled + FULL.generated), len(CONVEX) + len(FULL.convex_generated)):
@@ -132,31 +135,31 @@ class TestMaps:
 
     @pytest.mark.slow
     def test_unseen_maps_are_of_other_families(self):
-        unseen = {each.name: each.environment for each in studies.unseen_maps(FULL)}
+        unseen = {each.name: each.environment for each in study_maps.build_unseen_maps(FULL)}
         assert list(unseen)[:4] == ["blocks-301", "blocks-302", "blocks-303", "rooms-301"]
         kinds = {name: each.extra["generator"]["kind"] for name, each in unseen.items()}
         assert all(name.startswith(f"{kind}-") and kind in UNSEEN for name, kind in kinds.items())
-        assert len(set(unseen.values())) == len(unseen) == LEAST_MAPS
+        assert len(set(unseen.values())) == len(unseen) == MIN_MAPS
         assert all(tuple(each.starts) == KINDS for each in unseen.values())
-        contest = studies.beyond_contests(FULL, {}, UNTUNED)["unseen"]
+        contest = studies.build_beyond_contests(FULL, {}, UNTUNED)["unseen"]
         assert [law.key for law in contest.contenders] == [OURS[0], "rapf-default", "lloyd"]
         assert len(contest.study) == len(unseen) * 3 * 3
-        tuned = studies.beyond_contests(FULL, {}, PAPERS)["unseen"]
+        tuned = studies.build_beyond_contests(FULL, {}, PAPERS)["unseen"]
         assert [law.key for law in tuned.contenders] == [OURS[0], "rapf-best", "lloyd"]
-        assert "unseen" not in studies.beyond_contests(QUICK, {}, PAPERS)
+        assert "unseen" not in studies.build_beyond_contests(QUICK, {}, PAPERS)
 
 
 class TestPaper:
     @pytest.mark.slow
     def test_the_full_study_is_as_large_as_it_is_said_to_be(self):
-        assert len(studies.claim_maps(FULL)) == len(studies.convex_maps(FULL)) == 100
-        study = studies.claims_contest(FULL, PAPERS).study
+        assert len(study_maps.build_claim_maps(FULL)) == len(study_maps.build_convex_maps(FULL)) == 100
+        study = studies.build_claims_contest(FULL, PAPERS).study
         assert study.starts == KINDS
         assert len(study) == 100 * 3 * 4 * 6
-        assert len(studies.gains_study(FULL)) == 12 * 2 * (20 + 80)
+        assert len(studies.build_gains_study(FULL)) == 12 * 2 * (20 + 80)
 
     def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
-        tasks = list(generate_tasks(studies.claims_contest(TINY, PAPERS).study))
+        tasks = list(tasks_of(studies.build_claims_contest(TINY, PAPERS).study))
         assert len({(task.duration, task.dt, task.lattice, str(task.team)) for task in tasks}) == 1
         scenarios = {(task.map, task.start, task.seed) for task in tasks}
         for scenario in scenarios:
@@ -168,7 +171,7 @@ class TestPaper:
         rapf, rpf = RAPF_SHARED.all_gains, RPF_SHARED.all_gains
         assert {name: rapf[name] for name in rpf} == rpf
         assert rapf["attraction_limit"] is None
-        grids = studies.gain_sets(FULL)
+        grids = studies.list_gain_sets(FULL)
         assert all(gains["attraction_limit"] is None for gains in grids["rapf"])
         potentials = {(gains["k_rep"], gains["rho_0"]) for gains in grids["rapf"]}
         assert potentials == {(gains["k_rep"], gains["rho_0"]) for gains in grids["rpf"]}
@@ -177,9 +180,11 @@ class TestPaper:
         assert set(TEAM) <= set(TEAM_PARAMETERS)
 
     def test_best_gains_that_are_the_shared_ones_are_run_once(self):
-        same = paper_contenders({"rapf": RAPF_SHARED.gains, "rpf": RPF_SHARED.gains})
-        assert len(studies.claims_contest(TINY, same).study) == 2 * 3 * 4
-        assert {name: len(sets) for name, sets in distinct_gains((RAPF_SHARED, LLOYD, same[1])).items()} == {
+        same = build_paper_contenders({"rapf": RAPF_SHARED.gains, "rpf": RPF_SHARED.gains})
+        assert len(studies.build_claims_contest(TINY, same).study) == 2 * 3 * 4
+        assert {
+            name: len(sets) for name, sets in collect_gain_sets((RAPF_SHARED, LLOYD, same[1])).items()
+        } == {
             "rapf": 1,
             "lloyd": 1,
         }
@@ -187,13 +192,13 @@ class TestPaper:
     def test_figures_4_and_6_begin_in_the_same_places_and_8_elsewhere(self):
         first, second = load_map("blocks-a"), load_map("blocks-b")
         assert first.starts["paper"] == second.starts["paper"] != second.starts["other"]
-        found = studies.figure_studies(TINY)
+        found = studies.build_figure_studies(TINY)
         assert found["figures-a"].starts == ("paper",)
         assert found["figures-b"].starts == ("paper", "other")
         assert {len(study) for study in found.values()} == {2, 4}
 
     def test_figures_4_to_8_are_run_at_the_best_gains_from_the_same_places(self):
-        shared, best = studies.figure_studies(TINY), studies.figure_studies(TINY, PAPERS)
+        shared, best = studies.build_figure_studies(TINY), studies.build_figure_studies(TINY, PAPERS)
         assert list(best) == ["figures-a-best", "figures-b-best"]
         for name, study in best.items():
             tasks = list(generate_tasks(study))
@@ -203,16 +208,16 @@ class TestPaper:
             assert [(task.document, task.start, task.seed, task.controller) for task in tasks] == places
 
     def test_the_quick_study_is_a_small_part(self):
-        size = len(studies.claims_contest(QUICK, PAPERS).study) + len(studies.gains_study(QUICK))
+        size = len(studies.build_claims_contest(QUICK, PAPERS).study) + len(studies.build_gains_study(QUICK))
         assert size < 600
-        beyond = [each.study for each in studies.beyond_contests(QUICK, {}, UNTUNED).values()]
-        beyond += studies.conditions_studies(QUICK).values()
+        beyond = [each.study for each in studies.build_beyond_contests(QUICK, {}, UNTUNED).values()]
+        beyond += studies.build_conditions_studies(QUICK).values()
         assert sum(study.duration * len(study) for study in beyond) < 4500.0
 
 
 def baseline_contests(plan):
     """Return the sweeps of baselines and ours."""
-    contests = studies.beyond_contests(plan, {}, UNTUNED)
+    contests = studies.build_beyond_contests(plan, {}, UNTUNED)
     return {name: each for name, each in contests.items() if name == "rivals" or name.startswith("ours-")}
 
 
@@ -226,7 +231,7 @@ class TestBeyond:
 
     @both
     def test_baselines_begin_where_the_papers_controllers_began(self, plan):
-        papers = list(generate_tasks(studies.claims_contest(plan, PAPERS).study))
+        papers = list(tasks_of(studies.build_claims_contest(plan, PAPERS).study))
         places = {(task.document, task.start, task.seed) for task in papers}
         limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
         for each in baseline_contests(plan).values():
@@ -237,21 +242,21 @@ class TestBeyond:
     @pytest.mark.slow
     def test_in_full_ours_is_run_as_often_as_rapf_and_baselines_on_every_map(self):
         assert FULL.beyond.own_seeds == FULL.seeds
-        assert min(len(FULL.beyond.maps), len(FULL.beyond.conditions_maps)) >= LEAST_MAPS
-        assert len(studies.baseline_maps(FULL)) == 33
+        assert min(len(FULL.beyond.maps), len(FULL.beyond.conditions_maps)) >= MIN_MAPS
+        assert len(study_maps.build_baseline_maps(FULL)) == 33
         for name, each in baseline_contests(FULL).items():
             seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
             assert len(each.study) == 33 * 3 * seeds * len(each.contenders)
 
     def test_who_knows_the_density_begins_where_the_other_does(self):
-        contests = studies.beyond_contests(QUICK, {}, UNTUNED)
-        known, ignored = (generate_tasks(contests[name].study) for name in ("density", "density-ignored"))
+        contests = studies.build_beyond_contests(QUICK, {}, UNTUNED)
+        known, ignored = (tasks_of(contests[name].study) for name in ("density", "density-ignored"))
         for with_, without in zip(known, ignored, strict=True):
             assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
             assert with_.document != without.document
 
     def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
-        tasks = list(generate_tasks(studies.beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
+        tasks = list(tasks_of(studies.build_beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
         by_distance, by_time = (
             [task for task in tasks if task.gains["cells"] == cells] for cells in ("distance", "time")
         )
@@ -262,7 +267,7 @@ class TestBeyond:
 
     def test_each_disturbance_stands_alone(self):
         found = {
-            name: list(generate_tasks(study)) for name, study in studies.conditions_studies(TINY).items()
+            name: list(tasks_of(study)) for name, study in studies.build_conditions_studies(TINY).items()
         }
         names = "ideal", *(name.replace("_", "-") for name in studies.AXES)
         parts = "conditions", "conditions-others"
@@ -274,7 +279,7 @@ class TestBeyond:
         assert {task.team["communication_range"] for task in found["conditions-loss"]} == {None}
         assert {task.team["loss"] for task in found["conditions-loss"]} == {0.6}
         assert "loss" not in found["conditions-failure-rate"][0].team
-        full = studies.conditions_studies(FULL)
+        full = studies.build_conditions_studies(FULL)
         assert len(full["conditions-loss"]) == 3 * 2 * 12 * 3 and full["conditions-others-loss"].seeds == (0,)
         assert len(full["conditions-others-loss"]) == len(CONTROLLERS) * 12 - 2 * 12
         assert all(values[0] in (None, 0.0) for values in studies.AXES.values())
@@ -284,36 +289,40 @@ class TestBeyond:
         known, usual = get_gains(CONTROLLERS[name]), get_gain_values(make_controller(name))
         sets = [
             {**usual, **{gain: known[gain].validate(value, "grid") for gain, value in gains.items()}}
-            for gains in GRIDS[name]
+            for gains in GAIN_GRIDS[name]
         ]
         assert usual in sets
         assert len(sets) > 2 and all(each not in sets[:k] for k, each in enumerate(sets))
         # what a set does not name would change with the defaults
-        assert len({tuple(gains) for gains in GRIDS[name]}) == 1
-        assert 1 <= len(GRIDS[name][0]) <= 3
+        assert len({tuple(gains) for gains in GAIN_GRIDS[name]}) == 1
+        assert 1 <= len(GAIN_GRIDS[name][0]) <= 3
 
     @pytest.mark.slow
     def test_in_full_they_are_tuned_where_nothing_is_tested(self):
-        study = studies.baseline_gains_study(FULL)
+        study = studies.build_baseline_gains_study(FULL)
         assert study is not None
-        assert set(study.controllers) == set(GRIDS) == {law.controller for law in baselines({})}
-        assert len(study) == 4 * 2 * sum(len(grid) for grid in GRIDS.values())
-        tested = {each.environment.obstacles for each in studies.claim_maps(FULL)}
+        assert set(study.controllers) == set(GAIN_GRIDS) == {law.controller for law in build_baselines({})}
+        assert len(study) == 4 * 2 * sum(len(grid) for grid in GAIN_GRIDS.values())
+        tested = {each.environment.obstacles for each in study_maps.build_claim_maps(FULL)}
         assert not tested & {each.environment.obstacles for each in study.maps}
         assert set(FULL.beyond.tuning) <= set(FULL.tuning)
         assert (study.seeds, study.starts) == ((FULL.tuning_seed,), ("corner", "uniform"))
-        assert studies.baseline_gains_study(QUICK) is None
+        assert studies.build_baseline_gains_study(QUICK) is None
 
     def test_a_baseline_has_its_best_gains(self):
         tuned = {"range-limited": {"interaction_range": 9.0}}
-        for each in baselines(tuned):
+        for each in build_baselines(tuned):
             assert each.gains == tuned.get(each.controller, {})
 
     def test_every_built_in_controller_is_accounted_for(self):
         for name in CONTROLLERS:
-            account = account_of(name)
-            assert account.short != "–" and account.source.endswith(".") and account.does.endswith(".")
-        assert account_of("geodesic-lloyd").information == "whole map"
-        assert account_of("rapf").information == "own"
-        assert "not from its text" in account_of("howard").source
-        assert "not from its text" not in account_of("rapf").source
+            account = load_profile(name)
+            assert (
+                account.short_source != "–"
+                and account.source.endswith(".")
+                and account.behavior.endswith(".")
+            )
+        assert load_profile("geodesic-lloyd").information == "whole map"
+        assert load_profile("rapf").information == "own"
+        assert "not from its text" in load_profile("howard").source
+        assert "not from its text" not in load_profile("rapf").source

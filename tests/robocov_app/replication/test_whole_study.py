@@ -23,28 +23,44 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
-from robocov_app.replication import claims, contenders, pages, results, step_times, studies
+from robocov_app.replication import (
+    contenders,
+    execution,
+    figure_files,
+    pages,
+    runner,
+    step_times,
+    studies,
+    study_maps,
+)
 from robocov_app.replication import plan as planned
-from robocov_app.replication.claims import amount
-from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
-from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
-from robocov_app.replication.figures import CAPTIONS, arrival, beyond_plots, describe_figure, gap_samples
-from robocov_app.replication.pages import Image
-from robocov_app.replication.results import Interrupted, forecast, open_folder
-from robocov_app.sweep.study import Study
-from robocov_app.sweep.tasks import generate_tasks
+from robocov_app.replication.beyond_plots import build_gap_samples, plan_beyond_plots
+from robocov_app.replication.claims import judge_beyond_claims, judge_paper_claims
+from robocov_app.replication.claims.claim import EXTENSIONS, GOALS, RIVALS
+from robocov_app.replication.claims.goals import describe_goal, summarize_goals
+from robocov_app.replication.claims.thresholds import REGISTERED
+from robocov_app.replication.contenders import GAIN_GRIDS, LABELS, TEAMS
+from robocov_app.replication.evidence import describe_tuning, rank_contenders, summarize_contenders
+from robocov_app.replication.figure_files import FigureFile
+from robocov_app.replication.forecast import forecast_study
+from robocov_app.replication.formatting import format_amount
+from robocov_app.replication.paper_figures import CAPTIONS, describe_figure, find_arrival_time
+from robocov_app.replication.runner import StudyInterrupted, open_folder
+from robocov_app.sweep.study import Study, tasks_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
-FIRST = results.partition_record()
+FIRST = execution.record_partition()
 
 
 @pytest.fixture(scope="module", autouse=True)
 def small_parts():
     """Try two sets of each baseline's gains; time few steps."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contenders, "GRIDS", {name: (grid[0], grid[-1]) for name, grid in GRIDS.items()})
-        patch.setattr(step_times, "BLOCK", 3)
+        patch.setattr(
+            contenders, "GAIN_GRIDS", {name: (grid[0], grid[-1]) for name, grid in GAIN_GRIDS.items()}
+        )
+        patch.setattr(step_times, "STEPS_PER_BLOCK", 3)
         yield
 
 
@@ -54,19 +70,21 @@ def study(tmp_path_factory):
     with shared(tmp_path_factory, "tiny-paper") as root:
         folder, kept = root / "out", root / "images"
         open_folder(folder, TINY)
-        paper = results.run_paper(folder, TINY, options())
+        paper = execution.run_paper(folder, TINY, options())
         if not kept.exists():
-            images = pages.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
-            found = claims.paper_claims(paper.convex, paper.claims, paper.gains)
-            pages.save_claims(folder, found)
-            page = pages.paper_page(TINY, images, paper.figures, FIRST, paper, found)
-            pages.save(folder / pages.PAGE, page)
+            images = figure_files.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
+            found = judge_paper_claims(paper.convex, paper.claims, paper.gains)
+            pages.write_claims(folder, found)
+            page = pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found)
+            pages.write_text(folder / pages.PAGE_FILE, page)
             kept.write_bytes(pickle.dumps(images))
-        beyond = results.run_beyond(folder, TINY, options(), paper)
+        beyond = execution.run_beyond(folder, TINY, options(), paper)
     return folder, paper, beyond, pickle.loads(kept.read_bytes())
 
 
-DRAWN = {name: Image(name, 2148, 900, words) for name, words in CAPTIONS.items() if name.startswith("beyond")}
+DRAWN = {
+    name: FigureFile(name, 2148, 900, words) for name, words in CAPTIONS.items() if name.startswith("beyond")
+}
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +109,7 @@ def content(folder):
 
 @pytest.fixture(scope="module")
 def more(beyond):
-    return pages.beyond_page(DRAWN, beyond)
+    return pages.build_beyond_page(DRAWN, beyond)
 
 
 def text_of(found) -> str:
@@ -101,35 +119,35 @@ def text_of(found) -> str:
 
 class TestRuns:
     def test_as_many_as_were_forecast(self, folder, paper, beyond, tmp_path):
-        expected = forecast(tmp_path, TINY, 2, claims=True, beyond=True)
+        expected = forecast_study(tmp_path, TINY, 2, claims=True, beyond=True)
         # none of the tiny grid's gains are the shared ones
         assert expected.left == expected.runs == paper.runs + beyond.runs
         assert paper.failed == beyond.failed == 0
-        assert expected.seconds > 0.0 and set(expected.each) == set(CONTROLLERS)
-        again = forecast(folder, TINY, 2, claims=True, beyond=True)
+        assert expected.seconds > 0.0 and set(expected.seconds_per_run) == set(CONTROLLERS)
+        again = forecast_study(folder, TINY, 2, claims=True, beyond=True)
         assert (again.left, again.seconds) == (0, 0.0)
-        assert forecast(folder, TINY, 2, claims=False, beyond=False).runs == 8
+        assert forecast_study(folder, TINY, 2, claims=False, beyond=False).runs == 8
 
     def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
         monkeypatch.setattr("robocov_app.sweep.worker.perform", lambda task: None)
-        without = forecast(tmp_path, TINY, 2, claims=False, beyond=True)
-        for task in generate_tasks(studies.gains_study(TINY)):
+        without = forecast_study(tmp_path, TINY, 2, claims=False, beyond=True)
+        for task in tasks_of(studies.build_gains_study(TINY)):
             (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)
         # what a former version has done lies there as well
         (tmp_path / "studies" / "gains" / "runs" / "of-a-former-version").mkdir()
-        expected = forecast(tmp_path, TINY, 2, claims=False, beyond=True)
+        expected = forecast_study(tmp_path, TINY, 2, claims=False, beyond=True)
         assert expected.runs == expected.left == without.runs + 2 * 3 * 2  # RAPF's and RPF's
 
     def test_the_same_call_does_nothing_again_and_gives_the_same(self, folder, paper, beyond):
         rows = sorted((folder / "studies").glob("*/runs/*/row.json"))
         before = [path.stat().st_mtime_ns for path in rows]
-        again = results.run_paper(folder, TINY, options())
-        alone = results.run_beyond(folder, TINY, options(), None)
+        again = execution.run_paper(folder, TINY, options())
+        alone = execution.run_beyond(folder, TINY, options(), None)
         assert [path.stat().st_mtime_ns for path in rows] == before
         assert again.contenders == paper.contenders and again.references == paper.references
-        first, second = (claims.paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
+        first, second = (judge_paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
         assert text_of(first) == text_of(second)
-        first, second = (claims.beyond_claims(of) for of in (beyond, alone))
+        first, second = (judge_beyond_claims(of) for of in (beyond, alone))
         assert text_of(first) == text_of(second)
 
     def test_what_is_lost_is_done_again_and_gives_the_same(self, folder, paper, beyond, tmp_path):
@@ -140,8 +158,8 @@ class TestRuns:
         for path in lost:
             shutil.rmtree(path)
         (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as one that was killed leaves it
-        again = results.run_beyond(out, TINY, options(), paper)
-        assert text_of(claims.beyond_claims(again)) == text_of(claims.beyond_claims(beyond))
+        again = execution.run_beyond(out, TINY, options(), paper)
+        assert text_of(judge_beyond_claims(again)) == text_of(judge_beyond_claims(beyond))
         for name in ("rivals", "conditions-loss"):
             table = f"studies/{name}/results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
@@ -150,10 +168,10 @@ class TestRuns:
         of = {each.key: each for each in paper.contenders}
         for law, grid in paper.gains.items():
             assert of[f"{law}-best"].gains == grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
-        assert set(beyond.gains) == set(GRIDS)
+        assert set(beyond.gains) == set(GAIN_GRIDS)
         table = list(read_results(folder / "studies" / "rivals").rows())
         for name, grid in beyond.gains.items():
-            assert {(each.map, each.seed) for each in grid.scenarios} == {("generated-101", TINY.tuning_seed)}
+            assert {(each.map, each.seed) for each in grid.instances} == {("generated-101", TINY.tuning_seed)}
             best = grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
             for row in table:
                 if row["controller"] == name:
@@ -169,10 +187,10 @@ class TestRuns:
         assert all(len(places) == 1 for places in starts.values())
 
     def test_the_worst_runs_are_rapfs_worst_on_each_map(self, paper):
-        gap = paper.claims.of("rapf-shared", "gap")
+        gap = paper.claims.get_values("rapf-shared", "gap")
         assert len({scenario.map for scenario, _ in paper.worst}) == len(paper.worst) == 2
         first, record = paper.worst[0]
-        k = paper.claims.scenarios.index(first)
+        k = paper.claims.instances.index(first)
         assert gap[k] == gap.max()
         assert record.positions[-1] == pytest.approx(paper.claims.values["rapf-shared", "placement"][k])
         assert record.gains["k_att"] == 3.0
@@ -196,14 +214,14 @@ class TestRuns:
 
     def test_a_task_of_two_studies_is_done_once(self, tmp_path):
         common = {
-            "maps": studies.generated_maps(TINY.beyond.maps),
+            "maps": study_maps.build_generated_maps(TINY.beyond.maps),
             "duration": 0.2,
             "lattice": 8,
             "starts": ("corner",),
         }
         both = {"one": Study(controllers=("rpf",), **common)}
         both["two"] = Study(controllers=("rpf", "lloyd"), **common)
-        results.run_together(both, tmp_path, options(), "x")
+        runner.run_studies(both, tmp_path, options(), "x")
         tables = [list(read_results(tmp_path / "studies" / name).rows()) for name in both]
         assert [len(table) for table in tables] == [2, 4]
         finals = [{row["run"]: row["mean_distance_m"] for row in table} for table in tables]
@@ -212,25 +230,23 @@ class TestRuns:
 
 class TestBeyond:
     def test_every_registered_controller_has_a_row(self, beyond):
-        rows = ranked_rows(beyond)
+        rows = rank_contenders(beyond)
         assert {row.contender.controller for row in rows} == set(CONTROLLERS)
         medians = [row.gap.estimate for row in rows]
         assert medians == sorted(medians)
         for row in rows:
-            assert all(
-                beyond.steps[size].ratio_interval(row.contender.controller).estimate for size in (6, 8)
-            )
+            assert all(beyond.steps[size].compute_ratio(row.contender.controller).estimate for size in (6, 8))
             assert row.runs == 2
-        samples = gap_samples(beyond)
+        samples = build_gap_samples(beyond)
         assert [sample.label for sample in samples] == [row.contender.label for row in rows]
 
     def test_the_papers_runs_count_where_baselines_ran(self, paper):
         fewer = replace(TINY, beyond=replace(TINY.beyond, generated=()))
-        outcomes = results.among_baselines(paper.claims, fewer)
+        outcomes = execution.select_baseline_outcomes(paper.claims, fewer)
         assert set(outcomes.maps) == {"blocks-a"} and set(outcomes.starts) == {"corner"}
 
     def test_both_runs_are_judged_by_the_density(self, folder, beyond):
-        known, ignored = beyond.density.pictures
+        known, ignored = beyond.density.figure_runs
         assert not known.record.environment.density.is_uniform
         assert ignored.record.environment.density is None
         assert known.record.positions[0] == pytest.approx(ignored.record.positions[0])
@@ -238,16 +254,16 @@ class TestBeyond:
         costs = [judge(each.record.positions[-1]).mean_distance for each in (known, ignored)]
         assert beyond.density.costs == pytest.approx(tuple(costs))
         table = list(read_results(folder / "studies" / "density").rows())
-        finals = beyond.density.outcomes.of("known", "final")
+        finals = beyond.density.outcomes.get_values("known", "final")
         assert finals == pytest.approx([row["mean_distance_m"] for row in table])
 
     def test_mixed_teams_are_judged_by_time(self, beyond):
         for law in TEAMS:
-            seconds, metres = (beyond.teams.of(law.key, measure) for measure in ("time", "final"))
+            seconds, metres = (beyond.teams.get_values(law.key, measure) for measure in ("time", "final"))
             assert (seconds > metres).all() and (seconds < 4.0 * metres + 1e-9).all()
 
     def test_degradations_have_every_value_of_every_axis(self, beyond):
-        axes = studies.disturbed(TINY)["conditions"][2].items()
+        axes = studies.list_disturbances(TINY)["conditions"].axes.items()
         wanted = {("ideal", None)} | {(axis, value) for axis, values in axes for value in values}
         for name in CONTROLLERS:
             own = [each for each in beyond.degradations if each.controller == name]
@@ -256,11 +272,11 @@ class TestBeyond:
             assert all(each.ratio.estimate == 1.0 for each in best)
 
     def test_all_figures_are_drawn(self, beyond):
-        drawn = beyond_plots(beyond, "dark")
+        drawn = plan_beyond_plots(beyond, "dark")
         assert set(drawn) == set(DRAWN)
         (axes,) = drawn["beyond-gaps"]().axes
         low, high = axes.get_xlim()
-        samples = gap_samples(beyond)
+        samples = build_gap_samples(beyond)
         assert low < min(sample.values.min() for sample in samples)
         assert high > max(sample.values.max() for sample in samples)
         assert len(drawn["beyond-conditions"]().axes) == 6
@@ -341,39 +357,39 @@ class TestStopping:
         open_folder(tmp_path / "out", TINY)
         stopped = options()
         stopped.stop.requested = True
-        with pytest.raises(Interrupted):
-            results.run_paper(tmp_path / "out", TINY, stopped)
-        with pytest.raises(Interrupted):
-            results.run_together(studies.conditions_studies(TINY), tmp_path, stopped, "x")
+        with pytest.raises(StudyInterrupted):
+            execution.run_paper(tmp_path / "out", TINY, stopped)
+        with pytest.raises(StudyInterrupted):
+            runner.run_studies(studies.build_conditions_studies(TINY), tmp_path, stopped, "x")
         assert not list(tmp_path.glob("studies/*/runs/*"))
-        with pytest.raises(Interrupted):
-            results.time_steps(tmp_path, TINY, stopped)
+        with pytest.raises(StudyInterrupted):
+            execution.time_steps(tmp_path, TINY, stopped)
 
 
 class TestTables:
     def test_a_row_for_each_law(self, paper):
-        rows = law_rows(paper.claims, paper.contenders, TINY.duration)
+        rows = summarize_contenders(paper.claims, paper.contenders, TINY.duration)
         assert [row.contender for row in rows] == list(paper.contenders)
         for row in rows:
-            gap = paper.claims.of(row.contender.key, "gap")
+            gap = paper.claims.get_values(row.contender.key, "gap")
             assert row.gap.estimate == pytest.approx(np.median(gap))
             assert row.quartiles[0] <= row.gap.estimate <= row.quartiles[1]
-            assert 0.0 <= row.touched <= 1.0
-            assert np.isnan(row.stuck) == (row.contender.controller == "rpf")
+            assert 0.0 <= row.contact_fraction <= 1.0
+            assert np.isnan(row.stuck_fraction) == (row.contender.controller == "rpf")
             assert (
                 row.medians["final"] < row.medians["over_run"] and 0.0 < row.medians["path"] < TINY.duration
             )
-            work = paper.claims.of(row.contender.key, "work")
+            work = paper.claims.get_values(row.contender.key, "work")
             assert row.medians["work"] == np.median(work) and work.min() > 0.0
-            assert row.settling <= TINY.duration or (row.settling == np.inf and row.settled <= 0.5)
+            assert row.rest_time <= TINY.duration or (row.rest_time == np.inf and row.rest_fraction <= 0.5)
 
     def test_a_row_for_each_map_in_the_order_of_the_laws(self, paper, content):
         (table,) = re.findall(r"<caption><span>Map by map.*?</table>", content, re.DOTALL)
         assert re.findall(r'<th scope="row">(.*?)</th>', table) == ["blocks-a", "generated-1"]
-        here = [scenario.map == "blocks-a" for scenario in paper.claims.scenarios]
-        gaps = [amount(np.median(paper.claims.of(law, "gap")[here]), "%") for law in LABELS]
+        here = [scenario.map == "blocks-a" for scenario in paper.claims.instances]
+        gaps = [format_amount(np.median(paper.claims.get_values(law, "gap")[here]), "%") for law in LABELS]
         reference = paper.references["blocks-a"]
-        cells = [f"{reference.mean_distance:.3f} m", amount(reference.agreement, "%"), *gaps]
+        cells = [f"{reference.mean_distance:.3f} m", format_amount(reference.agreement, "%"), *gaps]
         row = table.partition("blocks-a</th>")[2].partition("</tr>")[0]
         assert re.findall(r"<td.*?>(.*?)</td>", plain(row)) == cells
 
@@ -392,7 +408,7 @@ class TestWords:
 
     def test_a_cost_has_arrived_when_it_stays(self, paper):
         history = paper.figures["a/rapf"].history
-        time = arrival(history)
+        time = find_arrival_time(history)
         later = history.mean_distance[history.time >= time]
         assert (np.abs(later / later[-1] - 1.0) <= 0.05).all()
         assert time in history.time
@@ -449,11 +465,11 @@ class TestPages:
             assert claim["claim"] in plain(content)
             p = {criterion["p"] for criterion in claim["criteria"]}
             assert claim["p"] == max(p) and (claim["p_adjusted"] or 1.0) >= claim["p"]
-            assert claims.amount(claim["p"]) in plain(content)
+            assert format_amount(claim["p"]) in plain(content)
         adjusted = {claim["key"] for claim in found if claim["p_adjusted"] is not None}
-        assert adjusted == set(claims.REGISTERED)
-        assert {claim["question"] for claim in found} == set(range(1, claims.GOALS))
-        ratio = paper.claims.compared("rapf-shared", "rpf-shared").ratio
+        assert adjusted == set(REGISTERED)
+        assert {claim["question"] for claim in found} == set(range(1, GOALS))
+        ratio = paper.claims.compare("rapf-shared", "rpf-shared").ratio
         shared = next(claim for claim in found if claim["key"] == "nonconvex-final-shared")
         assert (shared["estimate"], shared["interval"]) == (ratio.estimate, [ratio.low, ratio.high])
 
@@ -503,22 +519,22 @@ class TestPages:
         ids = {attributes.get("id") for _, attributes in _Tags(more).found}
         assert {f"controller-{name}" for name in CONTROLLERS} <= ids
         assert more.count('<svg class="strips"') == len(CONTROLLERS) and "<script" not in more
-        found = claims.beyond_claims(beyond)
-        assert {claim.part for claim in found} == {claims.GOALS, claims.RIVALS, claims.EXTENSIONS}
+        found = judge_beyond_claims(beyond)
+        assert {claim.question for claim in found} == {GOALS, RIVALS, EXTENSIONS}
         for claim in found:
-            assert claim.key in ids and claim.claim in said
+            assert claim.key in ids and claim.text in said
         goals = [claim for claim in found if claim.key.startswith("goal-") and claim.key != "goal-unseen"]
-        assert all(claims.goal_outcome(goal) in said for goal in goals)
-        assert claims.goal_counts(goals) in said
-        assert all(gains_text(name, grid) in said for name, grid in beyond.gains.items())
+        assert all(describe_goal(goal) in said for goal in goals)
+        assert summarize_goals(goals) in said
+        assert all(describe_tuning(name, grid) in said for name, grid in beyond.gains.items())
         assert "on 1 generated maps (seeds 101)" in said
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
-        said = plain(pages.beyond_page({}, quick))
+        said = plain(pages.build_beyond_page({}, quick))
         assert "default gains: those that the full study" in said and "120 s on 4 generated maps" in said
 
     def test_energy_has_its_unit(self, more, beyond):
-        for row in ranked_rows(beyond):
-            assert amount(row.medians["work"], "J") in plain(more)
+        for row in rank_contenders(beyond):
+            assert format_amount(row.medians["work"], "J") in plain(more)
         assert "in joules" in more and "before any limit" in more
 
     def test_every_controller_has_a_row_of_what_it_bears(self, more, beyond):
@@ -531,31 +547,31 @@ class TestPages:
             cells = [f"{known[name, *each].ratio.estimate:.2f}" for each in at]
             assert re.findall(r"<td.*?>(.*?)</td>", row) == [*cells, "1"]
         many = replace(TINY.beyond, conditions_maps=tuple("abcdefghijkl"))
-        told = pages.beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
+        told = pages.build_beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
         assert (
             "<small>"
             in told.partition('class="evidence heat"')[2].partition("<tbody>")[2].partition("</table>")[0]
         )
 
     def test_it_says_what_ours_reached_on_maps_of_other_families(self, more, beyond):
-        assert {scenario.map for scenario in beyond.unseen.scenarios} == {
+        assert {scenario.map for scenario in beyond.unseen.instances} == {
             f"{kind}-301" for kind in planned.UNSEEN
         }
-        assert np.isfinite(beyond.unseen.of("atlas", "gap")).all()
+        assert np.isfinite(beyond.unseen.get_values("atlas", "gap")).all()
         heading = "On maps of other families than those of the claims"
         assert (
             f"<caption>{heading}" in more
             and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in more
         )
         without = replace(beyond, unseen=None)
-        assert f"<caption>{heading}" not in pages.beyond_page({}, without)
-        assert "goal-unseen" not in text_of(claims.beyond_claims(without))
+        assert f"<caption>{heading}" not in pages.build_beyond_page({}, without)
+        assert "goal-unseen" not in text_of(judge_beyond_claims(without))
 
     def test_the_same_runs_give_the_same_pages(self, study, content, more):
         _, paper, beyond, images = study
-        found = claims.paper_claims(paper.convex, paper.claims, paper.gains)
-        assert pages.paper_page(TINY, images, paper.figures, FIRST, paper, found) == content
-        assert pages.beyond_page(DRAWN, beyond) == more
+        found = judge_paper_claims(paper.convex, paper.claims, paper.gains)
+        assert pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found) == content
+        assert pages.build_beyond_page(DRAWN, beyond) == more
 
     @pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("chromedriver")), reason="no browser")
     @pytest.mark.parametrize("width", [390, 1280])
@@ -621,16 +637,16 @@ class TestCommand:
     def test_beyond_only(self, study, tmp_path, monkeypatch, capsys):
         """With everything but the drawing of figures, which other tests do."""
         monkeypatch.setattr(planned, "QUICK", TINY)
-        images = {f"figure-{k}": Image(f"figure-{k}", 2148, 900, "words") for k in range(1, 9)}
-        monkeypatch.setattr(pages, "save_paper_figures", lambda *_, **__: images)
-        monkeypatch.setattr(pages, "save_beyond_figures", lambda *_, **__: DRAWN)
+        images = {f"figure-{k}": FigureFile(f"figure-{k}", 2148, 900, "words") for k in range(1, 9)}
+        monkeypatch.setattr(figure_files, "save_paper_figures", lambda *_, **__: images)
+        monkeypatch.setattr(figure_files, "save_beyond_figures", lambda *_, **__: DRAWN)
         out = tmp_path / "out"
         shutil.copytree(study[0], out)
         assert main(["paper", "--quick", "--beyond-only", "--out", str(out), "--json"]) == 0
         answer = json.loads(capsys.readouterr().out)
         found = json.loads((out / "claims.json").read_text())
         assert answer["claims"] == found and answer["runs"] == study[2].runs + 8
-        assert [claim["key"] for claim in found] == [claim.key for claim in claims.beyond_claims(study[2])]
+        assert [claim["key"] for claim in found] == [claim.key for claim in judge_beyond_claims(study[2])]
         page, front = ((out / name).read_text(encoding="utf-8") for name in ("beyond.html", "index.html"))
         assert 'href="index.html"' in page and 'href="beyond.html"' in front
         assert "without --beyond-only the claims are tested too" in front

@@ -224,10 +224,14 @@ def _list_tasks(options: Arguments) -> list[_MapTask]:
 def _list_study_tasks(*, is_quick: bool) -> list[_MapTask]:
     """List the random maps of a study of the paper."""
     from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
+    from robocov_app.replication.study_maps import (
+        build_claim_maps,
+        build_convex_maps,
+        build_generated_maps,
+    )
 
     plan = QUICK if is_quick else FULL
-    study_maps = [*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)]
+    study_maps = [*build_claim_maps(plan), *build_generated_maps(plan.tuning), *build_convex_maps(plan)]
     bundled_maps = list_bundled_maps()
     return [
         _MapTask(study_map.name, partial(_get_environment, study_map))

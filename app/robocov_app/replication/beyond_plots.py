@@ -1,0 +1,111 @@
+"""Plots of the results beyond the paper."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from robocov_app.figures.results import Sample
+from robocov_app.render.theme import Theme, theme_named
+from robocov_app.replication.comparison_plots import (
+    Draw,
+    PairsRow,
+    Plots,
+    draw_gaps,
+    get_style,
+    plan_pairs_plot,
+    select_plots,
+)
+from robocov_app.replication.contenders import OWN, TARGETS, TEAMS
+from robocov_app.replication.degradation_plot import draw_degradations
+from robocov_app.replication.evidence import rank_contenders
+from robocov_app.replication.height_plot import draw_heights
+from robocov_app.replication.paper_figures import PAGE_SCALE, WIDE_PX, draw_side_by_side
+from robocov_app.replication.results import IDEAL, BeyondResults
+from robocov_app.replication.studies import DISTURBED
+
+_HEIGHTS_ASPECT = 0.41
+_HEIGHTS_SCALE = 0.68 * PAGE_SCALE
+
+
+def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
+    """Return how the plots beyond the paper are drawn, by their names."""
+    theme = theme_named(theme)
+    samples = build_gap_samples(results)
+    heights_size = (WIDE_PX, round(_HEIGHTS_ASPECT * WIDE_PX))
+    return select_plots(
+        {
+            "beyond-gaps": partial(draw_gaps, samples, theme) if samples else None,
+            "beyond-pairs": plan_pairs_plot(
+                _list_duel_rows(results), "ours by the other's, pair by pair (1: equal)", theme
+            ),
+            "beyond-heights": partial(draw_heights, heights_size, theme, _HEIGHTS_SCALE),
+            "beyond-targets": plan_pairs_plot(
+                _list_target_rows(results), "by the centroid, pair by pair (1: equal)", theme
+            ),
+            "beyond-density": _plan_density_figure(results, theme),
+            "beyond-teams": plan_pairs_plot(
+                _list_team_rows(results), "mean time, by time to by distance (1: equal)", theme
+            ),
+            "beyond-conditions": _plan_degradations_plot(results, theme),
+        }
+    )
+
+
+def build_gap_samples(results: BeyondResults) -> list[Sample]:
+    """Return the gaps of all contenders, %, the lowest median first."""
+    samples = []
+    for summary in rank_contenders(results):
+        contender = summary.contender
+        known = results.outcomes.select_finite("gap", contender.key)
+        gaps = 100.0 * known.get_values(contender.key, "gap")
+        samples.append(Sample(contender.label, get_style(contender.controller), gaps))
+    return samples
+
+
+def _list_duel_rows(results: BeyondResults) -> list[PairsRow]:
+    own_key = OWN[0].key
+    rows = []
+    for summary in rank_contenders(results):
+        other = summary.contender
+        if other.key != own_key:
+            pairs = results.outcomes.compare(own_key, other.key)
+            rows.append(PairsRow(other.label, pairs, other.controller))
+    return rows
+
+
+def _list_target_rows(results: BeyondResults) -> list[PairsRow]:
+    centroid = TARGETS[0]
+    return [
+        PairsRow(target.label, results.targets.compare(target.key, centroid.key), "rapf")
+        for target in TARGETS[1:]
+    ]
+
+
+def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
+    rows = []
+    for by_distance, by_time in zip(TEAMS[::2], TEAMS[1::2], strict=True):
+        pairs = results.teams.compare(by_time.key, by_distance.key, "time")
+        rows.append(PairsRow(by_time.label, pairs, by_time.controller))
+    return rows
+
+
+def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
+    """Return how the runs with and without knowledge of the density are drawn, both over the density."""
+    known, ignored = results.density.figure_runs
+    weighted = known.record.environment
+    records = [replace(run.record, environment=weighted) for run in (known, ignored)]
+    costs = [f"mean distance by φ {cost:.3f} m" for cost in results.density.costs]
+    headings = list(zip(("knows φ", "ignores φ"), costs, strict=True))
+    return partial(draw_side_by_side, records, headings, theme)
+
+
+def _plan_degradations_plot(results: BeyondResults, theme: Theme) -> Draw | None:
+    degradations = [
+        degradation
+        for degradation in results.degradations
+        if degradation.controller in DISTURBED and degradation.axis != IDEAL
+    ]
+    if not any(np.isfinite(degradation.ratio.estimate) for degradation in degradations):
+        return None
+    return partial(draw_degradations, degradations, theme)

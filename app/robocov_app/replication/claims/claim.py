@@ -1,0 +1,247 @@
+"""Criteria and claims, and how a verdict follows from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+from robocov_app.figures.statistics import Interval
+from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS
+from robocov_app.replication.formatting import format_amount, format_interval
+from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
+
+Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
+
+VERDICTS: dict[Verdict, tuple[str, str]] = {
+    "holds": ("holds", "hold"),
+    "holds partly": ("holds partly", "hold partly"),
+    "does not hold": ("does not hold", "do not hold"),
+    "undecided": ("is undecided", "are undecided"),
+}
+"""Predicates of each verdict, for one claim and for several."""
+
+GOALS = 7
+RIVALS = 8
+EXTENSIONS = 9
+"""Questions beyond the paper. The paper's are 1 to 6."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A measure whose interval has to lie in a range for a claim to hold.
+
+    Parameters
+    ----------
+    measure : str
+        What is measured, in words.
+    interval : Interval
+        Its estimate and 95 % interval.
+    low, high : float
+        The range, ends included.
+    unit : str
+        "", "%", "m" or "s". For "%", a value of 0.5 is written as 50 %.
+    """
+
+    measure: str
+    interval: Interval
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+
+    @property
+    def is_met(self) -> bool | None:
+        """Whether the whole interval is in the range; None if it is partly inside, or unknown."""
+        if self.low <= self.interval.low and self.interval.high <= self.high:
+            return True
+        if self.interval.high < self.low or self.interval.low > self.high:
+            return False
+        return None
+
+    @property
+    def p_value(self) -> float:
+        """The p-value of the true value being outside the range."""
+        return self.interval.p_value(self.low, self.high)
+
+    @property
+    def range_text(self) -> str:
+        """The range as text, for example "at most 5 %"."""
+        low = format_amount(self.low, self.unit)
+        high = format_amount(self.high, self.unit)
+        if math.isinf(self.high):
+            return f"at least {low}"
+        if math.isinf(self.low):
+            return f"at most {high}"
+        return f"between {low} and {high}"
+
+    @property
+    def result_text(self) -> str:
+        """The estimate with its interval as text."""
+        return format_interval(self.interval, self.unit)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the criterion as it is written to ``claims.json``."""
+        return {
+            "measure": self.measure,
+            "unit": "1" if self.unit in ("", "%") else self.unit,
+            "estimate": self.interval.estimate,
+            "interval": [self.interval.low, self.interval.high],
+            "at_least": self.low,
+            "at_most": self.high,
+            "met": self.is_met,
+            "p": self.p_value,
+        }
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim with its criteria and verdict.
+
+    Parameters
+    ----------
+    key : str
+        Name that is the same in all versions, for example "nonconvex-final-shared".
+    question : int
+        Number of the question that the claim belongs to.
+    text : str
+        The claim in our words.
+    source : str
+        Where the paper makes the claim; empty if the question is ours.
+    criteria : tuple of Criterion
+        The first is the main one, whose estimate represents the claim.
+    runs, maps : int
+        Number of simulated runs that were used, and of different maps among them.
+    explanation : str
+    min_maps : int
+        Minimum number of maps for a decision.
+    adjusted_p_value : float or None
+        The p-value adjusted by Holm, if the claim is registered.
+    """
+
+    key: str
+    question: int
+    text: str
+    source: str = ""
+    criteria: tuple[Criterion, ...] = ()
+    runs: int = 0
+    maps: int = 0
+    explanation: str = "There is no run that could tell."
+    min_maps: int = MIN_MAPS
+    adjusted_p_value: float | None = None
+
+    def judge(
+        self,
+        criteria: Iterable[Criterion],
+        explanation: str,
+        outcomes: Outcomes | GainOutcomes,
+        runs_per_instance: int,
+    ) -> Claim:
+        """Return the claim with its criteria.
+
+        Parameters
+        ----------
+        criteria : iterable of Criterion
+        explanation : str
+        outcomes : Outcomes or GainOutcomes
+            Outcomes that the criteria are based on.
+        runs_per_instance : int
+            Number of runs on each of their problem instances.
+        """
+        return replace(
+            self,
+            criteria=tuple(criteria),
+            explanation=explanation,
+            runs=runs_per_instance * len(outcomes.instances),
+            maps=len(set(outcomes.maps)),
+        )
+
+    @property
+    def p_value(self) -> float:
+        """The highest p-value of the criteria."""
+        return max((criterion.p_value for criterion in self.criteria), default=1.0)
+
+    @property
+    def p_value_text(self) -> str:
+        """The p-values as text, for example "p = 0.001, by Holm 0.007"."""
+        text = f"p = {format_amount(self.p_value)}"
+        if self.adjusted_p_value is not None:
+            text += f", by Holm {format_amount(self.adjusted_p_value)}"
+        return text
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict. It is undecided on too few maps."""
+        if self.maps < self.min_maps or not self.criteria:
+            return "undecided"
+        met = [criterion.is_met for criterion in self.criteria]
+        if all(met):
+            is_significant = self.adjusted_p_value is None or self.adjusted_p_value <= ALPHA
+            return "holds" if is_significant else "undecided"
+        if any(met):
+            return "holds partly"
+        return "does not hold" if False in met else "undecided"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the claim as it is written to ``claims.json``."""
+        main = self.criteria[0].to_json() if self.criteria else {}
+        return {
+            "claim": self.text,
+            "verdict": self.verdict,
+            "estimate": main.get("estimate"),
+            "interval": main.get("interval"),
+            "p": self.p_value,
+            "p_adjusted": self.adjusted_p_value,
+            "runs": self.runs,
+            "key": self.key,
+            "question": self.question,
+            "measure": main.get("measure"),
+            "maps": self.maps,
+            "source": self.source,
+            "explanation": self.explanation,
+            "criteria": [criterion.to_json() for criterion in self.criteria],
+        }
+
+
+def summarize_verdicts(claims: Sequence[Claim]) -> str:
+    """Return the numbers of verdicts: "Of 3 claims 2 hold, 1 is undecided."."""
+    verdicts = [claim.verdict for claim in claims]
+    texts = []
+    for verdict, (singular, plural) in VERDICTS.items():
+        count = verdicts.count(verdict)
+        if count:
+            texts.append(f"{count} {plural if count > 1 else singular}")
+    return f"Of {len(claims)} claims {', '.join(texts)}."
+
+
+def judge_pairs(
+    claim: Claim,
+    pairs: PairedComparison | None,
+    *,
+    ratio_measure: str,
+    wins_measure: str,
+    explain: Callable[[PairedComparison], str],
+    max_ratio: float = 1.0,
+    min_wins: float = 0.5,
+) -> Claim:
+    """Judge whether the first of a pair has the lower values: in the median, and in most runs.
+
+    Parameters
+    ----------
+    claim : Claim
+    pairs : PairedComparison or None
+        Without any pairs, the claim is returned as it is.
+    ratio_measure, wins_measure : str
+        Names of the median ratio, and of the fraction of pairs in which the first value is lower.
+    explain : callable
+        Returns the explanation.
+    max_ratio, min_wins : float
+        Bounds of these measures.
+    """
+    if pairs is None:
+        return claim
+    criteria = (
+        Criterion(ratio_measure, pairs.ratio, high=max_ratio),
+        Criterion(wins_measure, pairs.wins, low=min_wins, unit="%"),
+    )
+    return claim.judge(criteria, explain(pairs), pairs.outcomes, runs_per_instance=2)

@@ -1,0 +1,79 @@
+"""Claims on RAPF and Lloyd's algorithm in convex regions."""
+
+import numpy as np
+
+from robocov_app.figures.statistics import share
+from robocov_app.replication.claims.claim import Claim, Criterion, judge_pairs
+from robocov_app.replication.claims.explanations import list_ratios_by_start
+from robocov_app.replication.claims.thresholds import CLUSTERED, NEARLY_ALWAYS, NEARLY_SAME, SAME_COST
+from robocov_app.replication.contenders import LABELS
+from robocov_app.replication.formatting import format_amount, format_interval
+from robocov_app.replication.outcome_tables import EARLY_S
+from robocov_app.replication.outcomes import Outcomes
+
+
+def judge_convex_final(outcomes: Outcomes) -> Claim:
+    """Judge whether RAPF ends at the same cost as Lloyd's algorithm."""
+    claim = Claim(
+        "convex-final",
+        1,
+        "In a convex region RAPF ends at the same cost as Lloyd's algorithm.",
+        "VI-A, figures 2 and 3",
+    )
+    pairs = outcomes.compare("rapf-shared", "lloyd")
+    if pairs is None:
+        return claim
+    nearly_same = share(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.outcomes.maps)
+    criteria = (
+        Criterion(
+            "median of J(RAPF) / J(LA) at the end",
+            pairs.ratio,
+            low=1.0 - SAME_COST,
+            high=1.0 + SAME_COST,
+        ),
+        Criterion(
+            f"runs that end within {format_amount(NEARLY_SAME, '%')} of LA",
+            nearly_same,
+            low=NEARLY_ALWAYS,
+            unit="%",
+        ),
+    )
+    lowest = format_amount(pairs.ratios.min())
+    highest = format_amount(pairs.ratios.max())
+    explanation = (
+        f"The ratio lies between {lowest} and {highest}; LA ends in "
+        f"a centroidal tessellation, of which a region has several. {describe_other_gains(outcomes)}"
+    )
+    return claim.judge(criteria, explanation, pairs.outcomes, runs_per_instance=2)
+
+
+def judge_convex_spreading(outcomes: Outcomes) -> Claim:
+    """Judge whether RAPF spreads faster than Lloyd's algorithm."""
+    measure = f"mean distance over the first {EARLY_S:g} s"
+    return judge_pairs(
+        Claim(
+            "convex-spreading",
+            1,
+            "From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm.",
+            "VI-A",
+        ),
+        outcomes.select_starts(*CLUSTERED).compare("rapf-shared", "lloyd", "early"),
+        ratio_measure=f"median ratio, RAPF to LA, of the {measure}",
+        wins_measure=f"runs in which RAPF's {measure} is the lower one",
+        explain=lambda pairs: (
+            f"Per start: {list_ratios_by_start(pairs)}. The paper itself concludes that “the improvement of "
+            f"RAPF is negligible” in convex regions, after having called it “quite better” from close starts."
+        ),
+    )
+
+
+def describe_other_gains(outcomes: Outcomes) -> str:
+    """Return in a sentence how RAPF at other gains compares with Lloyd's algorithm."""
+    texts = []
+    for key in ("rapf-best", "rapf-default"):
+        pairs = outcomes.compare(key, "lloyd")
+        if pairs is not None:
+            wins = format_amount(pairs.wins.estimate, "%")
+            ratio = format_interval(pairs.ratio)
+            texts.append(f"{LABELS[key]}: ratio {ratio}, lower in {wins} of the runs")
+    return f"{'; '.join(texts)}." if texts else ""

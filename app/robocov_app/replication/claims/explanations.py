@@ -1,0 +1,35 @@
+"""Sentences that several claims share."""
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.replication.formatting import format_amount, format_median
+from robocov_app.replication.outcomes import PairedComparison
+
+
+def describe_middle_half(gaps: Array) -> str:
+    """Return the quartiles of (m,) gaps in a sentence."""
+    low, high = np.quantile(gaps, [0.25, 0.75]).tolist()
+    return f"Half of the runs lie between {format_amount(low, '%')} and {format_amount(high, '%')}."
+
+
+def describe_losses(pairs: PairedComparison, name: str) -> str:
+    """Return in a sentence how often the first of a pair has the higher value."""
+    worst = int(np.argmax(pairs.ratios))
+    highest = format_amount(pairs.ratios[worst])
+    losses = (pairs.ratios >= 1.0).sum()
+    instance = pairs.outcomes.instances[worst]
+    return f"{name} loses {losses} of {len(pairs.ratios)}; the highest ratio is {highest} ({instance})."
+
+
+def list_ratios_by_start(pairs: PairedComparison) -> str:
+    """Return the median ratio for each kind of starts: "corner 0.6, centre 0.7"."""
+    starts = np.array(pairs.outcomes.starts)
+    kinds = dict.fromkeys(pairs.outcomes.starts)
+    return ", ".join(f"{kind} {format_median(pairs.ratios[starts == kind])}" for kind in kinds)
+
+
+def compute_positive_fraction(counts: Array) -> float:
+    """Return the fraction of positive values among the finite ones of (m,) counts; nan if there are none."""
+    finite = counts[np.isfinite(counts)]
+    return float((finite > 0).mean()) if len(finite) else float("nan")

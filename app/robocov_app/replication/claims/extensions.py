@@ -1,0 +1,126 @@
+"""Claims on extensions of the paper: targets, density, mixed teams, disturbances."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+from robocov_app.replication.claims.claim import EXTENSIONS, Claim, Criterion, judge_pairs
+from robocov_app.replication.claims.thresholds import CLEARLY_BELOW, NEARLY_SAME, SAME_COST, TOLERATED
+from robocov_app.replication.contenders import TARGETS, TEAMS
+from robocov_app.replication.formatting import capitalize, format_amount, format_median
+from robocov_app.replication.outcomes import Outcomes
+from robocov_app.replication.results import Degradation
+
+
+def judge_targets(outcomes: Outcomes) -> Claim:
+    """Judge whether the kind of target in its cell makes a difference to the cost of RAPF."""
+    claim = Claim(
+        "targets",
+        EXTENSIONS,
+        "Whether RAPF heads for the centroid of its cell, its geometric median or the best place of a "
+        "sensor makes no difference to the coverage cost.",
+    )
+    centroid = TARGETS[0]
+    pairs = []
+    for target in TARGETS[1:]:
+        comparison = outcomes.compare(target.key, centroid.key)
+        if comparison is not None:
+            pairs.append(comparison)
+    if not pairs:
+        return claim
+    criteria = []
+    wins = []
+    for comparison in pairs:
+        measure = f"median of J({comparison.first}) / J(centroid) at the end"
+        criteria.append(Criterion(measure, comparison.ratio, low=1.0 - SAME_COST, high=1.0 + SAME_COST))
+        fraction = format_amount(comparison.wins.estimate, "%")
+        wins.append(f"{comparison.first} lower in {fraction} of the runs")
+    explanation = f"{capitalize('; '.join(wins))}."
+    runs = sum(2 * len(comparison.outcomes.instances) for comparison in pairs)
+    judged = claim.judge(criteria, explanation, pairs[-1].outcomes, runs_per_instance=1)
+    return replace(judged, runs=runs)
+
+
+def judge_density(outcomes: Outcomes) -> Claim:
+    """Judge whether RAPF that knows the density ends at a lower weighted cost."""
+    return judge_pairs(
+        Claim(
+            "density",
+            EXTENSIONS,
+            "Where some places count more, RAPF that knows which ends at a clearly lower weighed cost.",
+        ),
+        outcomes.compare("known", "ignored"),
+        ratio_measure="median ratio of the mean distance by φ",
+        wins_measure="runs in which it is the lower one",
+        explain=lambda _: (
+            "Both are judged by the same φ: two Gaussians of 1 m on every map, 20 high over a floor of 1, "
+            "drawn by chance in the free space."
+        ),
+        max_ratio=CLEARLY_BELOW,
+    )
+
+
+def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
+    """Judge whether a mixed team arrives earlier with cells by time than with cells by distance."""
+    by_distance, by_time = (contender for contender in TEAMS if contender.controller == controller)
+    label = by_time.label.partition(",")[0]
+    return judge_pairs(
+        Claim(
+            f"teams-{controller}",
+            EXTENSIONS,
+            f"In a mixed team {label} is at places sooner, in the mean, with cells by time than by distance.",
+        ),
+        outcomes.compare(by_time.key, by_distance.key, "time"),
+        ratio_measure="median ratio of the mean time, by time to by distance",
+        wins_measure="runs in which it is the lower one",
+        explain=lambda pairs: (
+            f"Median of the mean time until the first robot is there: "
+            f"{format_median(pairs.second_values, 's')} "
+            f"with cells by distance, {format_median(pairs.first_values, 's')} by time. "
+            f"Two robots each of at most 1, 0.5 and 0.25 m/s."
+        ),
+    )
+
+
+def judge_conditions(degradations: Iterable[Degradation], maps: int) -> Claim:
+    """Judge whether RAPF tolerates lost and late messages.
+
+    Parameters
+    ----------
+    degradations : iterable of Degradation
+    maps : int
+        Number of maps they are from.
+    """
+    claim = Claim(
+        "conditions",
+        EXTENSIONS,
+        f"RAPF ends within {format_amount(NEARLY_SAME, '%')} of its cost where messages get lost or are "
+        "late.",
+    )
+    rapf = [
+        degradation
+        for degradation in degradations
+        if degradation.controller == "rapf" and math.isfinite(degradation.ratio.estimate)
+    ]
+    by_value = {(degradation.axis, degradation.value): degradation for degradation in rapf}
+    criteria = []
+    runs = 0
+    for disturbance, description in TOLERATED:
+        known = by_value.get(disturbance)
+        if known is not None:
+            measure = f"final cost where {description}, by that under ideal conditions"
+            criteria.append(Criterion(measure, known.ratio, high=1.0 + NEARLY_SAME))
+            runs += 2 * known.runs
+    if not criteria:
+        return claim
+    worst = max(rapf, key=lambda degradation: degradation.ratio.estimate)
+    highest = format_amount(worst.ratio.estimate)
+    axis = worst.axis.replace("_", " ")
+    value = "none" if worst.value is None else f"{worst.value:g}"
+    return replace(
+        claim,
+        criteria=tuple(criteria),
+        runs=runs,
+        maps=maps,
+        explanation=f"The highest of all medians is {highest}, with {axis} {value}.",
+    )

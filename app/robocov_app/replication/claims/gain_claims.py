@@ -1,0 +1,167 @@
+"""Claims on the gains of RAPF and RPF: how much the result depends on them, and the best ones on the map."""
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.figures.statistics import bootstrap, spread
+from robocov_app.replication.claims.claim import Claim, Criterion
+from robocov_app.replication.claims.thresholds import BARELY, REGRET
+from robocov_app.replication.contenders import format_potential
+from robocov_app.replication.formatting import format_amount, format_median
+from robocov_app.replication.outcomes import GainOutcomes
+
+_MIN_VARIATION = 1e-12
+"""Lower bound of a denominator."""
+
+
+def judge_gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
+    """Judge whether RAPF's final cost depends less on the gains than RPF's.
+
+    Parameters
+    ----------
+    rapf, rpf : GainOutcomes
+        Outcomes on the same problem instances, without failed runs.
+    """
+    claim = Claim(
+        "gains-result",
+        3,
+        "RAPF's final cost barely depends on the gains, RPF's does.",
+        "VI-B: “by using the RAPF, it is almost independent”",
+    )
+    if not rapf.instances:
+        return claim
+    rapf_variation = compute_variation(rapf)
+    rpf_variation = compute_variation(rpf)
+    ratios = rapf_variation / np.maximum(rpf_variation, _MIN_VARIATION)
+    measure = "median standard deviation of the final cost over the gains, by its mean"
+    criteria = (
+        *build_variation_criteria(measure, rapf_variation, rpf_variation, rapf.maps, BARELY),
+        Criterion(
+            "median ratio of that deviation, RAPF to RPF", bootstrap(ratios, clusters=rapf.maps), high=1.0
+        ),
+    )
+    rapf_worst = format_median(compute_worst_by_best(rapf))
+    rpf_worst = format_median(compute_worst_by_best(rpf))
+    explanation = (
+        f"{len(rapf.gains)} sets of gains for RAPF and {len(rpf.gains)} for RPF. Worst by best set, median: "
+        f"RAPF {rapf_worst}, RPF {rpf_worst}. "
+        f"RAPF at one attraction: {_describe_attractions(rapf)}."
+    )
+    return claim.judge(criteria, explanation, rapf, runs_per_instance=len(rapf.gains) + len(rpf.gains))
+
+
+def _describe_attractions(rapf: GainOutcomes) -> str:
+    texts = []
+    for level in rapf.list_levels("k_att"):
+        part = rapf.select_gain("k_att", level)
+        if len(part.gains) > 1:
+            variation = format_median(compute_variation(part), "%")
+            worst = format_median(compute_worst_by_best(part))
+            texts.append(f"k_att = {level:g}: {variation}, worst by best {worst}")
+    return "; ".join(texts)
+
+
+def build_variation_criteria(
+    measure: str, rapf: Array, rpf: Array, maps: tuple[str, ...] | list[str], bound: float
+) -> tuple[Criterion, Criterion]:
+    """Build the criteria that a variation is below a bound for RAPF and above it for RPF.
+
+    Parameters
+    ----------
+    measure : str
+    rapf, rpf : (m,) arrays
+        Variations of both.
+    maps : sequence of str
+        Map of each value.
+    bound : float
+    """
+    return (
+        Criterion(f"RAPF: {measure}", bootstrap(rapf, clusters=maps), high=bound, unit="%"),
+        Criterion("RPF: the same", bootstrap(rpf, clusters=maps), low=bound, unit="%"),
+    )
+
+
+def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
+    """Judge whether the best gains depend on the map for RPF, and hardly do for RAPF.
+
+    Parameters
+    ----------
+    rapf, rpf : GainOutcomes
+        Outcomes on the same problem instances, without failed runs.
+    """
+    claim = Claim(
+        "gains-choice",
+        3,
+        "Which gains are best depends on the environment for RPF, and hardly does for RAPF.",
+        "VI-B: “the best choice of the potential parameters is environment dependent”",
+    )
+    rapf_regrets, maps = compute_regrets(rapf)
+    rpf_regrets, _ = compute_regrets(rpf)
+    if not len(rapf_regrets):
+        return claim
+    measure = "mean cost, in excess, of the gains that are best on other maps instead of on the same one"
+    criteria = (
+        Criterion(f"RPF: {measure}", bootstrap(rpf_regrets, "mean", maps), low=REGRET, unit="%"),
+        Criterion("RAPF: the same", bootstrap(rapf_regrets, "mean", maps), high=REGRET, unit="%"),
+    )
+    rapf_best = format_potential(rapf.gains[rapf.find_best()])
+    rpf_best = format_potential(rpf.gains[rpf.find_best()])
+    explanation = (
+        f"Both sets are judged from a start that neither was chosen on. Highest excess: RPF "
+        f"{format_amount(rpf_regrets.max(), '%')}, RAPF {format_amount(rapf_regrets.max(), '%')}. "
+        f"Best over all maps: RAPF {rapf_best}, RPF {rpf_best}."
+    )
+    return claim.judge(criteria, explanation, rapf, runs_per_instance=len(rapf.gains) + len(rpf.gains))
+
+
+def compute_variation(grid: GainOutcomes) -> Array:
+    """Return the standard deviation of the cost over the gains relative to its mean, by instance, (m,)."""
+    return np.array([spread(column) for column in grid.excess.T])
+
+
+def compute_worst_by_best(grid: GainOutcomes) -> Array:
+    """Return the ratio of the cost with the worst gains to that with the best, for each instance, (m,)."""
+    return np.asarray(grid.excess.max(axis=0) / grid.excess.min(axis=0))
+
+
+def compute_regrets(grid: GainOutcomes) -> tuple[Array, list[str]]:
+    """Compute the cost of choosing gains without knowing the map.
+
+    For every problem instance two sets of gains are compared: the best one on the *other starts of the same
+    map*, and the best one on the other maps. Neither was chosen on the instance itself, so chance favors
+    none.
+
+    Parameters
+    ----------
+    grid : GainOutcomes
+
+    Returns
+    -------
+    regrets : (k,) array
+        J with the gains of other maps divided by J with those of the same map, minus 1.
+    maps : list of str
+        Map of each value.
+    """
+    regrets = []
+    maps = []
+    for k, instance in enumerate(grid.instances):
+        same_map = []
+        other_maps = []
+        for j, other in enumerate(grid.instances):
+            if other.map != instance.map:
+                other_maps.append(j)
+            elif other.start != instance.start:
+                same_map.append(j)
+        if same_map and other_maps:
+            informed = grid.excess[grid.find_best(same_map), k]
+            uninformed = grid.excess[grid.find_best(other_maps), k]
+            regrets.append(float(uninformed / informed) - 1.0)
+            maps.append(instance.map)
+    return np.array(regrets), maps
+
+
+def select_common_instances(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:
+    """Return the outcomes on the instances, the same of both, where no run of either failed."""
+    is_finite = np.isfinite(np.vstack([rapf.excess, rpf.excess]))
+    is_complete = np.asarray(is_finite.all(axis=0))
+    return rapf.select(is_complete), rpf.select(is_complete)

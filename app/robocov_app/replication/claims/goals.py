@@ -1,0 +1,318 @@
+"""Goals of our own controller, each a claim with one criterion.
+
+A goal is about the runs of the study: it is met or missed by the measured value. Its verdict as a claim tells
+whether other maps could have given another result.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import IntArray
+from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by, median_time, share
+from robocov_app.replication.claims.claim import GOALS, Claim, Criterion
+from robocov_app.replication.claims.explanations import describe_middle_half
+from robocov_app.replication.claims.thresholds import (
+    MAX_GAP,
+    MAX_MAP_GAP,
+    MAX_REST_TIME_S,
+    MAX_STEP_RATIO,
+    MIN_AT_REST,
+    NEVER_WORSE,
+    RARELY,
+)
+from robocov_app.replication.contenders import Contender, select_strongest
+from robocov_app.replication.formatting import format_amount
+from robocov_app.replication.outcomes import Outcomes, PairedComparison
+from robocov_app.replication.plan import Plan
+from robocov_app.replication.step_times import StepTimes
+
+_RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class _MainCriteria:
+    """Criteria on the gap, on contacts and on rest."""
+
+    gap: Criterion
+    contacts: Criterion
+    rest: Criterion
+
+
+def _build_main_criteria(outcomes: Outcomes, key: str) -> _MainCriteria:
+    gap = bootstrap(outcomes.get_values(key, "gap"), clusters=outcomes.maps)
+    contacts = share(outcomes.get_values(key, "contacts") > 0, outcomes.maps)
+    rest = share(np.isfinite(outcomes.get_values(key, "settled")), outcomes.maps)
+    return _MainCriteria(
+        gap=Criterion("median of J/J_ref - 1", gap, high=MAX_GAP, unit="%"),
+        contacts=Criterion("runs with a contact", contacts, high=RARELY, unit="%"),
+        rest=Criterion("runs that come to rest", rest, low=MIN_AT_REST, unit="%"),
+    )
+
+
+def judge_goals(
+    outcomes: Outcomes,
+    own: Contender,
+    contenders: Sequence[Contender],
+    steps: Mapping[int, StepTimes],
+    plan: Plan,
+) -> list[Claim]:
+    """Judge the goals of a controller of our own.
+
+    Parameters
+    ----------
+    outcomes : Outcomes
+        Outcomes of all contenders.
+    own : Contender
+    contenders : sequence of Contender
+        All contenders, among which are the paper's strongest.
+    steps : Mapping
+        Step times by the size of the team.
+    plan : Plan
+
+    Returns
+    -------
+    list of Claim
+        Goals without any data are left out.
+    """
+    goals: list[Claim] = []
+    known = outcomes.select_finite("gap", own.key)
+    if known.instances:
+        goals += _judge_gap_goals(outcomes, own, contenders)
+        goals += _judge_rest_goals(known, own, plan)
+    return goals + _judge_step_goals(own, steps, plan)
+
+
+def _build_goal(name: str, text: str, criterion: Criterion, explanation: str, outcomes: Outcomes) -> Claim:
+    goal = Claim(f"goal-{name}", GOALS, text)
+    return goal.judge((criterion,), explanation, outcomes, runs_per_instance=1)
+
+
+def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> list[Claim]:
+    """Judge the gap in the median, on every map, and in comparison with the paper's strongest."""
+    key = own.key
+    label = own.label
+    known = outcomes.select_finite("gap", key)
+    gaps = known.get_values(key, "gap")
+    highest = estimate_highest_of_maps(lambda rows: np.median(gaps[rows], axis=-1), known.maps)
+    goals = [
+        _build_goal(
+            "gap",
+            f"{label}'s cost is within {format_amount(MAX_GAP, '%')} of the centralised reference in the "
+            "median.",
+            _build_main_criteria(known, key).gap,
+            describe_middle_half(gaps),
+            known,
+        ),
+        _build_goal(
+            "every-map",
+            f"On every map {label}'s median is within {format_amount(MAX_MAP_GAP, '%')} of the reference.",
+            Criterion("highest median of a map", highest, high=MAX_MAP_GAP, unit="%"),
+            _describe_highest(known.compute_medians_by_map(key), MAX_MAP_GAP),
+            known,
+        ),
+    ]
+    for other in select_strongest(contenders):
+        pairs = outcomes.compare(key, other.key)
+        if pairs is None:
+            continue
+        own_medians = pairs.outcomes.compute_medians_by_map(key, "final")
+        other_medians = pairs.outcomes.compute_medians_by_map(other.key, "final")
+        ratios = {name: own_medians[name] / other_medians[name] for name in own_medians}
+        margin = format_amount(NEVER_WORSE - 1.0, "%")
+        goals.append(
+            _build_goal(
+                f"not-worse-{other.key}",
+                f"On no map {label}'s median is more than {margin} above that of {other.label}.",
+                Criterion(
+                    f"highest ratio of a map's medians to {other.label}",
+                    estimate_worst_ratio(pairs),
+                    high=NEVER_WORSE,
+                ),
+                _describe_highest(ratios, NEVER_WORSE),
+                known,
+            )
+        )
+    return goals
+
+
+def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim]:
+    """Judge contacts, the fraction of runs that come to rest, and the time until rest."""
+    label = own.label
+    criteria = _build_main_criteria(known, own.key)
+    has_contact = known.get_values(own.key, "contacts") > 0
+    settled = known.get_values(own.key, "settled")
+    is_at_rest = np.isfinite(settled)
+    censored = np.full(len(is_at_rest), plan.duration)
+
+    def compute_median_time(rows: IntArray) -> float:
+        at_rest = is_at_rest[rows]
+        return median_time(settled[rows][at_rest], censored[rows][~at_rest])
+
+    rest_time = bootstrap_by(compute_median_time, known.maps)
+    return [
+        _build_goal(
+            "contacts",
+            f"{label} touches nothing.",
+            replace(criteria.contacts, high=0.0),
+            f"{has_contact.sum()} of {len(has_contact)} runs.",
+            known,
+        ),
+        _build_goal(
+            "rest",
+            f"{label} comes to rest in at least {format_amount(MIN_AT_REST, '%')} of the runs.",
+            criteria.rest,
+            f"{(~is_at_rest).sum()} of {len(is_at_rest)} runs do not.",
+            known,
+        ),
+        _build_goal(
+            "time",
+            f"{label} is at rest within {format_amount(MAX_REST_TIME_S, 's')} in the median.",
+            Criterion("median time until rest", rest_time, high=MAX_REST_TIME_S, unit="s"),
+            "By Kaplan and Meier: runs that do not come to rest are censored.",
+            known,
+        ),
+    ]
+
+
+def _judge_step_goals(own: Contender, steps: Mapping[int, StepTimes], plan: Plan) -> list[Claim]:
+    """Judge the computing time of steps, which is measured on one map and without any run of the study."""
+    goals = []
+    large = steps.get(plan.beyond.large)
+    if large is not None:
+        ratio = large.compute_ratio(own.controller)
+        if math.isfinite(ratio.estimate):
+            goals.append(
+                Claim(
+                    "goal-step",
+                    GOALS,
+                    f"A step of {own.label} takes at most {MAX_STEP_RATIO:g} times as long as RAPF's with "
+                    f"{large.robots} robots.",
+                    criteria=(Criterion("time of a step by RAPF's", ratio, high=MAX_STEP_RATIO),),
+                    explanation="Timed in turn, over whole seconds of simulated time: plans and scans count "
+                    "by their share.",
+                )
+            )
+    huge = steps.get(plan.beyond.huge)
+    if huge is not None:
+        factor = huge.compute_real_time_factor(own.controller)
+        if math.isfinite(factor.estimate):
+            goals.append(
+                Claim(
+                    "goal-real-time",
+                    GOALS,
+                    f"{own.label} runs in real time with {huge.robots} robots.",
+                    criteria=(Criterion("computing time by simulated time", factor, high=1.0),),
+                    explanation="One process; the physics of the world included.",
+                )
+            )
+    return [replace(goal, maps=1, min_maps=1) for goal in goals]
+
+
+def estimate_highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Interval:
+    """Estimate the highest value of all maps, with an interval for these maps: runs are drawn within each.
+
+    Parameters
+    ----------
+    statistic : callable
+        Takes row numbers, (m,) or (k, m), and returns a value over the last axis.
+    maps : sequence of str
+        Map of each row.
+
+    Returns
+    -------
+    Interval
+    """
+    rng = np.random.default_rng(0)
+    names = np.array(maps)
+    estimates = []
+    resampled = []
+    for name in dict.fromkeys(maps):
+        rows = np.flatnonzero(names == name)
+        estimates.append(float(statistic(rows)))
+        resampled.append(statistic(rng.choice(rows, size=(_RESAMPLES, len(rows)))))
+    highest = np.max(resampled, axis=0)
+    low, high = np.quantile(highest, [0.025, 0.975]).tolist()
+    return Interval(max(estimates), low, high, highest)
+
+
+def estimate_worst_ratio(pairs: PairedComparison) -> Interval:
+    """Estimate the highest ratio of a map's medians."""
+
+    def compute_ratio(rows: IntArray) -> Any:
+        first = np.median(pairs.first_values[rows], axis=-1)
+        return first / np.median(pairs.second_values[rows], axis=-1)
+
+    return estimate_highest_of_maps(compute_ratio, pairs.outcomes.maps)
+
+
+def _describe_highest(values: Mapping[str, float], bound: float) -> str:
+    above = sum(value > bound for value in values.values())
+    highest = max(values, key=values.__getitem__)
+    return f"Highest on {highest}; above it on {above} of {len(values)} maps."
+
+
+def is_goal_met(goal: Claim) -> bool:
+    """Return whether the measured value of a goal is in the range of its criterion."""
+    (criterion,) = goal.criteria
+    return criterion.low <= criterion.interval.estimate <= criterion.high
+
+
+def _describe_miss(goal: Claim) -> str:
+    (criterion,) = goal.criteria
+    estimate = format_amount(criterion.interval.estimate, criterion.unit)
+    return f"{estimate} instead of {criterion.range_text}"
+
+
+def describe_goal(goal: Claim) -> str:
+    """Return the outcome of a goal: "met", "missed: 1.8 % instead of at most 1.4 %"."""
+    (criterion,) = goal.criteria
+    text = "met" if is_goal_met(goal) else f"missed: {_describe_miss(goal)}"
+    if criterion.is_met is None and math.isfinite(criterion.interval.low):
+        text += "; the interval reaches over the bound"
+    return text
+
+
+def summarize_goals(goals: Sequence[Claim]) -> str:
+    """Return in a sentence how many goals are met, and what was missed."""
+    if not goals:
+        return "Nothing was measured."
+    missed = [f"{goal.criteria[0].measure} {_describe_miss(goal)}" for goal in goals if not is_goal_met(goal)]
+    summary = f"{len(goals) - len(missed)} of {len(goals)} goals are met."
+    if missed:
+        summary += f" Missed: {'; '.join(missed)}."
+    return summary
+
+
+def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> Claim | None:
+    """Judge our own controller on maps of other kinds than those of the claims; None without any run.
+
+    Parameters
+    ----------
+    outcomes : Outcomes
+        Outcomes on these maps.
+    own : Contender
+    contenders : sequence of Contender
+        All contenders, among which are the paper's strongest.
+    """
+    known = outcomes.select_finite("gap", own.key)
+    if not known.instances:
+        return None
+    main = _build_main_criteria(known, own.key)
+    criteria = [main.gap, main.contacts, main.rest]
+    for other in select_strongest(contenders):
+        pairs = outcomes.compare(own.key, other.key)
+        if pairs is not None:
+            measure = f"median of J({own.label}) / J({other.label}) at the end"
+            criteria.append(Criterion(measure, pairs.ratio, high=1.0))
+    medians = known.compute_medians_by_map(own.key)
+    worst = max(medians, key=medians.__getitem__)
+    explanation = (
+        f"{len(medians)} generated maps, {len(known.instances)} runs of {own.label}. "
+        f"Highest median of a map: {format_amount(medians[worst], '%')}, on {worst}."
+    )
+    claim = Claim("goal-unseen", GOALS, "The same holds on maps of other families than those of the claims.")
+    return claim.judge(criteria, explanation, known, runs_per_instance=1)

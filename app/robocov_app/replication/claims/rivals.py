@@ -1,0 +1,82 @@
+"""Claims on our own controller in comparison with all others."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from robocov.arrays import IntArray
+from robocov.controllers import get_information, load_controller_class
+from robocov_app.figures.statistics import bootstrap_by
+from robocov_app.replication.claims.claim import RIVALS, Claim, Criterion, judge_pairs
+from robocov_app.replication.claims.explanations import describe_losses
+from robocov_app.replication.claims.thresholds import MOST_OF_GAP
+from robocov_app.replication.contenders import OURS, PAPER, Contender, select_strongest
+from robocov_app.replication.formatting import format_median
+from robocov_app.replication.outcomes import Outcomes
+
+
+def judge_rivals(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> list[Claim]:
+    """Judge whether our own controller ends at a lower cost than each other one.
+
+    Parameters
+    ----------
+    outcomes : Outcomes
+        Outcomes of all contenders.
+    own : Contender
+    contenders : sequence of Contender
+
+    Returns
+    -------
+    list of Claim
+    """
+    strongest = select_strongest(contenders)
+    claims = []
+    if strongest:
+        claims.append(judge_closed_gap(outcomes, own, strongest[0]))
+    others = [contender for contender in contenders if contender.controller not in (*PAPER, *OURS)]
+    for other in (*strongest, *others):
+        information = get_information(load_controller_class(other.controller))
+        text = f"{own.label} ends at a lower cost than {other.label}"
+        text += "." if information == "own" else f", which goes by the {information}."
+        claims.append(
+            judge_pairs(
+                Claim(f"beyond-{own.key}-{other.key}", RIVALS, text),
+                outcomes.compare(own.key, other.key),
+                ratio_measure=f"median of J({own.label}) / J({other.label}) at the end",
+                wins_measure=f"runs in which {own.label}'s is the lower one",
+                explain=lambda pairs: describe_losses(pairs, "It"),
+            )
+        )
+    return claims
+
+
+def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Claim:
+    """Judge whether our own controller closes most of the gap that another one leaves to the reference."""
+    claim = Claim(
+        f"beyond-{own.key}-closes",
+        RIVALS,
+        f"{own.label} closes most of the gap that {other.label} leaves to the centralised reference.",
+    )
+    known = outcomes.select_finite("gap", own.key, other.key)
+    if not known.instances:
+        return claim
+    own_gaps = known.get_values(own.key, "gap")
+    other_gaps = known.get_values(other.key, "gap")
+
+    def compute_closed_fraction(rows: IntArray) -> float:
+        other_gap = float(np.median(other_gaps[rows]))
+        if other_gap <= 0.0:
+            return float("nan")
+        return 1.0 - float(np.median(own_gaps[rows])) / other_gap
+
+    if math.isnan(compute_closed_fraction(np.arange(len(own_gaps)))):
+        return replace(claim, explanation=f"{other.label} leaves no gap that could be closed.")
+    closed = bootstrap_by(compute_closed_fraction, known.maps)
+    explanation = (
+        f"Medians of J/J_ref - 1 in the same runs: {format_median(own_gaps, '%')} and "
+        f"{format_median(other_gaps, '%')}."
+    )
+    criterion = Criterion("part of the median gap that is closed", closed, low=MOST_OF_GAP, unit="%")
+    return claim.judge((criterion,), explanation, known, runs_per_instance=2)

@@ -1,0 +1,88 @@
+"""Claims on the starts: how much the final cost and placement of RAPF and RPF depend on them."""
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.figures.statistics import bootstrap, group_by, spread
+from robocov_app.replication.claims.claim import Claim, Criterion
+from robocov_app.replication.claims.gain_claims import build_variation_criteria
+from robocov_app.replication.claims.thresholds import BARELY_BY_START, SAME_PLACEMENT
+from robocov_app.replication.formatting import format_amount, format_median
+from robocov_app.replication.outcomes import Outcomes
+
+_MIN_VARIATION = 1e-12
+"""Lower bound of a denominator."""
+
+
+def judge_starts_cost(outcomes: Outcomes) -> Claim:
+    """Judge whether RAPF's final cost depends less on the starts than RPF's."""
+    claim = Claim(
+        "starts-cost",
+        4,
+        "RAPF's final cost barely depends on where the robots start, RPF's does.",
+        "VI-B, figures 6 and 8",
+    )
+    known = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
+    rapf, maps = _compute_start_variation(known, "rapf-shared")
+    rpf, _ = _compute_start_variation(known, "rpf-shared")
+    if not maps:
+        return claim
+    measure = "median standard deviation of the final cost over the starts, by its mean"
+    criteria = build_variation_criteria(measure, rapf, rpf, maps, BARELY_BY_START)
+    ratio = np.median(rpf) / max(np.median(rapf), _MIN_VARIATION)
+    others = {}
+    for key in ("rapf-best", "rpf-best", "lloyd"):
+        variation, _ = _compute_start_variation(outcomes.select_finite("final", key), key)
+        others[key] = format_median(variation, "%")
+    explanation = (
+        f"Over the same map and seed, from {len(set(known.starts))} kinds of starts. RPF's varies "
+        f"{format_amount(ratio)} times as much as RAPF's. At their "
+        f"best gains: RAPF {others['rapf-best']}, RPF {others['rpf-best']}; LA {others['lloyd']}."
+    )
+    return claim.judge(criteria, explanation, known, runs_per_instance=2)
+
+
+def judge_starts_placement(outcomes: Outcomes) -> Claim:
+    """Judge whether RAPF's final placement depends less on the starts than RPF's."""
+    claim = Claim(
+        "starts-placement",
+        4,
+        "RAPF's final placement varies little with where the robots start, RPF's strongly.",
+        "VI-B, figures 6 and 8",
+    )
+    known = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
+    rapf_spreads = known.compute_placement_spreads("rapf-shared")
+    rpf_spreads = known.compute_placement_spreads("rpf-shared")
+    maps = [name for name in rapf_spreads if name in rpf_spreads]
+    if not maps:
+        return claim
+    rapf = np.array([rapf_spreads[name] for name in maps])
+    rpf = np.array([rpf_spreads[name] for name in maps])
+    sides = [known.share_sides[name] for name in maps]
+    measure = "matched distance between the ends from different starts, by the side of a robot's share"
+    criteria = (
+        Criterion(f"RAPF: {measure}", bootstrap(rapf, clusters=maps), high=SAME_PLACEMENT, unit="%"),
+        Criterion(
+            "median ratio of that distance, RAPF to RPF", bootstrap(rapf / rpf, clusters=maps), high=1.0
+        ),
+    )
+    explanation = (
+        f"In metres: RAPF {format_median(rapf * sides, 'm')}, RPF {format_median(rpf * sides, 'm')} "
+        f"(medians over maps). "
+        f"Robots are matched so that the sum of straight distances is least. "
+        f"A placement can differ while its cost does not: many are equally good."
+    )
+    return claim.judge(criteria, explanation, known, runs_per_instance=2)
+
+
+def _compute_start_variation(outcomes: Outcomes, key: str) -> tuple[Array, list[str]]:
+    """Return the variations of a contender's final cost over several starts, (k,), and their maps."""
+    finals = zip(outcomes.instances, outcomes.get_values(key, "final"), strict=True)
+    groups = group_by(finals, lambda pair: (pair[0].map, pair[0].seed))
+    variations = []
+    maps = []
+    for (name, _), pairs in groups.items():
+        if len(pairs) > 1:
+            variations.append(spread([final for _, final in pairs]))
+            maps.append(name)
+    return np.array(variations), maps

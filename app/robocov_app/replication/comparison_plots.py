@@ -1,0 +1,176 @@
+"""Plots that compare contenders: pairs of runs, final costs, gaps and gain grids."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
+
+from robocov.arrays import Array
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import TITLE, Page
+from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_paired
+from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
+from robocov_app.render.theme import Theme
+from robocov_app.replication.contenders import OURS
+from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
+from robocov_app.replication.paper_figures import PAGE_SCALE, WIDE_PX
+
+Draw: TypeAlias = Callable[[], Figure]
+"""Draws a figure."""
+Plots: TypeAlias = Mapping[str, Draw]
+"""How each plot is drawn, by its name. Those without any run are left out."""
+
+_GAP_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)
+"""Ticks of an axis of gaps, %."""
+_MIN_TICKS = 3
+_TICK_STEPS = (0.01, 0.02, 0.05, 0.1)
+_MAX_TICK_INTERVALS = 8
+
+
+class PairsRow(NamedTuple):
+    """A row of a plot of pairs."""
+
+    text: str
+    pairs: PairedComparison | None
+    controller: str
+    """Controller whose style the row has."""
+
+
+class CostRow(NamedTuple):
+    """A row of a plot of final costs."""
+
+    text: str
+    outcomes: Outcomes
+    contender: str
+
+
+def select_plots(plots: Mapping[str, Draw | None]) -> Plots:
+    """Return the plots that have any run."""
+    return {name: draw for name, draw in plots.items() if draw is not None}
+
+
+def get_style(controller: str) -> CurveStyle:
+    """Return the style of a controller among many: ours stands out, baselines look the same."""
+    style = curve_styles([controller])[controller]
+    if not style.name.startswith("other"):
+        return style
+    return style._replace(name="other-0" if controller in OURS else "other-2")
+
+
+def plan_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Draw | None:
+    """Return a function that draws the ratios of pairs of runs; None if there are no pairs.
+
+    Parameters
+    ----------
+    rows : iterable of PairsRow
+    label : str
+        Label of the axis of ratios.
+    theme : Theme
+    """
+    pairs = [
+        Pairs(row.text, get_style(row.controller), row.pairs.ratios, row.pairs.ratio)
+        for row in rows
+        if row.pairs is not None
+    ]
+    return partial(_draw_pairs, pairs, label, theme) if pairs else None
+
+
+def _draw_pairs(pairs: Sequence[Pairs], label: str, theme: Theme) -> Figure:
+    figure = plot_paired(pairs, label, WIDE_PX, PAGE_SCALE, theme)
+    (axes,) = figure.axes
+    low, high = axes.get_xlim()
+    if sum(low <= tick <= high for tick in axes.get_xticks()) < _MIN_TICKS:
+        # If all ratios are near 1, the ticks of a logarithmic axis are too far apart.
+        step = next(step for step in _TICK_STEPS if (high - low) / step <= _MAX_TICK_INTERVALS)
+        axes.set_xticks(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step)
+    return figure
+
+
+def build_cost_samples(rows: Iterable[CostRow]) -> list[Sample]:
+    """Return the values of J / J_ref in each row. Rows without any are left out."""
+    texts = []
+    controllers = []
+    costs = []
+    for row in rows:
+        known = row.outcomes.select_finite("gap", row.contender)
+        values = known.get_values(row.contender, "gap") + 1.0
+        if len(values):
+            texts.append(row.text)
+            controllers.append(row.contender.partition("-")[0])
+            costs.append(values)
+    styles = styles_of(controllers)
+    return [Sample(text, style, values) for text, style, values in zip(texts, styles, costs, strict=True)]
+
+
+def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Draw | None:
+    """Return a function that draws final costs in groups with names; None if there are none."""
+    with_samples = [group for group in groups if group[1]]
+    if not with_samples:
+        return None
+    label = "J/J_ref at the end (1: the centralised reference)"
+    return partial(plot_final_costs, with_samples, label, WIDE_PX, PAGE_SCALE, theme, origin=1.0)
+
+
+@plain_style()
+def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
+    """Draw gaps, in percent, on an axis of square roots."""
+    figure = plot_final_costs([("", samples)], "J/J_ref − 1 at the end (%)", WIDE_PX, PAGE_SCALE, theme)
+    (axes,) = figure.axes
+    values = np.concatenate([sample.values for sample in samples])
+    low = min(float(values.min()), 0.0)
+    high = float(values.max())
+    functions = (partial(_raise_signed, exponent=0.5), partial(_raise_signed, exponent=2.0))
+    axes.set_xscale("function", functions=functions)
+    # Leave some space to the left of values below the reference.
+    axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
+    axes.xaxis.set_major_locator(FixedLocator([tick for tick in _GAP_TICKS if tick <= high]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
+    return figure
+
+
+def _raise_signed(values: Array, exponent: float) -> Array:
+    return np.asarray(np.sign(values) * np.abs(values) ** exponent)
+
+
+@plain_style()
+def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
+    """Draw the mean gap, in percent, over the gains of the repulsion: of RPF, and of RAPF at each k_att."""
+    rpf = gains["rpf"].select_complete()
+    rapf = gains["rapf"].select_complete()
+    levels = rapf.list_levels("k_att")
+    panels = [("RPF", rpf)]
+    panels += [(f"RAPF, k_att = {level:g}", rapf.select_gain("k_att", level)) for level in levels]
+    k_rep = rpf.list_levels("k_rep")
+    rho_0 = rpf.list_levels("rho_0")
+    columns = 3 if len(panels) > 4 else 2
+    rows = -(-len(panels) // columns)
+    left = 44 * PAGE_SCALE
+    right = 10 * PAGE_SCALE
+    above = 52 * PAGE_SCALE
+    below = 44 * PAGE_SCALE
+    width = WIDE_PX / columns - left - right
+    height = len(rho_0) * 24 * PAGE_SCALE
+    page = Page((WIDE_PX, round(rows * (height + above + below))), theme, PAGE_SCALE)
+    for number, (name, grid) in enumerate(panels):
+        row, column = divmod(number, columns)
+        x = left + column * (width + left + right)
+        y = above + row * (height + above + below)
+        axes = page.axes((x, y, width, height))
+        gaps = _compute_mean_gaps(grid, k_rep, rho_0)
+        plot_gain_grid(axes, k_rep, rho_0, gaps, ("k_rep (N m³)", "rho_0 (m)"), theme)
+        page.text(name, x - left / 2, y - 36 * PAGE_SCALE, points=TITLE, bold=True)
+    return page.figure
+
+
+def _compute_mean_gaps(grid: GainOutcomes, k_rep: list[float], rho_0: list[float]) -> Array:
+    """Return the mean gap for each rho_0 and k_rep, (len(rho_0), len(k_rep)), %; nan where none was tried."""
+    gaps = np.full((len(rho_0), len(k_rep)), np.nan)
+    for gains, excess in zip(grid.gains, grid.excess, strict=True):
+        row = rho_0.index(float(gains["rho_0"] or 0.0))
+        column = k_rep.index(float(gains["k_rep"] or 0.0))
+        gaps[row, column] = 100.0 * (excess.mean() - 1.0)
+    return gaps

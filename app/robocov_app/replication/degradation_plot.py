@@ -1,0 +1,123 @@
+"""Plot of final costs with disturbances, a panel for each kind."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from robocov.errors import format_count
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, TEXT, Page, quiet_axes, tone
+from robocov_app.figures.styles import CurveStyle, curve_styles
+from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+from robocov_app.replication.paper_figures import CAPTIONS
+from robocov_app.replication.results import Degradation
+from robocov_app.sweep.study import UNITS
+
+_SIZE_PX = (1180, 720)
+_MAX_COLUMNS = 3
+_OFFSET = 0.11
+"""Horizontal distance between controllers at one value, relative to that between two values."""
+
+
+@plain_style()
+def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = LIGHT) -> Figure:
+    """Draw final costs relative to those without the disturbance, a panel for each kind of disturbance.
+
+    Parameters
+    ----------
+    degradations : sequence of Degradation
+        At least one.
+    theme : Theme or str
+
+    Returns
+    -------
+    Figure
+    """
+    theme = theme_named(theme)
+    width, height = _SIZE_PX
+    quiet = mix(theme.background, theme.ink, 0.7)
+    names = list(dict.fromkeys(degradation.axis for degradation in degradations))
+    columns = min(_MAX_COLUMNS, len(names))
+    rows = -(-len(names) // columns)
+    panel_width = (width - 40) / columns
+    panel_height = (height - 110) / rows
+    bottom, top = _find_limits(degradations)
+    page = Page(_SIZE_PX, theme, scale=1.0)
+    page.title("Coverage when things go wrong", 26)
+    subtitle = "final mean distance, as a multiple of the same run's in which that does not go wrong"
+    page.text(subtitle, page.margin, 50, colour=quiet, room=page.room)
+    for number, name in enumerate(names):
+        row, column = divmod(number, columns)
+        x = 64 + column * panel_width
+        y = 100 + row * panel_height
+        axes = page.axes((x, y, panel_width - 60, panel_height - 84))
+        axes.set_ylim(bottom, top)
+        _draw_panel(axes, name, [each for each in degradations if each.axis == name], theme)
+    handles, labels = page.figure.axes[0].get_legend_handles_labels()
+    page.figure.legend(
+        handles,
+        labels,
+        ncols=len(handles),
+        loc="center right",
+        bbox_to_anchor=page.at(width - page.margin, 26),
+        frameon=False,
+        fontsize=SMALL,
+        labelcolor=tone(theme.ink),
+    )
+    pairs = format_count(max(degradation.runs for degradation in degradations), "pair")
+    note = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
+    page.text(note, page.margin, height - 18, points=SMALL, colour=quiet)
+    return page.figure
+
+
+def _find_limits(degradations: Sequence[Degradation]) -> tuple[float, float]:
+    """Return the common vertical limits of all panels."""
+    values = []
+    for degradation in degradations:
+        values += [degradation.ratio.estimate, degradation.ratio.low, degradation.ratio.high]
+    bottom = min(1.0, float(np.nanmin(values)))
+    top = max(1.05, float(np.nanmax(values)))
+    margin = 0.06 * (top - bottom)
+    return bottom - margin, top + margin
+
+
+def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], theme: Theme) -> None:
+    values = list(dict.fromkeys(degradation.value for degradation in degradations))
+    styles = curve_styles(degradation.controller for degradation in degradations)
+    axes.axhline(1.0, color=tone(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
+    for k, (controller, style) in enumerate(styles.items()):
+        own = [degradation for degradation in degradations if degradation.controller == controller]
+        offset = _OFFSET * (k - (len(styles) - 1) / 2)
+        x = np.array([values.index(degradation.value) for degradation in own]) + offset
+        _draw_curve(axes, x, own, style, theme)
+    unit = f" ({UNITS[name]})" if UNITS[name] else ""
+    title = f"{CAPTIONS[f'axis-{name}']}{unit}"
+    axes.set_title(title, fontsize=TEXT, color=tone(theme.ink), loc="left")
+    labels = ["no limit" if value is None else f"{value:g}" for value in values]
+    axes.set_xticks(range(len(values)), labels)
+    axes.set_xlim(-0.4, len(values) - 0.6)
+    quiet_axes(axes, theme, grid="y")
+
+
+def _draw_curve(
+    axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
+) -> None:
+    """Draw the median ratios of a controller, with their intervals."""
+    color = tone(style.colour(theme))
+    y = np.array([degradation.ratio.estimate for degradation in degradations])
+    ends = np.array([[degradation.ratio.low, degradation.ratio.high] for degradation in degradations])
+    errors = np.nan_to_num(np.abs(ends - y[:, None]).T)
+    axes.errorbar(x, y, errors, fmt="none", ecolor=color, elinewidth=1.4, capsize=2.5, zorder=3)
+    axes.plot(
+        x,
+        y,
+        label=degradations[0].label,
+        color=color,
+        zorder=3,
+        linewidth=1.6,
+        linestyle=style.dashes,
+        marker=style.mark,
+        markersize=5.5,
+    )

@@ -1,0 +1,90 @@
+"""Final costs with disturbances, relative to those under ideal conditions."""
+
+from itertools import product
+from pathlib import Path
+from typing import TypeAlias
+
+from robocov.controllers import load_controller_class
+from robocov.metrics.results import read_results
+from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS, bootstrap
+from robocov_app.replication import studies
+from robocov_app.replication.contenders import RAPF_SHARED
+from robocov_app.replication.plan import Plan
+from robocov_app.replication.results import IDEAL, Degradation
+from robocov_app.replication.step_times import UNKNOWN
+from robocov_app.sweep.study import parameter_column
+
+Costs: TypeAlias = dict[tuple[str, int], float]
+"""Final costs, m, by map and seed."""
+CostTable: TypeAlias = dict[tuple[str, float | None], Costs]
+"""Final costs by controller and value of a disturbance."""
+
+
+def read_degradations(folder: Path, plan: Plan) -> list[Degradation]:
+    """Read the degradations of all controllers from the sweeps with disturbances.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sweeps.
+    plan : Plan
+
+    Returns
+    -------
+    list of Degradation
+        First the costs under ideal conditions, relative to those of RAPF, then those with each disturbance.
+    """
+    parts = studies.list_disturbances(plan)
+    ideal: CostTable = {}
+    for part in parts:
+        ideal |= _read_costs(folder / f"{part}-ideal")
+    rapf_costs = ideal.get((RAPF_SHARED.controller, None), {})
+    degradations = []
+    for part, (controllers, _, axes) in parts.items():
+        for controller in controllers:
+            costs = ideal.get((controller, None), {})
+            degradations.append(_build_degradation(IDEAL, None, controller, costs, rapf_costs))
+        for axis, values in axes.items():
+            table = _read_costs(
+                folder / f"{part}-{axis.replace('_', '-')}", parameter_column(axis), default=values[1]
+            )
+            for value, controller in product(values, controllers):
+                ideal_costs = ideal.get((controller, None), {})
+                costs = ideal_costs if value == values[0] else table.get((controller, value), {})
+                degradations.append(_build_degradation(axis, value, controller, costs, ideal_costs))
+    return degradations
+
+
+def _build_degradation(
+    axis: str,
+    value: float | None,
+    controller: str,
+    costs: Costs,
+    ideal_costs: Costs,
+) -> Degradation:
+    ratios = {key: costs[key] / ideal_costs[key] for key in ideal_costs if key in costs}
+    maps = [name for name, _ in ratios]
+    # On few maps, runs are drawn one by one: the interval is then that of these maps alone.
+    clusters = maps if len(set(maps)) >= MIN_BOOTSTRAP_MAPS else None
+    ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
+    label = str(load_controller_class(controller).label)
+    return Degradation(axis, value, controller, label, ratio, runs=len(ratios))
+
+
+def _read_costs(folder: Path, column: str = "", default: float | None = None) -> CostTable:
+    """Return the final costs of a sweep.
+
+    Parameters
+    ----------
+    folder : Path
+    column : str
+        Column of the disturbance.
+    default : float or None
+        Value of the disturbance if the table has no such column, because it has one value only.
+    """
+    table: CostTable = {}
+    for row in read_results(folder).rows():
+        if row["mean_distance_m"] is not None:
+            costs = table.setdefault((row["controller"], row.get(column, default)), {})
+            costs[row["map"], row["seed"]] = float(row["mean_distance_m"])
+    return table

@@ -1,0 +1,326 @@
+"""Executing the study: all runs, in an order in which each has the results that it depends on."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import robocov
+from robocov.arrays import Array
+from robocov.controllers import CONTROLLERS
+from robocov.cost import CoverageCost
+from robocov.errors import InputError
+from robocov.metrics.results import read_results
+from robocov.record import Record
+from robocov_app.replication import studies
+from robocov_app.replication.contenders import OURS, OWN, RAPF_SHARED, Contender, build_paper_contenders
+from robocov_app.replication.degradations import read_degradations
+from robocov_app.replication.forecast import is_gain_grid_finished
+from robocov_app.replication.outcome_tables import read_gain_outcomes, read_outcomes
+from robocov_app.replication.outcomes import (
+    GainOutcomes,
+    Outcomes,
+    ProblemInstance,
+    find_best_gains,
+    merge_outcomes,
+)
+from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
+from robocov_app.replication.references import References
+from robocov_app.replication.results import BeyondResults, DensityResults, FigureRun, PaperResults, ShownRuns
+from robocov_app.replication.runner import (
+    RunnerOptions,
+    find_map_references,
+    get_study_folder,
+    run_studies,
+    run_study,
+)
+from robocov_app.replication.step_times import StepTimes, measure_step_times
+from robocov_app.replication.study_maps import (
+    build_baseline_maps,
+    build_density_maps,
+    build_generated_maps,
+    build_unseen_maps,
+)
+from robocov_app.sweep import worker
+from robocov_app.sweep.study import Study, tasks_of
+
+_WORST_RUNS = 4
+"""Number of RAPF's worst runs that are shown."""
+_SHOWN_RATE_HZ = 10.0
+_PARTITION_DURATION_S = 0.1
+
+
+def record_partition() -> Record:
+    """Return the run whose first frame is figure 1: robots anywhere in the pentagon."""
+    environment = robocov.load_map("pentagon")
+    starts = environment.start("uniform").sample(ROBOTS, seed=PARTITION_SEED)
+    return robocov.Simulation(environment, robocov.Lloyd(), starts).run(_PARTITION_DURATION_S)
+
+
+def run_figures(
+    folder: Path, plan: Plan, options: RunnerOptions, papers: Sequence[Contender] = ()
+) -> dict[str, FigureRun]:
+    """Execute the runs that the figures show.
+
+    Parameters
+    ----------
+    folder : Path
+    plan : Plan
+    options : RunnerOptions
+    papers : sequence of Contender
+        The paper's contenders, for the figures at the best gains.
+
+    Returns
+    -------
+    dict
+        Runs by "case/controller".
+
+    Raises
+    ------
+    InputError
+        If one of them failed.
+    """
+    runs: dict[str, FigureRun] = {}
+    for name, study in studies.build_figure_studies(plan, papers).items():
+        for row, run in _read_figure_runs(run_study(study, folder, name, options)):
+            case = "other" if row["start"] == "other" else name.split("-")[1]
+            runs[f"{case}/{row['controller']}"] = run
+    return runs
+
+
+def _read_figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
+    results = read_results(folder)
+    for row in results.rows():
+        if row["error"] is not None:
+            raise InputError(f"{folder}: a run that a figure shows failed: {row['error']}")
+        yield row, FigureRun(results.record(row["run"]), results.history(row["run"]))
+
+
+def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
+    """Execute the runs of the paper's figures and claims."""
+    figures = run_figures(folder, plan, options)
+    gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
+    papers = build_paper_contenders(find_best_gains(gains))
+    best_figures = run_figures(folder, plan, options, papers)
+    convex = studies.build_convex_contest(plan, papers)
+    claims = studies.build_claims_contest(plan, papers)
+    maps = (*convex.study.maps, *claims.study.maps)
+    references |= find_map_references(maps, folder, plan, options)
+    convex_folder = run_study(convex.study, folder, "convex", options)
+    convex_outcomes = read_outcomes(convex_folder, convex, references)
+    claims_folder = run_study(claims.study, folder, "claims", options)
+    claims_outcomes = read_outcomes(claims_folder, claims, references)
+    names = [
+        *studies.build_figure_studies(plan),
+        *studies.build_figure_studies(plan, papers),
+        "gains",
+        "convex",
+        "claims",
+    ]
+    runs, failed = _count_runs(folder, names)
+    return PaperResults(
+        figures=figures,
+        best_figures=best_figures,
+        gains=gains,
+        convex=convex_outcomes,
+        claims=claims_outcomes,
+        contenders=papers,
+        references=references,
+        worst=repeat_worst_runs(claims.study, claims_outcomes, RAPF_SHARED, _WORST_RUNS),
+        runs=runs,
+        failed=failed,
+    )
+
+
+def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
+    """Execute the runs beyond the paper.
+
+    Parameters
+    ----------
+    folder : Path
+    plan : Plan
+    options : RunnerOptions
+    paper : PaperResults or None
+        Results of the paper's claims. Without them, the paper's contenders run as well, at their best gains
+        if those are known.
+
+    Returns
+    -------
+    BeyondResults
+    """
+    if paper is not None:
+        references = {**paper.references}
+        papers = paper.contenders
+        claims = paper.claims
+    else:
+        papers, claims, references = _run_claims_only(folder, plan, options)
+    gains: dict[str, GainOutcomes] = {}
+    tuning = studies.build_baseline_gains_study(plan)
+    if tuning is not None:
+        gains, _ = _run_gain_grid(tuning, studies.BASELINE_GAINS, folder, plan, options)
+    contests = studies.build_beyond_contests(plan, find_best_gains(gains), papers)
+    maps = (*build_generated_maps(plan.beyond.maps), *build_unseen_maps(plan))
+    references |= find_map_references(maps, folder, plan, options)
+    sweeps = {name: contest.study for name, contest in contests.items()}
+    sweeps |= studies.build_conditions_studies(plan)
+    run_studies(sweeps, folder, options, "paper: beyond")
+    outcomes = {
+        name: read_outcomes(get_study_folder(folder, name), contest, references)
+        for name, contest in contests.items()
+    }
+    sides = [name for name in contests if name == "rivals" or name.startswith("ours-")]
+    all_outcomes = merge_outcomes(
+        [select_baseline_outcomes(claims, plan), *(outcomes[name] for name in sides)]
+    )
+    all_contenders = list(papers)
+    for name in sides:
+        all_contenders += contests[name].contenders
+    own_study = contests[f"ours-{OURS[0]}"].study
+    names = [*sweeps, studies.BASELINE_GAINS] if gains else list(sweeps)
+    runs, failed = _count_runs(folder, names)
+    return BeyondResults(
+        plan=plan,
+        outcomes=all_outcomes,
+        unseen=outcomes.get("unseen"),
+        contenders=tuple(all_contenders),
+        gains=gains,
+        steps=time_steps(folder, plan, options),
+        worst=repeat_worst_runs(own_study, all_outcomes, OWN[0], plan.beyond.worst),
+        targets=outcomes["targets"],
+        density=_read_density_results(folder, plan, outcomes["density"], outcomes["density-ignored"]),
+        teams=outcomes["teams"],
+        degradations=read_degradations(folder / "studies", plan),
+        runs=runs,
+        failed=failed,
+    )
+
+
+def _run_claims_only(
+    folder: Path, plan: Plan, options: RunnerOptions
+) -> tuple[tuple[Contender, ...], Outcomes, References]:
+    """Run the paper's contenders on non-convex maps; return them, their outcomes and the references."""
+    gains: dict[str, GainOutcomes] = {}
+    references: References = {}
+    if is_gain_grid_finished(folder, plan):
+        # All runs are there. This makes sure that the table is, too.
+        gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
+    papers = build_paper_contenders(find_best_gains(gains))
+    contest = studies.build_claims_contest(plan, papers)
+    references |= find_map_references(contest.study.maps, folder, plan, options)
+    target = run_study(contest.study, folder, "claims", options)
+    return papers, read_outcomes(target, contest, references), references
+
+
+def _run_gain_grid(
+    study: Study, name: str, folder: Path, plan: Plan, options: RunnerOptions
+) -> tuple[dict[str, GainOutcomes], References]:
+    """Run a gain grid; return its outcomes by controller, and the references of its maps."""
+    references = find_map_references(study.maps, folder, plan, options)
+    target = run_study(study, folder, name, options)
+    return read_gain_outcomes(target, study, references), references
+
+
+def select_baseline_outcomes(outcomes: Outcomes, plan: Plan) -> Outcomes:
+    """Return the outcomes on the maps, and from the starts, of the baselines."""
+    names = {study_map.name for study_map in build_baseline_maps(plan)}
+    starts = plan.beyond.starts
+    return outcomes.select(
+        [instance.map in names and instance.start in starts for instance in outcomes.instances]
+    )
+
+
+def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, StepTimes]:
+    """Measure the step times of all controllers, and of the largest team for our own controller only.
+
+    Raises
+    ------
+    StudyInterrupted
+        If the user has interrupted it.
+    """
+    every_controller = tuple(CONTROLLERS)
+    controllers_by_size = {
+        ROBOTS: every_controller,
+        plan.beyond.large: every_controller,
+        plan.beyond.huge: OURS[:1],
+    }
+    step_times = measure_step_times(
+        folder, controllers_by_size, plan, is_stopped=lambda: options.stop.requested
+    )
+    options.raise_if_stopped()
+    return step_times
+
+
+def repeat_worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: int) -> ShownRuns:
+    """Repeat the worst runs of a contender, to show them.
+
+    Parameters
+    ----------
+    study : Study
+        The sweep of these runs.
+    outcomes : Outcomes
+    contender : Contender
+    count : int
+        Maximum number of runs.
+
+    Returns
+    -------
+    list of (ProblemInstance, Record)
+        The runs with the highest gaps, at most one for each map.
+    """
+    known = outcomes.select_finite("gap", contender.key)
+    worst: dict[str, ProblemInstance] = {}
+    for k in np.argsort(-known.get_values(contender.key, "gap"), kind="stable").tolist():
+        if len(worst) < count:
+            worst.setdefault(known.instances[k].map, known.instances[k])
+    environments = {study_map.name: study_map.environment for study_map in study.maps}
+    records = {}
+    for task in tasks_of(study):
+        instance = ProblemInstance(task.map, task.start, task.seed)
+        is_contender = task.controller == contender.controller and dict(task.gains) == contender.all_gains
+        if is_contender and instance in worst.values():
+            records[instance] = worker.simulated(task, environments[task.map]).thin(_SHOWN_RATE_HZ)
+    return [(instance, records[instance]) for instance in worst.values()]
+
+
+def _read_density_results(folder: Path, plan: Plan, known: Outcomes, ignored: Outcomes) -> DensityResults:
+    """Judge the runs with and without knowledge of the density, both by the density."""
+    costs = {
+        study_map.name: CoverageCost(study_map.environment, plan.lattice)
+        for study_map in build_density_maps(plan)
+    }
+    values: dict[tuple[str, str], Array] = {}
+    for key, outcomes in (("known", known), ("ignored", ignored)):
+        finals = []
+        for name, positions in zip(outcomes.maps, _get_placements(outcomes), strict=True):
+            is_finished = np.isfinite(positions).all()
+            finals.append(costs[name](positions).mean_distance if is_finished else np.nan)
+        values[key, "final"] = np.array(finals)
+    known_run = _read_single_run(get_study_folder(folder, "density-picture"))
+    ignored_run = _read_single_run(get_study_folder(folder, "density-picture-ignored"))
+    cost = CoverageCost(known_run.record.environment, plan.lattice)
+    return DensityResults(
+        outcomes=Outcomes(known.instances, values),
+        figure_runs=(known_run, ignored_run),
+        costs=(
+            float(cost(known_run.record.positions[-1]).mean_distance),
+            float(cost(ignored_run.record.positions[-1]).mean_distance),
+        ),
+    )
+
+
+def _get_placements(outcomes: Outcomes) -> Array:
+    """Return the final positions of the only contender, (m, n, 2) m."""
+    (placements,) = [array for (_, measure), array in outcomes.values.items() if measure == "placement"]
+    return placements
+
+
+def _read_single_run(folder: Path) -> FigureRun:
+    ((_, run),) = _read_figure_runs(folder)
+    return run
+
+
+def _count_runs(folder: Path, names: Iterable[str]) -> tuple[int, int]:
+    """Return the number of runs of some sweeps, and of those that failed."""
+    tables = [read_results(get_study_folder(folder, name)) for name in names]
+    return sum(len(table) for table in tables), sum(len(table.failures()) for table in tables)

@@ -1,0 +1,120 @@
+"""Writing the figures of the study, as PNG, SVG and PDF, in light and dark."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from robocov.files.result_folder import report_folder_errors
+from robocov.record import Record
+from robocov_app.figures.files import save_figure
+from robocov_app.replication.beyond_plots import plan_beyond_plots
+from robocov_app.replication.comparison_plots import Draw, Plots
+from robocov_app.replication.paper_figures import (
+    BEST_FIGURES,
+    CAPTIONS,
+    FIGURES,
+    describe_figure,
+    draw_figure,
+)
+from robocov_app.replication.paper_plots import plan_paper_plots
+from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
+from robocov_app.terminal.progress import show_progress
+
+FIGURES_FOLDER = "figures"
+_SUFFIXES = ("png", "svg", "pdf")
+
+
+class FigureFile(NamedTuple):
+    """A figure in the page."""
+
+    name: str
+    """Name of its files in ``figures/``."""
+    width: int
+    """px"""
+    height: int
+    """px"""
+    description: str
+    """What it shows, and what is visible there."""
+    findings: str = ""
+    """What is visible there, in sentences; empty for plots."""
+
+
+def save_paper_figures(
+    folder: Path,
+    runs: Mapping[str, FigureRun],
+    partition_run: Record,
+    results: PaperResults | None,
+    *,
+    quiet: bool,
+) -> dict[str, FigureFile]:
+    """Write the paper's figures and the plots of its claims.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+    runs : Mapping
+        Runs of the figures by "case/controller".
+    partition_run : Record
+        The run whose first frame is figure 1.
+    results : PaperResults or None
+        Without them, no plots and no figures at the best gains are written.
+    quiet : bool
+        Show no progress.
+
+    Returns
+    -------
+    dict
+        Figures by name.
+    """
+    runs_by_figure = {f"figure-{number}": (number, runs) for number in FIGURES}
+    if results is not None:
+        for number in BEST_FIGURES:
+            runs_by_figure[f"figure-{number}-best"] = (number, results.best_figures)
+
+    def plan_plots(theme: str) -> Plots:
+        plots: dict[str, Draw] = {}
+        for name, (number, figure_runs) in runs_by_figure.items():
+            plots[name] = partial(draw_figure, number, figure_runs, partition_run, theme)
+        if results is not None:
+            plots.update(plan_paper_plots(results, theme))
+        return plots
+
+    findings = {
+        name: describe_figure(number, figure_runs, partition_run)
+        for name, (number, figure_runs) in runs_by_figure.items()
+    }
+    return _save_figures(folder, plan_plots, findings, quiet=quiet)
+
+
+def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) -> dict[str, FigureFile]:
+    """Write the plots beyond the paper, and return them by name."""
+    return _save_figures(folder, partial(plan_beyond_plots, results), {}, quiet=quiet)
+
+
+def _save_figures(
+    folder: Path, plan_plots: Callable[[str], Plots], findings: Mapping[str, str], *, quiet: bool
+) -> dict[str, FigureFile]:
+    target = folder / FIGURES_FOLDER
+    with report_folder_errors(target):
+        target.mkdir(exist_ok=True)
+    light = plan_plots("light")
+    dark = plan_plots("dark")
+    files: dict[str, FigureFile] = {}
+    with show_progress("figures", len(light), quiet=quiet) as update:
+        for number, (name, draw) in enumerate(light.items(), start=1):
+            figure = draw()
+            for suffix in _SUFFIXES:
+                save_figure(figure, target / f"{name}.{suffix}")
+            save_figure(dark[name](), target / f"{name}-dark.png")
+            figure_findings = findings.get(name, "")
+            files[name] = FigureFile(
+                name,
+                width=round(figure.bbox.width),
+                height=round(figure.bbox.height),
+                description=f"{CAPTIONS[name]} {figure_findings}".rstrip(),
+                findings=figure_findings,
+            )
+            update(number)
+    return files

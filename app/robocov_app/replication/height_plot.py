@@ -1,0 +1,278 @@
+"""Plot of the best position of a sensor over a cell, depending on its height (equation 14).
+
+The optimum of f = 1 / (r² + h²) moves from its limit for h → 0 to the centroid for h → ∞.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import ConnectionPatch, Polygon, Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from robocov.arrays import Array
+from robocov.locational_cost import Distance, Sensing, compute_locational_costs
+from robocov.locational_cost.best_points import find_best_points
+from robocov.observation.region import Region
+from robocov.voronoi import VoronoiPartition, partition
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, Box, Page, quiet_axes, tone
+from robocov_app.render.theme import Theme, mix
+
+PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
+"""A cell without any symmetry, m."""
+_MIN_LABEL_DISTANCE = 0.13
+"""Minimum distance between labeled positions, relative to the length of the path."""
+_MIN_HEIGHT_M = 0.01
+_MAX_HEIGHT_M = 100.0
+_PATH_POINTS = 240
+_GROUND_HEIGHT = 1e-7
+"""Height that stands for the limit 0, relative to the size of the cell."""
+_PANELS = (
+    (0.0, 0.30, "the cell (m)"),
+    (0.37, 0.26, "the frame in it (m)"),
+    (0.68, 0.32, "from the optimum to the centroid (mm)"),
+)
+"""Start and width of each panel, relative to the page, and its heading."""
+
+
+class SensorOptimum(NamedTuple):
+    """The best position for a sensor at a height."""
+
+    height: float
+    """m"""
+    x: float
+    y: float
+    """m"""
+    distance: float
+    """Distance from the centroid of the cell, m."""
+    loss: float
+    """Relative loss of a sensor over the centroid; nan in the limits."""
+
+
+def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
+    """Find the best positions of a sensor over the cell.
+
+    Parameters
+    ----------
+    heights : sequence of float
+        Heights in ascending order, m.
+
+    Returns
+    -------
+    list of SensorOptimum
+        Optima at these heights, and in the limits 0 before and infinity after them.
+    """
+    cell = _build_cell()
+    return [
+        _find_ground_optimum(cell),
+        *(_find_optimum(cell, height) for height in heights),
+        _build_optimum(cell, np.inf, cell.centroid[0], float("nan")),
+    ]
+
+
+def _find_ground_optimum(cell: VoronoiPartition) -> SensorOptimum:
+    size = float(np.sqrt(cell.mass[0]))
+    position = find_best_points(cell, Sensing(_GROUND_HEIGHT * size))[0]
+    return _build_optimum(cell, 0.0, position, float("nan"))
+
+
+def _find_optimum(cell: VoronoiPartition, height: float) -> SensorOptimum:
+    position = find_best_points(cell, Sensing(height))[0]
+    best = _compute_cost(cell, position, height)
+    at_centroid = _compute_cost(cell, cell.centroid[0], height)
+    return _build_optimum(cell, height, position, float(1.0 - at_centroid / best))
+
+
+def _compute_cost(cell: VoronoiPartition, position: Array, height: float) -> float:
+    offsets = position[None] - cell.generators
+    return float(compute_locational_costs(cell.edges, offsets, Sensing(height))[0])
+
+
+def _build_optimum(cell: VoronoiPartition, height: float, position: Array, loss: float) -> SensorOptimum:
+    x, y = position.tolist()
+    return SensorOptimum(height, x, y, float(np.hypot(*(position - cell.centroid[0]))), loss)
+
+
+def _build_cell() -> VoronoiPartition:
+    region = Region(np.array(PENTAGON))
+    return partition(region.centroid[None], region)
+
+
+@plain_style()
+def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
+    """Draw the path of the optimum over the cell, and its distance from the centroid.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Size of the page, px.
+    theme : Theme
+    scale : float
+        Scale of the page.
+
+    Returns
+    -------
+    Figure
+    """
+    cell = _build_cell()
+    path = find_sensor_optima(np.geomspace(_MIN_HEIGHT_M, _MAX_HEIGHT_M, _PATH_POINTS).tolist())
+    labeled = _select_labeled(path_heights=[n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)])
+    median = find_best_points(cell, Distance())[0]
+    page = Page(size, theme, scale)
+    top = 44 * scale
+    height = size[1] - top - 46 * scale
+    left = page.margin + 26 * scale
+    width = size[0] - page.margin - left
+    panels = []
+    for start, panel_width, heading in _PANELS:
+        panels.append(page.axes((left + start * width, top, panel_width * width, height)))
+        page.text(heading, left + start * width, top - 16 * scale)
+    points = np.array([[optimum.x, optimum.y] for optimum in path] + [median])
+    frame = _find_frame(points, _PANELS[1][1] * width / height)
+    cell_axes, frame_axes, distance_axes = panels
+    _draw_cell(cell_axes, cell, frame, theme)
+    _draw_path(frame_axes, path, labeled, median, theme)
+    _set_frame(frame_axes, frame, theme)
+    x, y, frame_width, frame_height = frame
+    for side in (0.0, 1.0):
+        connection = ConnectionPatch(
+            xyA=(x + frame_width, y + side * frame_height),
+            xyB=(0.0, side),
+            coordsA=cell_axes.transData,
+            coordsB=frame_axes.transAxes,
+            color=tone(theme.faint),
+            linewidth=0.8,
+        )
+        page.figure.add_artist(connection)
+    _draw_distance(distance_axes, path, labeled, theme)
+    return page.figure
+
+
+def _select_labeled(path_heights: Sequence[float]) -> list[SensorOptimum]:
+    """Return the limits, and the optima that are far enough from them and from each other for a label."""
+    first, *inner, last = find_sensor_optima(path_heights)
+    min_distance = _MIN_LABEL_DISTANCE * first.distance
+    labeled = [first]
+    for optimum in inner:
+        is_far_from_end = optimum.distance >= min_distance
+        is_far_from_previous = labeled[-1].distance - optimum.distance >= min_distance
+        if is_far_from_end and is_far_from_previous:
+            labeled.append(optimum)
+    return [*labeled, last]
+
+
+def _find_frame(points: Array, aspect: float) -> Box:
+    """Return x, y, width and height of the enlarged frame: all points, with space for labels at the right."""
+    low = points.min(axis=0)
+    high = points.max(axis=0)
+    width, height = (high - low) * (1.9, 1.3)
+    width, height = max(width, height * aspect), max(height, width / aspect)
+    return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
+
+
+def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: Box, theme: Theme) -> None:
+    fill = tone(mix(theme.background, theme.robots[1], theme.tint))
+    axes.add_patch(Polygon(cell.polygons[0], facecolor=fill, edgecolor=tone(theme.boundary), linewidth=1.6))
+    x, y, width, height = frame
+    axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=tone(theme.ink), linewidth=1.2))
+    axes.set_aspect("equal")
+    axes.margins(0.02)
+    axes.autoscale_view()
+    _simplify_axes(axes, theme)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6, integer=True))
+
+
+def _draw_path(
+    axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], median: Array, theme: Theme
+) -> None:
+    """Draw the path of the optimum with labels, and the geometric median."""
+    line = tone(theme.final)
+    faint = tone(theme.faint)
+    label_style: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
+    axes.plot([row.x for row in path], [row.y for row in path], color=line, linewidth=2.4, zorder=2)
+    first, *inner, last = labeled
+    for optimum in inner:
+        axes.plot(optimum.x, optimum.y, "o", color=line, markersize=5.5, markeredgewidth=0.0, zorder=3)
+    for optimum, marker, face in ((first, "o", tone(theme.background)), (last, "P", line)):
+        axes.plot(
+            optimum.x,
+            optimum.y,
+            markersize=9.5,
+            markeredgecolor=line,
+            markeredgewidth=1.8,
+            zorder=4,
+            marker=marker,
+            markerfacecolor=face,
+        )
+    labels = [(optimum, f"h = {optimum.height:g} m") for optimum in inner]
+    labels += [(first, "h → 0"), (last, "h → ∞: the centroid")]
+    for optimum, label in labels:
+        axes.annotate(label, (optimum.x, optimum.y), (11, -1), color=tone(theme.ink), zorder=5, **label_style)
+    x, y = median.tolist()
+    axes.plot(x, y, "D", color=faint, markersize=6.0, zorder=3)
+    axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **label_style)
+
+
+def _set_frame(axes: Axes, frame: Box, theme: Theme) -> None:
+    """Limit axes to the enlarged frame, and outline it."""
+    x, y, width, height = frame
+    axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal")
+    _simplify_axes(axes, theme)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(4, prune="both"))
+    for side in axes.spines.values():
+        side.set(visible=True, color=tone(theme.ink), linewidth=1.2)
+
+
+def _draw_distance(
+    axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], theme: Theme
+) -> None:
+    """Draw the distance of the optimum from the centroid against the height."""
+    line = tone(theme.final)
+    highest = 1e3 * path[0].distance
+    inner = path[1:-1]
+    axes.axhline(highest, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.plot(*_get_distance_curve(inner), color=line, linewidth=2.4)
+    axes.plot(
+        *_get_distance_curve(labeled[1:-1]),
+        color=line,
+        marker="o",
+        linestyle="none",
+        markersize=5.5,
+        markeredgewidth=0.0,
+    )
+    axes.set(xscale="log", xlim=(inner[0].height, inner[-1].height), ylim=(0.0, 1.12 * highest))
+    axes.xaxis.set_major_formatter("{x:g}")
+    _simplify_axes(axes, theme, "height h (m)", grid="y")
+    worst = max(inner, key=lambda optimum: optimum.loss)
+    note = (
+        f"A sensor over the centroid misses\nat most {100.0 * worst.loss:.2g} % of what it could\n"
+        f"tell, at h = {worst.height:.2g} m."
+    )
+    axes.annotate(
+        note,
+        (0.04, 0.07),
+        xycoords="axes fraction",
+        fontsize=SMALL,
+        color=tone(theme.ink),
+        ha="left",
+        va="bottom",
+        bbox={"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0},
+    )
+
+
+def _get_distance_curve(optima: Sequence[SensorOptimum]) -> tuple[list[float], list[float]]:
+    """Return heights, m, and distances from the centroid, mm."""
+    heights = [optimum.height for optimum in optima]
+    distances = [1e3 * optimum.distance for optimum in optima]
+    return heights, distances
+
+
+def _simplify_axes(axes: Axes, theme: Theme, label: str = "", grid: Literal["y", ""] = "") -> None:
+    quiet_axes(axes, theme, label, grid=grid)
+    axes.tick_params(length=3.0, left=True)
+    axes.minorticks_off()

@@ -1,0 +1,135 @@
+"""Reading the outcomes of a sweep from its table and records."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from robocov.controllers import CONTROLLERS, get_gains
+from robocov.metrics.results import read_results
+from robocov_app.replication.outcomes import GainOutcomes, Outcomes, ProblemInstance, compute_mean_until
+from robocov_app.replication.plan import ROBOTS
+from robocov_app.replication.references import References
+from robocov_app.replication.studies import Contest
+from robocov_app.sweep.study import Study
+
+EARLY_S = 20.0
+"""Time in which a team spreads over a convex region of ten meters: Lloyd's algorithm has then settled."""
+FIRST_MINUTE_S = 60.0
+"""Time that counts as "during the motion"."""
+
+COLUMNS = {
+    "final": "mean_distance_m",
+    "contacts": "contacts",
+    "stuck": "stuck_robots",
+    "settled": "settled_at_s",
+    "time": "mean_time_s",
+    "path": "path_length_m",
+    "over_run": "mean_distance_over_run_m",
+    "work": "work_J",
+}
+"""Columns of a sweep's table by measure. Robots of one speed have no time."""
+
+_ControllerKey: TypeAlias = tuple[Any, ...]
+"""A controller and the values of all its gains."""
+
+
+def read_outcomes(folder: Path, contest: Contest, references: References) -> Outcomes:
+    """Read the outcomes of the contenders of a sweep.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sweep.
+    contest : Contest
+    references : dict
+        Reference placements by map. On a map without any the gap is nan.
+
+    Returns
+    -------
+    Outcomes
+    """
+    results = read_results(folder)
+    instances = list_instances(contest.study)
+    controller_keys = {
+        contender.key: _identify_controller(contender.controller, contender.all_gains)
+        for contender in contest.contenders
+    }
+    values = {}
+    for key in controller_keys:
+        for measure in (*COLUMNS, "early", "first_minute", "gap"):
+            values[key, measure] = np.full(len(instances), np.nan)
+        values[key, "placement"] = np.full((len(instances), ROBOTS, 2), np.nan)
+    for k, row in _read_rows(folder, instances):
+        controller_key = _identify_controller(row["controller"], row)
+        for key, candidate in controller_keys.items():
+            if candidate != controller_key:
+                continue
+            for measure, column in COLUMNS.items():
+                if row.get(column) is not None:
+                    values[key, measure][k] = row[column]
+            values[key, "placement"][k] = results.record(row["run"]).positions[-1]
+            history = results.history(row["run"])
+            values[key, "early"][k] = compute_mean_until(history, EARLY_S)
+            values[key, "first_minute"][k] = compute_mean_until(history, FIRST_MINUTE_S)
+            reference = references.get(row["map"])
+            if reference is not None:
+                values[key, "gap"][k] = values[key, "final"][k] / reference.mean_distance - 1.0
+    share_sides = {}
+    for study_map in contest.study.maps:
+        share_sides[study_map.name] = float(np.sqrt(study_map.environment.free_area / ROBOTS))
+    return Outcomes(instances, values, share_sides)
+
+
+def read_gain_outcomes(folder: Path, study: Study, references: References) -> dict[str, GainOutcomes]:
+    """Read the outcomes of a gain grid.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sweep.
+    study : Study
+    references : dict
+        Reference placements by map. On a map without any the excess is nan.
+
+    Returns
+    -------
+    dict
+        Outcomes by controller.
+    """
+    instances = list_instances(study)
+    gain_sets = {name: study.gains_of(name).choices for name in study.controllers}
+    excess = {name: np.full((len(sets), len(instances)), np.nan) for name, sets in gain_sets.items()}
+    cells = {}
+    for name, sets in gain_sets.items():
+        for g, gains in enumerate(sets):
+            cells[_identify_controller(name, gains)] = (name, g)
+    for k, row in _read_rows(folder, instances):
+        cell = cells.get(_identify_controller(row["controller"], row))
+        if cell is not None and row["map"] in references:
+            name, g = cell
+            excess[name][g, k] = row["mean_distance_m"] / references[row["map"]].mean_distance
+    return {name: GainOutcomes(instances, gain_sets[name], excess[name]) for name in study.controllers}
+
+
+def list_instances(study: Study) -> tuple[ProblemInstance, ...]:
+    """Return the problem instances of a sweep: all maps, starts and seeds."""
+    instances: list[ProblemInstance] = []
+    for study_map in study.maps:
+        for start in study.starts_on(study_map):
+            instances += [ProblemInstance(study_map.name, start, seed) for seed in study.seeds]
+    return tuple(instances)
+
+
+def _read_rows(folder: Path, instances: Iterable[ProblemInstance]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the runs that did not fail, each with the index of its instance."""
+    index = {instance: k for k, instance in enumerate(instances)}
+    for row in read_results(folder).rows():
+        k = index.get(ProblemInstance(row["map"], row["start"], row["seed"]))
+        if k is not None and row["error"] is None:
+            yield k, row
+
+
+def _identify_controller(controller: str, gains: Mapping[str, Any]) -> _ControllerKey:
+    return (controller, *(gains[name] for name in get_gains(CONTROLLERS.get(controller))))

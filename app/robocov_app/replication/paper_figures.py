@@ -1,0 +1,312 @@
+"""The paper's figures 1 to 8 on environments of the same kinds.
+
+Starts are green, final positions blue, trajectories red. RAPF's cost is blue, RPF's red, as in the paper.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from robocov.environment import Environment
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov.voronoi import partition
+from robocov_app.figures import arena
+from robocov_app.figures.curves import draw_curves, end_label
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, TITLE, Page, tone
+from robocov_app.render.layout import united
+from robocov_app.render.scene import CENTROID, GOAL
+from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+from robocov_app.replication.contenders import ASSETS
+from robocov_app.replication.formatting import format_amount
+from robocov_app.replication.outcome_tables import FIRST_MINUTE_S
+from robocov_app.replication.outcomes import compute_matched_distance, compute_mean_until
+from robocov_app.replication.results import FigureRun
+
+PAGE_SCALE = 3.0
+"""Scale of the pages: 300 dots per inch."""
+WIDE_PX = 2148
+NARROW_PX = 1050
+"""Widths of two columns of a journal (7.16 inches) and of one (3.5 inches)."""
+_COST_HEIGHT_PX = 1050
+_HIDDEN_M = 0.25
+"""Distance from its centroid within which the disc of a robot hides it, on a map of ten meters."""
+_ARRIVED = 0.05
+"""A cost has arrived when it stays within 5 % of its last value."""
+_SAME_COST = 0.0005
+"""Relative difference below which two costs are called the same."""
+
+FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
+"""The case that each of the paper's figures shows, by its number."""
+BEST_FIGURES = (4, 5, 6, 7, 8)
+"""Figures that are drawn at the best gains as well."""
+COST_FIGURES = (3, 5, 7)
+"""Figures of the cost against time. The others, except for the first, show trajectories."""
+
+CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
+"""Captions of all figures by name."""
+
+
+def draw_figure(
+    number: int, runs: Mapping[str, FigureRun], partition_run: Record, theme: Theme | str
+) -> Figure:
+    """Draw one of the paper's figures.
+
+    Parameters
+    ----------
+    number : int
+        Number of the figure, from 1 to 8.
+    runs : Mapping
+        Runs by "case/controller".
+    partition_run : Record
+        The run whose first frame is figure 1.
+    theme : Theme or str
+
+    Returns
+    -------
+    Figure
+    """
+    theme = theme_named(theme)
+    if number == 1:
+        return draw_partition(partition_run, theme)
+    pair = _get_pair(runs, number)
+    if number in COST_FIGURES:
+        return draw_costs(pair, theme)
+    records = [run.record for run in pair]
+    with_goals = [record for record in records if arena.has_goals(record)]
+    are_goals_hidden = all(_are_goals_hidden(record) for record in with_goals)
+    unnamed = (CENTROID, GOAL) if are_goals_hidden else ()
+    titles = [run.record.label for run in pair]
+    costs = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in pair]
+    return draw_side_by_side(records, list(zip(titles, costs, strict=True)), theme, unnamed)
+
+
+def _are_goals_hidden(record: Record) -> bool:
+    """Return whether all robots hide their goals at the end."""
+    offsets = record.goals[-1] - record.positions[-1]
+    return bool((np.hypot(*offsets.T) < _HIDDEN_M).all())
+
+
+def _get_pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, FigureRun]:
+    """Return the runs of RAPF and of the other controller in a figure."""
+    case = FIGURES[number]
+    other = "lloyd" if case == "convex" else "rpf"
+    return runs[f"{case}/rapf"], runs[f"{case}/{other}"]
+
+
+def describe_figure(number: int, runs: Mapping[str, FigureRun], partition_run: Record) -> str:
+    """Return in sentences what one of the paper's figures shows.
+
+    Parameters
+    ----------
+    number : int
+        Number of the figure, from 1 to 8.
+    runs : Mapping
+        Runs by "case/controller".
+    partition_run : Record
+        The run whose first frame is figure 1.
+    """
+    if number == 1:
+        return _describe_partition(partition_run)
+    rapf, other = _get_pair(runs, number)
+    if number in COST_FIGURES:
+        return _describe_costs(rapf, other)
+    text = _describe_final_costs(rapf, other)
+    if number == 8:
+        text += f" {_describe_other_starts(runs)}"
+    return text
+
+
+def _describe_partition(run: Record) -> str:
+    positions = run.positions[0]
+    centroids = partition(positions, run.environment.region).centroid
+    mean_distance = float(np.hypot(*(centroids - positions).T).mean())
+    return (
+        f"The robots stand anywhere in “{run.environment.name}”, on average "
+        f"{format_amount(mean_distance, 'm')} from the centres of mass of their cells."
+    )
+
+
+def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
+    label = other.record.label
+    rapf_mean = compute_mean_until(rapf.history, FIRST_MINUTE_S)
+    other_mean = compute_mean_until(other.history, FIRST_MINUTE_S)
+    rapf_cost = rapf.history.mean_distance
+    other_cost = other.history.mean_distance
+    # Both start from the same positions, at the same cost.
+    common = slice(1, min(len(rapf_cost), len(other_cost)))
+    lower = float((rapf_cost[common] < other_cost[common]).mean())
+    return (
+        f"Averaged over the first {FIRST_MINUTE_S:g} s RAPF has {rapf_mean:.3f} m, {label} "
+        f"{other_mean:.3f} m: {_describe_difference(rapf_mean, other_mean)}. RAPF's is the lower one "
+        f"{format_amount(lower, '%')} of the time. RAPF stays within 5 % of its last value from "
+        f"{find_arrival_time(rapf.history):.0f} s on, "
+        f"{label} from {find_arrival_time(other.history):.0f} s on."
+    )
+
+
+def _describe_final_costs(rapf: FigureRun, other: FigureRun) -> str:
+    rapf_cost = float(rapf.history.mean_distance[-1])
+    other_cost = float(other.history.mean_distance[-1])
+    return (
+        f"On “{rapf.record.environment.name}” RAPF ends with a mean distance of {rapf_cost:.3f} m, "
+        f"{other.record.label} with {other_cost:.3f} m: {_describe_difference(rapf_cost, other_cost)}."
+    )
+
+
+def _describe_other_starts(runs: Mapping[str, FigureRun]) -> str:
+    distances = []
+    for controller in ("rapf", "rpf"):
+        first = runs[f"b/{controller}"].record.positions[-1]
+        second = runs[f"other/{controller}"].record.positions[-1]
+        distances.append(format_amount(compute_matched_distance(first, second), "m"))
+    return (
+        f"Between the ends of figure 6 and these, robots are {distances[0]} apart with RAPF "
+        f"and {distances[1]} with RPF (matched with the least sum of distances)."
+    )
+
+
+def _describe_difference(cost: float, other_cost: float) -> str:
+    change = cost / other_cost - 1.0
+    if abs(change) < _SAME_COST:
+        return "the same"
+    direction = "less" if change < 0 else "more"
+    return f"{format_amount(abs(change), '%')} {direction}"
+
+
+def find_arrival_time(history: CostHistory) -> float:
+    """Return the time, s, from which a cost stays within 5 % of its last value."""
+    cost = history.mean_distance
+    is_away = np.abs(cost - cost[-1]) > _ARRIVED * cost[-1]
+    rows = np.flatnonzero(is_away)
+    return float(history.time[rows[-1] + 1]) if len(rows) else float(history.time[0])
+
+
+@plain_style()
+def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
+    """Draw the Voronoi cells at the start of a run, and their centers of mass."""
+    environment = run.environment
+    positions = run.positions[0]
+    edge_color = tone(theme.cell_edge)
+    dot_style: Any = {"linestyle": "none", "marker": "o", "markersize": 4.0, "color": tone(theme.ink)}
+    handles: list[Artist] = [
+        arena.robot_handle("robot", theme.final, theme),
+        Line2D([], [], label="centre of mass of its cell", **dot_style),
+        Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
+        *arena.map_handles(environment, theme)[1:],
+    ]
+    page, (axes,) = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
+    arena.draw_map(axes, environment, theme)
+    cells = partition(positions, environment.region)
+    fills = []
+    for k in range(len(positions)):
+        color = theme.robots[k % len(theme.robots)]
+        fills.append(tone(mix(theme.background, color, theme.paper_tint)))
+    collection = PolyCollection(
+        list(cells.polygons), facecolors=fills, edgecolors=edge_color, linewidths=0.8, zorder=1
+    )
+    axes.add_collection(collection, autolim=False)
+    axes.plot(*cells.centroid.T, zorder=8, clip_on=False, **dot_style)
+    arena.draw_robots(axes, positions, run.team.radius, [theme.final] * len(positions), theme)
+    return page.figure
+
+
+@plain_style()
+def draw_side_by_side(
+    records: Sequence[Record],
+    headings: Iterable[tuple[str, str]],
+    theme: Theme,
+    unnamed: Sequence[str] = (),
+) -> Figure:
+    """Draw runs on one map next to each other.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    headings : iterable of (str, str)
+        Title and final cost above each panel.
+    theme : Theme
+    unnamed : sequence of str
+        Labels that are left out of the legend.
+
+    Returns
+    -------
+    Figure
+    """
+    handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
+    handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
+    page, panels = build_panels(records[0].environment, len(records), WIDE_PX, handles, theme, above=30.0)
+    for letter, record, (title, cost), axes in zip("abcdef", records, headings, panels, strict=False):
+        arena.draw_run(axes, record, theme, "paper")
+        box = axes.get_position()
+        left = box.x0 * page.size[0]
+        right = box.x1 * page.size[0]
+        top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
+        page.text(f"({letter})  {title}", left, top, points=TITLE, bold=True)
+        page.text(cost, right, top, points=SMALL, colour=theme.faint, align="right")
+    return page.figure
+
+
+@plain_style()
+def draw_costs(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
+    """Draw the costs of runs against time."""
+    curves = [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
+    ]
+    page = Page((WIDE_PX, _COST_HEIGHT_PX), theme, PAGE_SCALE)
+    edge = 34 * page.scale
+    label_width = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+    width = WIDE_PX - 2 * edge - label_width
+    height = _COST_HEIGHT_PX - edge - 44 * page.scale
+    draw_curves(page.axes((edge, edge, width, height)), curves, theme)
+    return page.figure
+
+
+def build_panels(
+    environment: Environment,
+    count: int,
+    width: int,
+    handles: Sequence[Artist],
+    theme: Theme,
+    *,
+    above: float,
+) -> tuple[Page, list[Axes]]:
+    """Build a page with equal axes for one map in a row, and its legend and scale bar.
+
+    Parameters
+    ----------
+    environment : Environment
+    count : int
+        Number of axes.
+    width : int
+        Width of the page, px.
+    handles : sequence of Artist
+        Handles of the legend.
+    theme : Theme
+    above : float
+        Space above the axes, px before scaling.
+
+    Returns
+    -------
+    page : Page
+    panels : list of Axes
+    """
+    min_x, min_y, max_x, max_y = environment.region.bounds
+    sketch = Page((width, width), theme, PAGE_SCALE)
+    panel_width = (width - (count + 1) * sketch.margin) / count
+    panel_height = panel_width / ((max_x - min_x) / (max_y - min_y))
+    top = above * PAGE_SCALE
+    page = Page((width, round(top + panel_height + sketch.footer_height(handles))), theme, PAGE_SCALE)
+    boxes = [
+        (page.margin + k * (panel_width + page.margin), top, panel_width, panel_height) for k in range(count)
+    ]
+    page.footer(handles, boxes, panel_width / (max_x - min_x))
+    return page, [page.map_axes(box, min_x, min_y, max_x, max_y) for box in boxes]

@@ -1,0 +1,69 @@
+"""Plots of the paper's claims."""
+
+from functools import partial
+
+from robocov_app.render.theme import Theme, theme_named
+from robocov_app.replication.claims.thresholds import CLUSTERED
+from robocov_app.replication.comparison_plots import (
+    CostRow,
+    PairsRow,
+    Plots,
+    build_cost_samples,
+    draw_gain_grids,
+    plan_costs_plot,
+    plan_pairs_plot,
+    select_plots,
+)
+from robocov_app.replication.contenders import LABELS
+from robocov_app.replication.outcomes import Outcomes
+from robocov_app.replication.results import PaperResults
+
+
+def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
+    """Return how the plots of the paper's claims are drawn, by their names."""
+    theme = theme_named(theme)
+    claims = results.claims
+    by_start = []
+    for key in ("rapf-shared", "rpf-shared"):
+        rows = [
+            CostRow(f"start {start}", claims.select_starts(start), key)
+            for start in dict.fromkeys(claims.starts)
+        ]
+        by_start.append((LABELS[key], build_cost_samples(rows)))
+    gap_rows = [CostRow(label, claims, key) for key, label in LABELS.items()]
+    has_gains = all(grid.select_complete().instances for grid in results.gains.values())
+    return select_plots(
+        {
+            "claim-1-convex": plan_pairs_plot(
+                _list_convex_rows(results.convex), "RAPF by LA, pair by pair (1: equal)", theme
+            ),
+            "claim-2-nonconvex": plan_pairs_plot(
+                _list_nonconvex_rows(claims), "RAPF by the other law, pair by pair (1: equal)", theme
+            ),
+            "claim-3-gains": partial(draw_gain_grids, results.gains, theme) if has_gains else None,
+            "claim-4-starts": plan_costs_plot(by_start, theme),
+            "claim-6-gap": plan_costs_plot([("", build_cost_samples(gap_rows))], theme),
+        }
+    )
+
+
+def _list_convex_rows(outcomes: Outcomes) -> list[PairsRow]:
+    rows = [PairsRow("at the end", outcomes.compare("rapf-shared", "lloyd"), "rapf")]
+    for start in CLUSTERED:
+        pairs = outcomes.select_starts(start).compare("rapf-shared", "lloyd", "early")
+        rows.append(PairsRow(f"first 20 s, start {start}", pairs, "rapf"))
+    return rows
+
+
+def _list_nonconvex_rows(outcomes: Outcomes) -> list[PairsRow]:
+    rows = []
+    for gains in ("shared", "best"):
+        pairs = outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", "final")
+        rows.append(PairsRow(f"RPF, at the end, {gains} gains", pairs, "rapf"))
+    for gains in ("shared", "best"):
+        pairs = outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", "first_minute")
+        rows.append(PairsRow(f"RPF, first 60 s, {gains} gains", pairs, "rapf"))
+    for gains in ("shared", "best"):
+        pairs = outcomes.compare(f"rapf-{gains}", "lloyd", "final")
+        rows.append(PairsRow(f"LA, at the end, {gains} gains", pairs, "rapf"))
+    return rows

@@ -1,0 +1,187 @@
+"""Running the sweeps of a study, which can be interrupted and resumed at any time."""
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from itertools import compress
+from pathlib import Path
+
+from robocov.errors import InputError
+from robocov.files.result_folder import report_folder_errors
+from robocov.files.writing import replace_file
+from robocov_app.replication.plan import Plan
+from robocov_app.replication.references import References, find_references
+from robocov_app.sweep import worker
+from robocov_app.sweep.executors import LocalPool
+from robocov_app.sweep.ledger import Ledger, opened
+from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
+from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
+from robocov_app.terminal.interruption import Interruption
+
+STUDY_FILE = "paper.json"
+"""File that marks a folder as that of a study, quick or full."""
+_HEAD = {"format": "robocov-paper", "version": 1}
+
+
+class StudyInterrupted(Exception):  # noqa: N818 - it is no error
+    """The user has pressed Ctrl-C."""
+
+
+@dataclass(frozen=True)
+class RunnerOptions:
+    """Options of the execution.
+
+    Parameters
+    ----------
+    workers : int
+        Maximum number of processes.
+    scheduler : str or None
+        Address of a Dask scheduler, whose workers execute the runs.
+    quiet : bool
+        Show no progress.
+    stop : Interruption
+    keep_versions : bool
+        Use runs of other versions of robocov and its dependencies.
+    """
+
+    workers: int
+    scheduler: str | None
+    quiet: bool
+    stop: Interruption
+    keep_versions: bool = False
+
+    def raise_if_stopped(self) -> None:
+        """Raise StudyInterrupted if the user has interrupted the study."""
+        if self.stop.requested:
+            raise StudyInterrupted
+
+
+def open_folder(folder: Path, plan: Plan) -> None:
+    """Create the folder of a study, or check that it is the folder of the same study.
+
+    Raises
+    ------
+    InputError
+        If the folder contains something else, or another study.
+    """
+    with report_folder_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        is_empty = not any(folder.iterdir())
+    path = folder / STUDY_FILE
+    if is_empty:
+        with replace_file(path) as part:
+            part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
+        return
+    problem = "the folder is not empty, and what is in it is no study of the paper"
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        content = json.loads(path.read_bytes())
+        if content["format"] == _HEAD["format"]:
+            if content["plan"] == plan.name:
+                return
+            problem = f"expected the {plan.name} study, got the {content['plan']} one"
+    raise InputError(f"{folder}: {problem}; choose another --out")
+
+
+def get_study_folder(folder: Path, name: str) -> Path:
+    """Return the folder of a sweep in the folder of a study."""
+    return folder / "studies" / name
+
+
+def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
+    """Run a sweep, and return its folder.
+
+    Raises
+    ------
+    StudyInterrupted
+        If the user has interrupted it.
+    """
+    target = get_study_folder(folder, name)
+    sweep(
+        study,
+        target,
+        title=f"paper: {name}",
+        workers=options.workers,
+        scheduler=options.scheduler,
+        quiet=options.quiet,
+        stop=options.stop,
+        keep_versions=options.keep_versions,
+    )
+    options.raise_if_stopped()
+    return target
+
+
+def run_studies(studies: Mapping[str, Study], folder: Path, options: RunnerOptions, title: str) -> None:
+    """Run several sweeps with one pool of processes.
+
+    Most of them are so small that starting processes takes longer than their runs. Each sweep has its own
+    folder and table, as if it had been run alone.
+
+    Parameters
+    ----------
+    studies : Mapping
+        Sweeps by name.
+    folder : Path
+        Folder of the study.
+    options : RunnerOptions
+    title : str
+        Title of the progress.
+
+    Raises
+    ------
+    StudyInterrupted
+        If the user has interrupted them.
+    """
+    uses_pool = options.scheduler is None
+    if uses_pool:
+        _run_in_one_pool(studies, folder, options, title)
+    options.raise_if_stopped()
+    # The runs of the pool have been reported. What is left is to write the tables.
+    quiet = options.quiet or uses_pool
+    for name, study in studies.items():
+        run_study(study, folder, name, replace(options, quiet=quiet))
+
+
+def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: RunnerOptions, title: str) -> None:
+    tasks: dict[str, Task] = {}
+    ledgers: dict[str, list[Ledger]] = {}  # Two sweeps may have a task in common.
+    notes = []
+
+    def store(task: Task, outcome: worker.Outcome) -> None:
+        for ledger in ledgers[task.digest]:
+            ledger.keep(task, outcome)
+
+    with ExitStack() as stack:
+        for name, study in studies.items():
+            ledger = stack.enter_context(opened(get_study_folder(folder, name), study.to_json()))
+            survey = ledger.survey(tasks_of(study), keep_versions=options.keep_versions)
+            for task in compress(tasks_of(study), survey.todo):
+                tasks[task.digest] = task
+                ledgers.setdefault(task.digest, []).append(ledger)
+            notes += [f"{name}: {line}" for line in survey.words(keep_versions=options.keep_versions)]
+        if not tasks and not notes:
+            return
+        count = Count(len(tasks))
+        workers = min(options.workers, len(tasks))
+        tell = stack.enter_context(sweep_progress(title, count, quiet=options.quiet))
+        for note in notes:
+            tell.say(note)
+        for _ in worked_off(tasks.values(), lambda: LocalPool(workers), count, options.stop, store):
+            tell(count)
+
+
+def find_map_references(
+    maps: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions
+) -> References:
+    """Return the reference placements of maps, stored ones and new ones.
+
+    Raises
+    ------
+    StudyInterrupted
+        If the user has interrupted the search.
+    """
+    references = find_references(
+        maps, folder / "references", plan, options.workers, options.stop, quiet=options.quiet
+    )
+    options.raise_if_stopped()
+    return references
