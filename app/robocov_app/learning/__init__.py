@@ -1,21 +1,21 @@
 """Learning environments: the simulation for gymnasium and PettingZoo (``pip install "robocov[rl]"``).
 
 `CoverageParallelEnv` has one learner for each robot, `CoverageEnv` one for all of them, `CoverageVectorEnv`
-many of these at once; all take what a `CoverageTask` says, and their observations are those of an
-`ObservationLayout`. What is learned becomes a controller as a `PolicyController`; a controller acts in the
-environments as a `ControllerPolicy`.
+many of these at once. All are defined by a `CoverageTask`, and their observations by an `ObservationLayout`.
+A learned policy becomes a controller as a `PolicyController`; a controller acts in the environments as a
+`ControllerPolicy`.
 
     import numpy as np
     from robocov_app.learning import CoverageEnv, ObservationLayout
 
-    layout = ObservationLayout(neighbours=2)
+    layout = ObservationLayout(neighbors=2)
     env = CoverageEnv(
         duration=20.0, dt=0.05, repeat=5, action="velocity", reward_every=999, observation=layout
     )
     offsets = [0, 1, 2, 3, 4, 5, 7, 8, 10, 11]  # x and y of all in an observation, without the masks
 
 
-    def law(gains):  # a velocity along each offset: away from neighbours, to the middle, ...
+    def law(gains):  # a velocity along each offset: away from neighbors, to the middle, ...
         return lambda rows: np.einsum("k,nkd->nd", gains, rows[:, offsets].reshape(len(rows), -1, 2))
 
 
@@ -48,24 +48,42 @@ from robocov.optional_imports import import_optional
 
 if TYPE_CHECKING:
     from robocov_app.learning.gym import CoverageEnv, CoverageVectorEnv
+    from robocov_app.learning.maps import GeneratedMaps
+    from robocov_app.learning.observation_layout import ObservationLayout
     from robocov_app.learning.parallel import CoverageParallelEnv
     from robocov_app.learning.policy import ControllerPolicy, PolicyController
-    from robocov_app.learning.task import CoverageTask, GeneratedMaps, ObservationLayout
+    from robocov_app.learning.task import CoverageTask
 
-__all__ = ["ControllerPolicy", "CoverageEnv", "CoverageParallelEnv", "CoverageTask", "CoverageVectorEnv"]
-__all__ += ["GeneratedMaps", "ObservationLayout", "PolicyController"]
-_HOME = dict.fromkeys(("ControllerPolicy", "PolicyController"), "policy")
-_HOME |= dict.fromkeys(("CoverageEnv", "CoverageVectorEnv"), "gym")
-_HOME |= dict.fromkeys(("CoverageTask", "GeneratedMaps", "ObservationLayout"), "task")
-_HOME["CoverageParallelEnv"] = "parallel"
-_NEEDED = {"gym": ("gymnasium",), "parallel": ("gymnasium", "pettingzoo")}  # packages of the extra
+__all__ = [
+    "ControllerPolicy",
+    "CoverageEnv",
+    "CoverageParallelEnv",
+    "CoverageTask",
+    "CoverageVectorEnv",
+    "GeneratedMaps",
+    "ObservationLayout",
+    "PolicyController",
+]
+_MODULES = {
+    "ControllerPolicy": "policy",
+    "CoverageEnv": "gym",
+    "CoverageParallelEnv": "parallel",
+    "CoverageTask": "task",
+    "CoverageVectorEnv": "gym",
+    "GeneratedMaps": "maps",
+    "ObservationLayout": "observation_layout",
+    "PolicyController": "policy",
+}
+"""Module of each public name."""
+_EXTRA_PACKAGES = {"gym": ("gymnasium",), "parallel": ("gymnasium", "pettingzoo")}
+"""Packages of the extra that modules need."""
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = _HOME[name]
-    for package in _NEEDED.get(module, ()):
+    module = _MODULES[name]
+    for package in _EXTRA_PACKAGES.get(module, ()):
         import_optional(package, "rl")
     value = getattr(importlib.import_module(f"{__name__}.{module}"), name)
     globals()[name] = value

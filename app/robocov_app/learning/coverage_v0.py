@@ -1,4 +1,4 @@
-"""The environment as PettingZoo lays its own out: `parallel_env`, and `env` where robots act in turn."""
+"""The environment under PettingZoo's usual names: `parallel_env`, and `env` for robots that act in turn."""
 
 from typing import Any
 
@@ -12,7 +12,13 @@ parallel_env = CoverageParallelEnv
 
 
 def env(**options: Any) -> Any:
-    """Return PettingZoo's ``AECEnv`` of it: the same, but the robots say one by one what they do."""
+    """Return the environment as PettingZoo's ``AECEnv``, in which the robots report their actions in turn.
+
+    Parameters
+    ----------
+    **options
+        Options of `CoverageParallelEnv`.
+    """
     return parallel_to_aec(parallel_env(**options))
 
 

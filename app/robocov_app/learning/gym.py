@@ -1,7 +1,7 @@
 """One learner for the whole team: an environment of gymnasium, registered as ``robocov/Coverage-v0``.
 
 Importing this module registers it; ``gymnasium.make("robocov_app.learning.gym:robocov/Coverage-v0")`` does
-both. (gymnasium knows no entry points of packages any more.) ``gymnasium.make_vec`` makes a
+both, because gymnasium no longer supports entry points of packages. ``gymnasium.make_vec`` makes a
 `CoverageVectorEnv` with ``vectorization_mode="vector_entry_point"``.
 """
 
@@ -15,78 +15,151 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from robocov.arrays import Array
-from robocov_app.learning import episode as episodes
-from robocov_app.learning.episode import EpisodeEnv, Outcome, Place, SharedSimulation
-from robocov_app.learning.task import CoverageTask, Rows, Scenarios, action_limit, changed_task
+from robocov_app.learning.actions import check_actions, compute_action_limits
+from robocov_app.learning.environment import EpisodeEnv, draw_episode
+from robocov_app.learning.episode import ActionOutcome, SharedRun, SharedSimulation
+from robocov_app.learning.maps import MapSampler
+from robocov_app.learning.observation_layout import Rows
+from robocov_app.learning.task import CoverageTask, change_task
 
 ID = "robocov/Coverage-v0"
+"""Name of the registered environment."""
 
 
 class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """A team that one learner steers, who is told what all robots know: gymnasium's ``Env``.
+    """A team that one learner drives with the knowledge of all robots: gymnasium's ``Env``.
 
-    Observations are the robots' rows of the task's `ObservationLayout` below each other, (n, size) float32
-    from -1 to 1, zero for a robot that has failed, or not yet joined; actions one row for each robot, (n, 2),
-    forces in N or velocities in m/s, held for `CoverageTask.repeat` control periods. The reward is the mean
-    of what `CoverageParallelEnv` gives each robot.
+    Observations are the robots' rows of the task's `ObservationLayout`, (n, size) float32 from -1 to 1, zero
+    for a robot that has failed or not yet joined. Actions have one row for each robot, (n, 2), forces in N or
+    velocities in m/s, held for `CoverageTask.repeat` control periods. The reward is the mean of the robots'
+    rewards in `CoverageParallelEnv`.
 
-    An episode is truncated after `CoverageTask.duration`, and ends when no robot is left. The same seed and
-    actions give the same episode, bit for bit. The `options` are those of
-    `robocov_app.learning.episode.EpisodeEnv`, with changes of the task, as in
-    ``gymnasium.make(..., maps="museum", robots=4)``.
+    An episode is truncated after `CoverageTask.duration`, and ends when no robot works. The same seed and
+    actions give the same episode, bit for bit.
 
-    Raises InputError when the task makes no sense or a map cannot be read.
+    Parameters
+    ----------
+    task : CoverageTask, optional
+        By default the task with all defaults.
+    **options
+        Options of `robocov_app.learning.environment.EpisodeEnv`, with attributes of the task that differ, as
+        in ``gymnasium.make(..., maps="museum", robots=4)``.
+
+    Attributes
+    ----------
+    shared_run : SharedRun or None
+        A simulation that is shared with other environments.
+    next_outcome : ActionOutcome or None
+        Outcome of the next action, if the shared simulation has already executed it.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range.
+    InputError
+        If a map cannot be read.
     """
 
-    place: "Place | None" = None
-    outcome: Outcome | None = None
+    shared_run: "SharedRun | None" = None
+    next_outcome: ActionOutcome | None = None
 
     def __init__(self, task: CoverageTask | None = None, **options: Any) -> None:
         super().__init__(task, **options)
         low, high = (np.tile(row, (self.task.robots, 1)) for row in self.task.observation.bounds)
         self.observation_space = Box(low, high, dtype=np.float32)
-        limit = np.tile(action_limit(self.task.action, self.task.whole_team)[:, None], (1, 2))
-        self.action_space = Box(-limit.astype(np.float32), limit.astype(np.float32), dtype=np.float32)
+        limits = compute_action_limits(self.task.action, self.task.whole_team)
+        high_actions = np.tile(limits[:, None], (1, 2)).astype(np.float32)
+        self.action_space = Box(-high_actions, high_actions, dtype=np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Rows, dict[str, Any]]:
-        """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
+        """Start an episode.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Without a seed, the sequence of random numbers continues.
+        options : dict, optional
+            As in `robocov_app.learning.environment.draw_episode`.
+
+        Returns
+        -------
+        observation : (n, size) array
+        info : dict
+        """
         gymnasium.Env.reset(self, seed=seed)
-        self.outcome = None
-        self.episode = episodes.drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
-        self._show()
-        info = self._info(np.zeros(self.task.robots))
-        return self._rows(), {**info, "map": self.episode.environment.name}
+        self.next_outcome = None
+        self.episode = draw_episode(self.task, self._sampler, self.np_random, options, self.shared_run)
+        self._update_window()
+        info = self._build_info(np.zeros(self.task.robots))
+        return self._build_rows(), {**info, "map": self.episode.environment.name}
 
     def step(self, action: Any) -> tuple[Rows, float, bool, bool, dict[str, Any]]:
-        """Let the team act, and return observation, reward, termination, truncation and info."""
-        episode = self._present()
-        outcome, self.outcome = self.outcome or episode.advance(action), None
-        self._show()
-        ended, over = not episode.working.any(), episode.cycle >= self.task.cycles
-        reward = float(outcome.rewards.sum()) / len(episode.team)
-        return self._rows(), reward, ended, over, self._info(outcome.contact)
+        """Execute the actions of the team.
 
-    def _rows(self) -> Rows:
-        rows = self._present().observations()
-        rows[~self._present().working] = 0.0
+        Parameters
+        ----------
+        action : (n, 2) array_like, N or m/s
+
+        Returns
+        -------
+        observation : (n, size) array
+        reward : float
+        terminated, truncated : bool
+        info : dict
+        """
+        episode = self._get_episode()
+        outcome = self.next_outcome or episode.advance(action)
+        self.next_outcome = None
+        self._update_window()
+        is_terminated = not episode.working.any()
+        is_truncated = episode.cycle >= self.task.cycles
+        reward = float(outcome.rewards.sum()) / len(episode.team)
+        info = self._build_info(outcome.contact_time)
+        return self._build_rows(), reward, is_terminated, is_truncated, info
+
+    def _build_rows(self) -> Rows:
+        episode = self._get_episode()
+        rows = episode.build_rows()
+        rows[~episode.working] = 0.0
         return rows
 
-    def _info(self, contact: Array) -> dict[str, Any]:
-        episode = self._present()
-        return {**episode.facts(), "contact_s": contact.copy(), "working": episode.working.copy()}
+    def _build_info(self, contact_time: Array) -> dict[str, Any]:
+        episode = self._get_episode()
+        return {
+            **episode.summarize(),
+            "contact_s": contact_time.copy(),
+            "working": episode.working.copy(),
+        }
 
 
 class CoverageVectorEnv(SyncVectorEnv):
-    """Many of `CoverageEnv` in one process, several times as quick: gymnasium's ``VectorEnv``.
+    """Many environments `CoverageEnv` in one process, several times as fast: gymnasium's ``VectorEnv``.
 
-    Each environment is what it is alone, bit for bit: with ``reset(seed=s)`` that of the seed s + k.
-    Those on one map without conditions and moving obstacles are moved on together, others one by one.
-    `autoreset_mode` says when an episode that is over is followed by the next one, `render_mode` is that of
-    each environment, and `changes` are of the task.
+    Each environment behaves exactly as it would alone, bit for bit: with ``reset(seed=s)`` environment k as
+    with the seed s + k. Environments on one map without conditions and moving obstacles are advanced
+    together, others one by one.
 
-    Raises InputError when the task makes no sense or a map cannot be read.
+    Parameters
+    ----------
+    num_envs : int
+        Number of environments.
+    task : CoverageTask, optional
+        By default the task with all defaults.
+    autoreset_mode : str or gymnasium.vector.AutoresetMode
+        When the next episode follows one that is over.
+    render_mode : str, optional
+        Render mode of each environment.
+    **changes
+        Attributes of the task that differ.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range.
+    InputError
+        If a map cannot be read.
     """
 
     def __init__(
@@ -98,36 +171,39 @@ class CoverageVectorEnv(SyncVectorEnv):
         render_mode: str | None = None,
         **changes: Any,
     ) -> None:
-        self.task = changed_task(task, changes)
-        scenarios = Scenarios(self.task.maps, self.task.lattice)
-        make = partial(CoverageEnv, self.task, scenarios=scenarios, render_mode=render_mode)
+        self.task = change_task(task, changes)
+        sampler = MapSampler(self.task.maps, self.task.lattice)
+        make = partial(CoverageEnv, self.task, sampler=sampler, render_mode=render_mode)
         super().__init__([make] * num_envs, autoreset_mode=autoreset_mode)
-        self._teams = cast("list[CoverageEnv]", self.envs)
-        ideal = self.task.conditions is None or self.task.conditions.is_ideal
-        self._shared: SharedSimulation | None = None
-        if (
-            scenarios.only is not None
-            and not scenarios.only.has_moving_obstacles
-            and ideal
-            and not self.task.recording
-        ):
-            self._shared = SharedSimulation(self.task, scenarios.only, num_envs)
-            for run, env in enumerate(self._teams):
-                env.place = self._shared, run
+        self._environments = cast("list[CoverageEnv]", self.envs)
+        self._shared = self._share_simulation(sampler)
+
+    def _share_simulation(self, sampler: MapSampler) -> SharedSimulation | None:
+        """Let all environments share a simulation, if the task allows it."""
+        only_map = sampler.only_map
+        is_ideal = self.task.conditions is None or self.task.conditions.is_ideal
+        if only_map is None or only_map.has_moving_obstacles or not is_ideal or self.task.recording:
+            return None
+        simulation = SharedSimulation(self.task, only_map, self.num_envs)
+        for run, environment in enumerate(self._environments):
+            environment.shared_run = SharedRun(simulation, run)
+        return simulation
 
     def step(self, actions: Any) -> Any:
-        """Let all teams act, and return observations, rewards, terminations, truncations and infos."""
-        begun_now = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
-        values, together = np.zeros((self.num_envs, self.task.robots, 2)), {}
-        for run, (env, action) in enumerate(zip(self._teams, actions, strict=True)):
-            if not begun_now[run]:
-                values[run] = episodes.checked_actions(action, self.task.robots)
-                if env.episode is not None and env.episode.shared is not None:
-                    together[run] = env.episode
-        if self._shared is not None and together:
-            for run, outcome in self._shared.advance(values, together).items():
-                self._teams[run].outcome = outcome
-        return super().step(values)
+        """Execute the actions of all teams, and return the results as gymnasium does."""
+        is_restarted = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
+        checked = np.zeros((self.num_envs, self.task.robots, 2))
+        shared_episodes = {}
+        for run, (environment, action) in enumerate(zip(self._environments, actions, strict=True)):
+            if is_restarted[run]:
+                continue
+            checked[run] = check_actions(action, self.task.robots)
+            if environment.episode is not None and environment.episode.shared is not None:
+                shared_episodes[run] = environment.episode
+        if self._shared is not None and shared_episodes:
+            for run, outcome in self._shared.advance(checked, shared_episodes).items():
+                self._environments[run].next_outcome = outcome
+        return super().step(checked)
 
 
 gymnasium.register(

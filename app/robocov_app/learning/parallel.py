@@ -10,27 +10,44 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
+from robocov.arrays import Array
 from robocov.errors import ParameterError, quote
-from robocov_app.learning.episode import EpisodeEnv, drawn_episode
-from robocov_app.learning.task import CoverageTask, Rows, action_limit
+from robocov_app.learning.actions import compute_action_limits
+from robocov_app.learning.environment import EpisodeEnv, draw_episode
+from robocov_app.learning.observation_layout import Rows
+from robocov_app.learning.task import CoverageTask
 
-_T = TypeVar("_T")
+_Value = TypeVar("_Value")
 Flags: TypeAlias = dict[str, bool]
+"""A flag for each agent."""
 Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]
+"""Observations, rewards, terminations, truncations and infos by agent."""
 
 
 class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
-    """A team that learns to cover, each robot by what it knows: PettingZoo's ``ParallelEnv``.
+    """A team of learners, each with the knowledge of one robot: PettingZoo's ``ParallelEnv``.
 
     The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's `ObservationLayout`:
     float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for
     `CoverageTask.repeat` control periods. An episode is truncated after `CoverageTask.duration`, or after
     `max_cycles` actions. The same seed and actions give the same episode, bit for bit.
 
-    The `options` are those of `robocov_app.learning.episode.EpisodeEnv`, with changes of the task, as in
-    ``CoverageParallelEnv(maps="museum", robots=4)``.
+    Parameters
+    ----------
+    task : CoverageTask, optional
+        By default the task with all defaults.
+    max_cycles : int, optional
+        Maximum number of actions, by default as many as fit into the duration.
+    **options
+        Options of `robocov_app.learning.environment.EpisodeEnv`, with attributes of the task that differ, as
+        in ``CoverageParallelEnv(maps="museum", robots=4)``.
 
-    Raises InputError when the task makes no sense or a map cannot be read.
+    Raises
+    ------
+    ParameterError
+        If a value is out of range.
+    InputError
+        If a map cannot be read.
     """
 
     metadata = EpisodeEnv.metadata | {"name": "robocov_coverage_v0", "is_parallelizable": True}
@@ -46,10 +63,12 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         self.agents: list[str] = []
         self._rng = np.random.default_rng()
         low, high = self.task.observation.bounds
-        limits = action_limit(self.task.action, self.task.whole_team).tolist()
         self.observation_spaces = {agent: Box(low, high, dtype=np.float32) for agent in self.possible_agents}
-        boxes = (Box(-limit, limit, (2,), np.float32) for limit in limits)
-        self.action_spaces = dict(zip(self.possible_agents, boxes, strict=True))
+        limits = compute_action_limits(self.task.action, self.task.whole_team).tolist()
+        self.action_spaces = {
+            agent: Box(-limit, limit, (2,), np.float32)
+            for agent, limit in zip(self.possible_agents, limits, strict=True)
+        }
         self.state_space = Box(-1.0, 1.0, (4 * self.task.robots,), np.float32)
 
     def observation_space(self, agent: str) -> Box:
@@ -63,20 +82,65 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, Rows], dict[str, dict[str, Any]]]:
-        """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
+        """Start an episode.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Without a seed, the sequence of random numbers continues.
+        options : Mapping, optional
+            As in `robocov_app.learning.environment.draw_episode`.
+
+        Returns
+        -------
+        observations, infos : dict
+            By agent.
+        """
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
-        self.episode = drawn_episode(self.task, self._scenarios, self._rng, options)
+        self.episode = draw_episode(self.task, self._sampler, self._rng, options)
         self.agents = list(compress(self.possible_agents, self.episode.working))
-        self._show()
-        told = {**self.episode.facts(), "contact_s": 0.0, "map": self.episode.environment.name}
-        infos = {agent: dict(told) for agent in self.possible_agents}
-        return self._of(self.agents, self.episode.observations()), infos
+        self._update_window()
+        info = {**self.episode.summarize(), "contact_s": 0.0, "map": self.episode.environment.name}
+        infos = {agent: dict(info) for agent in self.possible_agents}
+        return self._select(self.agents, self.episode.build_rows()), infos
 
     def step(self, actions: Mapping[str, Any]) -> Step:
-        """Let every robot act, and return observations, rewards, terminations, truncations and infos."""
-        episode = self._present()
-        values = np.zeros((self.task.robots, 2))
+        """Execute the actions of all robots.
+
+        Parameters
+        ----------
+        actions : Mapping
+            Actions by agent, (2,) N or m/s.
+
+        Returns
+        -------
+        observations, rewards, terminations, truncations, infos : dict
+            By agent, of all robots that worked before or work after the actions.
+        """
+        episode = self._get_episode()
+        checked = self._check_actions(actions)
+        acting = self.agents
+        is_over = episode.cycle + 1 >= self.max_cycles
+        outcome = episode.advance(checked, is_last=is_over)
+        self.agents = list(compress(self.possible_agents, episode.working))
+        reported = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
+        # A robot that has failed does not work again: its episode has ended.
+        terminations = {agent: agent not in self.agents for agent in reported}
+        truncations = {agent: is_over and not terminations[agent] for agent in reported}
+        observations = self._select(reported, episode.build_rows())
+        rewards = self._select(reported, outcome.rewards.tolist())
+        contact_times = self._select(reported, outcome.contact_time.tolist())
+        summary = episode.summarize()
+        infos = {agent: {**summary, "contact_s": seconds} for agent, seconds in contact_times.items()}
+        if is_over:
+            self.agents = []
+        self._update_window()
+        return observations, rewards, terminations, truncations, infos
+
+    def _check_actions(self, actions: Mapping[str, Any]) -> Array:
+        """Return the actions of all robots, (n, 2), zero for those that do not act."""
+        checked = np.zeros((self.task.robots, 2))
         for robot, agent in enumerate(self.possible_agents):
             if agent not in self.agents:
                 continue
@@ -86,29 +150,17 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
             with suppress(TypeError, ValueError):
                 action = np.asarray(actions[agent], dtype=np.float64)
             if action.shape != (2,) or not np.isfinite(action).all():
-                found = quote(actions[agent])
-                raise ParameterError(f"action of {agent}: expected two finite numbers, got {found}")
-            values[robot] = action
-        acting, over = self.agents, episode.cycle + 1 >= self.max_cycles
-        outcome = episode.advance(values, last=over)
-        self.agents = list(compress(self.possible_agents, episode.working))
-        told = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
-        # who has failed will not come back: for it the episode has ended
-        ended = {agent: agent not in self.agents for agent in told}
-        truncated = {agent: over and not ended[agent] for agent in told}
-        observations, rewards = self._of(told, episode.observations()), outcome.rewards.tolist()
-        touched, common = self._of(told, outcome.contact.tolist()), episode.facts()
-        infos = {agent: {**common, "contact_s": seconds} for agent, seconds in touched.items()}
-        if over:
-            self.agents = []
-        self._show()
-        return observations, self._of(told, rewards), ended, truncated, infos
+                raise ParameterError(
+                    f"action of {agent}: expected two finite numbers, got {quote(actions[agent])}"
+                )
+            checked[robot] = action
+        return checked
 
     def state(self) -> Rows:
-        """Return where all robots are and how fast, for critics: see `Episode.state`."""
-        return self._present().state()
+        """Return positions and velocities of all robots, for critics: see `Episode.build_state`."""
+        return self._get_episode().build_state()
 
-    def _of(self, agents: list[str], values: Iterable[_T]) -> dict[str, _T]:
-        """Return the values of some of the agents, of one for each robot."""
-        every = dict(zip(self.possible_agents, values, strict=True))
-        return {agent: every[agent] for agent in agents}
+    def _select(self, agents: list[str], values: Iterable[_Value]) -> dict[str, _Value]:
+        """Return the values of some agents from those of all robots."""
+        by_agent = dict(zip(self.possible_agents, values, strict=True))
+        return {agent: by_agent[agent] for agent in agents}

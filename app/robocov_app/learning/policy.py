@@ -15,47 +15,67 @@ from robocov.errors import ParameterError, require_type
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.team import Team
-from robocov_app.learning import task as tasks
+from robocov_app.learning.actions import ACTIONS, Action, compute_actions, compute_driving_forces
 from robocov_app.learning.episode import Episode
-from robocov_app.learning.task import Action, ObservationLayout, actions_of, driving_forces
+from robocov_app.learning.observation_layout import ObservationLayout
+from robocov_app.learning.task import check_kind
 
 Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
-"""From an observation, (size,), to an action, (2,)."""
-_SOON = 5e-7  # seconds that sums of control periods may miss
+"""Returns the action of a robot, (2,), for its observation, (size,)."""
+_TIME_TOLERANCE_S = 5e-7
+"""Tolerance for sums of control periods."""
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """Memory of a policy: its last actions, (n, 2) N or m/s, and when the next are due, s."""
+class PolicyMemory:
+    """Memory of a policy.
+
+    Parameters
+    ----------
+    team : Team
+    actions : (n, 2) array, N or m/s, optional
+        The last actions; None before the first ones.
+    next_time : float
+        Time of the next decision, s.
+    """
 
     team: Team
     actions: Array | None = None
-    due: float = -np.inf
+    next_time: float = -np.inf
 
 
 @dataclass(frozen=True)
 class PolicyController:
-    """A controller that does what a policy says, decided as often and observed as in training.
+    """A controller that executes a policy, with the decisions and observations of the training.
 
-    The policy is asked for each robot alone, with its own row of the observations: that it uses nothing
-    that the robot does not know is so by construction. For the command line a class is wanted that has the
-    policy in it::
+    The policy is called for each robot alone, with its own row of the observations, so that it can only use
+    what the robot knows. The command line needs a class that contains the policy::
 
         # mine.py
         @dataclass(frozen=True)
         class MyPolicy(PolicyController):
-            layout: ObservationLayout = ObservationLayout(neighbours=4)
+            layout: ObservationLayout = ObservationLayout(neighbors=4)
 
             def act(self, observation):
                 return observation @ WEIGHTS
 
     and ``robocov run rooms --controller mine.py:MyPolicy``.
 
-    `policy` makes an action, (2,) in N or m/s, of an observation, (size,) float32, and is None where a
-    subclass has `act`; `period` is the time for which an action is held, `CoverageTask.period` in training.
+    Parameters
+    ----------
+    policy : callable, optional
+        Returns an action, (2,) in N or m/s, for an observation, (size,) float32. A subclass with a method
+        `act` needs none.
+    layout : ObservationLayout
+    action : str
+        Kind of the actions.
+    period : float
+        Time for which an action is held, s, as `CoverageTask.period` in training.
 
-    Raises ParameterError when an attribute makes no sense, or the policy gives something else than two
-    numbers.
+    Raises
+    ------
+    ParameterError
+        If an attribute is invalid, or the policy does not return two numbers.
 
     Examples
     --------
@@ -74,7 +94,7 @@ class PolicyController:
     period: float = gain(0.1, "s", "for which an action is held")
 
     def __post_init__(self) -> None:
-        tasks.checked_kind("action", self.action, tasks.ACTIONS)
+        check_kind("action", self.action, ACTIONS)
         require_type("layout", self.layout, ObservationLayout, "an ObservationLayout")
         validate_gains(self)
 
@@ -85,37 +105,55 @@ class PolicyController:
 
     @property
     def scanning(self) -> Scanning | None:
+        """Scans that the observations need."""
         return Scanning(self.layout.rays, self.period) if self.layout.rays else None
 
     def act(self, observation: NDArray[np.float32]) -> Any:
-        """Return the action of one robot, (2,), from its observation, (size,)."""
+        """Return the action of one robot, (2,), for its observation, (size,)."""
         if self.policy is None:
             raise ParameterError(f"{self.name}: expected a policy or a method act(observation)")
         return self.policy(observation)
 
-    def begin(self, region: Region, team: Team) -> Held:
-        return Held(team)
+    def begin(self, region: Region, team: Team) -> PolicyMemory:
+        """Return the memory before the first decision."""
+        return PolicyMemory(team)
 
-    def decide(self, seen: Observations, memory: Held) -> Decision:
-        """Return the forces of the actions, which are asked for when they are due."""
-        due = seen.time >= memory.due - _SOON if not self.layout.rays else seen.scans is not None
-        if memory.actions is None or due:
-            rows = self.layout.rows(seen, memory.team)
-            given = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
-            if wrong := [action.shape for action in given if action.shape != (2,)]:
-                raise ParameterError(f"{self.name}: expected an action of shape (2,), got {wrong[0]}")
-            memory = Held(memory.team, np.array(given), seen.time + self.period)
-        assert memory.actions is not None
-        forces = driving_forces(self.action, memory.actions, seen.velocities, memory.team)
+    def decide(self, seen: Observations, memory: PolicyMemory) -> Decision:
+        """Return the forces of the actions, which are decided again in each period."""
+        actions = memory.actions
+        if actions is None or self._is_due(seen, memory):
+            actions = self._compute_actions(seen, memory.team)
+            memory = PolicyMemory(memory.team, actions, next_time=seen.time + self.period)
+        forces = compute_driving_forces(self.action, actions, seen.velocities, memory.team)
         return Decision(forces, memory=memory)
+
+    def _is_due(self, seen: Observations, memory: PolicyMemory) -> bool:
+        """Return whether new actions are due: with rays, when there are new scans."""
+        if self.layout.rays:
+            return seen.scans is not None
+        return seen.time >= memory.next_time - _TIME_TOLERANCE_S
+
+    def _compute_actions(self, seen: Observations, team: Team) -> Array:
+        rows = self.layout.build_rows(seen, team)
+        actions = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
+        for action in actions:
+            if action.shape != (2,):
+                raise ParameterError(f"{self.name}: expected an action of shape (2,), got {action.shape}")
+        return np.array(actions)
 
 
 class ControllerPolicy:
-    """Says what a controller would do in the present state of a learning environment.
+    """A policy that returns the actions of a controller in the present state of a learning environment.
 
-    It knows what the controller knows, not the observations that learners get; with ``repeat=1`` an episode
-    is the same as a run, bit for bit. Scans that it wants are taken without the noise of any conditions.
+    It has the knowledge of the controller, not the observations of learners. With ``repeat=1`` an episode
+    is the same as a run, bit for bit. Its scans are without the noise of any conditions.
 
+    Parameters
+    ----------
+    controller : Controller
+
+    Examples
+    --------
     ::
 
         expert = ControllerPolicy(rc.Rapf())
@@ -127,43 +165,64 @@ class ControllerPolicy:
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
         self._episode: Episode | None = None
-        self._law: Any = None
+        self._informed: Any = None
         self._memory: Any = None
+        self._decision_cycle = -1
+        self._scan_number = -1
         self._actions = np.empty((0, 2))
 
     def __call__(self, env: Any) -> Any:
-        """Return the actions of a team: by agent for a parallel environment, else (n, 2) N or m/s.
+        """Return the actions of the team.
 
-        What the controller remembers begins anew with each episode. Asked twice about the same moment it
-        says the same. The environment, `CoverageParallelEnv` or `CoverageEnv`, may be wrapped.
+        The controller starts without memory in each episode. Several calls at the same time return the same
+        actions.
+
+        Parameters
+        ----------
+        env : CoverageParallelEnv or CoverageEnv
+            It may be wrapped.
+
+        Returns
+        -------
+        dict or (n, 2) array, N or m/s
+            Actions by agent for a parallel environment, an array for others.
         """
         bare = env.unwrapped
-        actions = self._decided(bare.episode).copy()
+        actions = self._update_actions(bare.episode).copy()
         if not hasattr(bare, "agents"):
             return actions
-        rows = dict(zip(bare.possible_agents, actions, strict=True))
-        return {agent: rows[agent] for agent in bare.agents}
+        by_agent = dict(zip(bare.possible_agents, actions, strict=True))
+        return {agent: by_agent[agent] for agent in bare.agents}
 
-    def _decided(self, episode: Episode) -> Array:
+    def _update_actions(self, episode: Episode) -> Array:
         if self._episode is not episode:
-            self._episode, self._asked_at, self._scan_number = episode, -1, -1
-            self._law = inform_controller(self.controller, episode.environment)
-            self._memory = self._law.begin(episode.environment.region, episode.team)
-        if self._asked_at != episode.cycle:
-            seen = replace(episode.observe(), scans=self._scanned(episode))
-            decision = self._law.decide(seen, self._memory)
-            self._memory, self._asked_at = decision.memory, episode.cycle
-            self._actions = actions_of(episode.task.action, decision.forces, seen.velocities, episode.team)
+            self._start(episode)
+        if self._decision_cycle != episode.cycle:
+            seen = replace(episode.observe(), scans=self._scan(episode))
+            decision = self._informed.decide(seen, self._memory)
+            self._memory = decision.memory
+            self._decision_cycle = episode.cycle
+            self._actions = compute_actions(
+                episode.task.action, decision.forces, seen.velocities, episode.team
+            )
         return self._actions
 
-    def _scanned(self, episode: Episode) -> Scans | None:
-        """Return a scan where the controller wants one, as often as in a run or at each decision."""
-        scanning: Scanning | None = getattr(self._law, "scanning", None)
+    def _start(self, episode: Episode) -> None:
+        self._episode = episode
+        self._decision_cycle = -1
+        self._scan_number = -1
+        self._informed = inform_controller(self.controller, episode.environment)
+        self._memory = self._informed.begin(episode.environment.region, episode.team)
+
+    def _scan(self, episode: Episode) -> Scans | None:
+        """Return a scan if the controller needs one, as often as in a run or at each decision."""
+        # Controllers in files of users may have no such attribute.
+        scanning: Scanning | None = getattr(self._informed, "scanning", None)
         if scanning is None:
             return None
         number = episode.cycle * episode.task.repeat // scanning.count_steps(episode.task.dt)
         if number == self._scan_number:
             return None
-        self._scan_number, simulation = number, episode.simulation
-        scans = simulation.sensor.scan(episode.positions, scanning.rays, episode.team.sensing_range)
-        return Scans(*scans)
+        self._scan_number = number
+        sensor = episode.simulation.sensor
+        return Scans(*sensor.scan(episode.positions, scanning.rays, episode.team.sensing_range))

@@ -15,8 +15,10 @@ from robocov.metrics import compute_clearances, count_contacts
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.learning import CoverageTask, ObservationLayout
-from robocov_app.learning.episode import Episode, drawn_episode
-from robocov_app.learning.task import Scenarios, reference_distance
+from robocov_app.learning.environment import draw_episode
+from robocov_app.learning.episode import Episode
+from robocov_app.learning.maps import MapSampler
+from robocov_app.learning.rewards import compute_reference_distance
 
 STARTS = np.array([[1.0, 1.0], [2.0, 1.0], [1.0, 2.0]])
 
@@ -45,7 +47,7 @@ def test_shared_rewards_sum_up_to_the_decrease_of_the_cost(cluttered: Environmen
     rewards = np.array(pushed(episode, 20))
     cost = CoverageCost(cluttered, 16)
     decrease = cost(STARTS).mean_distance - cost(episode.simulation.positions).mean_distance
-    unit = reference_distance(cluttered.free_area, 3)
+    unit = compute_reference_distance(cluttered.free_area, 3)
     assert (rewards == rewards[:, :1]).all()
     assert rewards.sum(axis=0) == pytest.approx(decrease / unit, abs=1e-12)
     assert np.abs(rewards).max() > 0.001
@@ -65,7 +67,7 @@ def test_rewarding_less_often_rewards_the_same_in_all(cluttered: Environment, re
 def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None:
     episode = begun(cluttered, reward_every=100)
     assert not episode.advance(np.ones((3, 2))).rewards.any()
-    assert episode.advance(np.ones((3, 2)), last=True).rewards.any()
+    assert episode.advance(np.ones((3, 2)), is_last=True).rewards.any()
 
 
 def test_contacts_are_told_and_cost(empty: Environment) -> None:
@@ -77,9 +79,9 @@ def test_contacts_are_told_and_cost(empty: Environment) -> None:
     for _ in range(15):
         before = episode.result.mean_distance
         outcome = episode.advance(forces)
-        touched += outcome.contact
+        touched += outcome.contact_time
         decrease = (before - episode.result.mean_distance) / episode.reference
-        np.testing.assert_allclose(outcome.rewards, decrease - 0.5 * outcome.contact, atol=1e-12)
+        np.testing.assert_allclose(outcome.rewards, decrease - 0.5 * outcome.contact_time, atol=1e-12)
     record = episode.record()
     clear = compute_clearances(record)
     expected = ((clear[1:] <= 1e-3) * record.dt).sum(axis=0)
@@ -91,7 +93,7 @@ def test_contacts_are_told_and_cost(empty: Environment) -> None:
 def test_two_that_touch(empty: Environment) -> None:
     episode = begun(empty, np.array([[5.0, 5.0], [5.5, 5.0], [8.0, 8.0]]))
     towards = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 0.0]])
-    touched = sum(episode.advance(towards).contact for _ in range(12))
+    touched = sum(episode.advance(towards).contact_time for _ in range(12))
     assert touched[0] == touched[1] > 0.1 and touched[2] == 0.0
 
 
@@ -100,7 +102,7 @@ def test_one_that_has_not_joined_is_not_touched(empty: Environment) -> None:
     absent = Conditions(joins=((2, 100.0),))
     episode = begun(empty, np.array([[4.0, 5.0], [5.0, 5.0]]), conditions=absent, recording=True)
     forces = np.array([[3.0, 0.0], [3.0, 0.0]])
-    assert not any(episode.advance(forces).contact.any() for _ in range(25))
+    assert not any(episode.advance(forces).contact_time.any() for _ in range(25))
     assert episode.simulation.positions[0, 0] > 5.5
     assert not episode.record().forces[:, 1].any()
 
@@ -147,7 +149,7 @@ def test_an_episode_goes_on_when_nobody_is_left(empty: Environment) -> None:
     episode = begun(empty, conditions=gone)
     rewards = pushed(episode, 4)
     assert not episode.working.any() and not np.array(rewards[2:]).any()
-    assert np.isfinite(episode.observations()).all()
+    assert np.isfinite(episode.build_rows()).all()
 
 
 def test_obstacles_that_move_count_where_they_are(empty: Environment) -> None:
@@ -168,7 +170,7 @@ def test_scans_are_those_of_the_moment(cluttered: Environment) -> None:
         distances, hit = episode.simulation.sensor.scan(
             episode.simulation.positions, 12, episode.team.sensing_range
         )
-        rows = episode.observations()[:, place]
+        rows = episode.build_rows()[:, place]
         np.testing.assert_allclose(rows, np.where(hit, distances / 3.0, 1.0), atol=1e-6)
         assert hit.any()
         episode.advance(np.ones((3, 2)))
@@ -178,38 +180,38 @@ def test_state_is_where_all_are(empty: Environment) -> None:
     episode = begun(empty, action="velocity")
     for _ in range(8):
         episode.advance(np.full((3, 2), 0.4))
-    state = episode.state().reshape(3, 4)
+    state = episode.build_state().reshape(3, 4)
     np.testing.assert_allclose(state[:, :2] * np.hypot(10, 10) + 5.0, episode.simulation.positions, atol=1e-5)
     np.testing.assert_allclose(state[:, 2:], 0.4, atol=0.01)
 
 
 def test_what_is_drawn_and_what_is_given(empty: Environment, cluttered: Environment) -> None:
     task = CoverageTask(maps=[empty, cluttered], robots=3, start="*", lattice=8)
-    scenarios = Scenarios(task.maps, 8)
+    scenarios = MapSampler(task.maps, 8)
 
     def names(seed: int) -> list[tuple[str, bytes]]:
         rng = np.random.default_rng(seed)
-        episodes = [drawn_episode(task, scenarios, rng) for _ in range(6)]
+        episodes = [draw_episode(task, scenarios, rng) for _ in range(6)]
         return [(each.environment.name, each.simulation.positions.tobytes()) for each in episodes]
 
     assert names(1) == names(1) != names(2)
     assert {name for name, _ in names(1)} == {"empty", "cluttered"}
     rng = np.random.default_rng(0)
     given = {"map": cluttered, "start": "uniform", "start_seed": 7, "nothing": 1}
-    episode = drawn_episode(task, scenarios, rng, given)
+    episode = draw_episode(task, scenarios, rng, given)
     expected = cluttered.start("uniform").sample(3, seed=7)
     assert episode.environment is cluttered and np.array_equal(episode.simulation.positions, expected)
-    placed = drawn_episode(task, scenarios, rng, {"map": empty, "positions": STARTS.tolist()})
+    placed = draw_episode(task, scenarios, rng, {"map": empty, "positions": STARTS.tolist()})
     assert np.array_equal(placed.simulation.positions, STARTS)
 
 
 def test_conditions_are_seeded_anew(empty: Environment) -> None:
     task = CoverageTask(maps=empty, robots=3, lattice=8, conditions=Conditions(position_noise=0.1))
-    scenarios = Scenarios(empty, 8)
+    scenarios = MapSampler(empty, 8)
     rng = np.random.default_rng(0)
-    seeds = [drawn_episode(task, scenarios, rng).simulation.conditions.seed for _ in range(3)]
+    seeds = [draw_episode(task, scenarios, rng).simulation.conditions.seed for _ in range(3)]
     assert len(set(seeds)) == 3
-    given = drawn_episode(task, scenarios, rng, {"conditions_seed": 5})
+    given = draw_episode(task, scenarios, rng, {"conditions_seed": 5})
     assert given.simulation.conditions.seed == 5
 
 
@@ -221,8 +223,8 @@ def test_what_cannot_be_done(empty: Environment) -> None:
         episode.advance(np.array([[0.0, 0.0], [np.nan, 0.0], [0.0, 0.0]]))
     with pytest.raises(StartError, match="starts: expected one for each of 3 robots, got 2"):
         begun(empty, STARTS[:2], robots=3)
-    scenarios, rng = Scenarios(empty, 8), np.random.default_rng(0)
+    scenarios, rng = MapSampler(empty, 8), np.random.default_rng(0)
     overlapping, ragged = {"positions": [[5.0, 5.0]] * 3}, {"positions": [[1.0], [2.0, 1.0]]}
     for options in (overlapping, ragged, {"map": "nowhere"}, {"map": 3}, {"start": "nowhere"}):
         with pytest.raises(InputError):
-            drawn_episode(CoverageTask(maps=empty, robots=3), scenarios, rng, options)
+            draw_episode(CoverageTask(maps=empty, robots=3), scenarios, rng, options)

@@ -41,7 +41,7 @@ def told(layout: ObservationLayout, seen: Observations, robot: int, reach: float
     others = [k for k in range(len(seen.positions)) if k != robot]
     heard = [k for k in others if np.hypot(*(seen.positions[k] - [x, y])) <= reach]
     heard.sort(key=lambda k: (np.hypot(*(seen.positions[k] - [x, y])), k))
-    for rank in range(layout.neighbours):
+    for rank in range(layout.neighbors):
         if rank < len(heard):
             row += [*(seen.positions[heard[rank]] - [x, y]) / 10.0, 1.0]
         else:
@@ -61,7 +61,7 @@ def test_rows_are_what_they_are_documented_to_be(layout: ObservationLayout, reac
     positions = np.random.default_rng(n).uniform((0, 0), (8, 6), size=(n, 2))
     seen = seen_at(positions, reach, n, layout.rays)
     team = Team.homogeneous(n, max_speed=0.8, sensing_range=2.0, communication_range=reach)
-    rows = layout.rows(seen, team)
+    rows = layout.build_rows(seen, team)
     assert rows.dtype == np.float32 and rows.shape == (n, layout.size)
     for robot in range(n):
         np.testing.assert_allclose(rows[robot], told(layout, seen, robot, reach), atol=2e-6)
@@ -69,10 +69,10 @@ def test_rows_are_what_they_are_documented_to_be(layout: ObservationLayout, reac
 
 def test_blocks_are_all_of_a_row() -> None:
     layout = ObservationLayout(3, 8, True)
-    assert [*layout.blocks] == ["position", "velocity", "obstacle", "neighbour", "rays", "centroid"]
+    assert [*layout.blocks] == ["position", "velocity", "obstacle", "neighbor", "rays", "centroid"]
     covered = np.concatenate([np.arange(layout.size)[place] for place in layout.blocks.values()])
     assert covered.tolist() == list(range(layout.size))
-    assert "rays" not in ObservationLayout().blocks and "neighbour" not in ObservationLayout(0).blocks
+    assert "rays" not in ObservationLayout().blocks and "neighbor" not in ObservationLayout(0).blocks
 
 
 @settings(max_examples=30)
@@ -84,7 +84,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     seen = seen_at(positions, reach, seed, rays=6)
     layout, team = ObservationLayout(3, 6, True), Team.homogeneous(n, communication_range=reach)
     i = int(rng.integers(n))
-    before = layout.rows(seen, team)[i]
+    before = layout.build_rows(seen, team)[i]
     heard = np.zeros(n, dtype=bool)
     heard[[*seen.neighbors.list_neighbors(i), i]] = True
     moved = positions.copy()
@@ -96,7 +96,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     for name in ("velocities", "obstacle_points"):
         getattr(other, name)[i] = getattr(seen, name)[i]
     other.scans.distances[i], other.scans.hit[i] = seen.scans.distances[i], seen.scans.hit[i]
-    assert layout.rows(other, team)[i].tobytes() == before.tobytes()
+    assert layout.build_rows(other, team)[i].tobytes() == before.tobytes()
 
 
 @settings(max_examples=30)
@@ -107,7 +107,7 @@ def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> Non
     seen = seen_at(rng.uniform((-5, -5), (13, 11), size=(n, 2)), np.inf, seed, rays=4)
     layout = ObservationLayout(2, 4, True)
     low, high = layout.bounds
-    rows = layout.rows(seen, Team.homogeneous(n, max_speed=0.2, sensing_range=sensing))
+    rows = layout.build_rows(seen, Team.homogeneous(n, max_speed=0.2, sensing_range=sensing))
     assert ((rows >= low) & (rows <= high)).all()
 
 
@@ -122,14 +122,14 @@ def test_a_message_that_is_old_is_told_as_it_came() -> None:
         REGION,
         reported_positions=np.array([[1.5, 1.0], [1.0, 3.0]]),
     )
-    rows = ObservationLayout(1).rows(seen, Team.homogeneous(2))
+    rows = ObservationLayout(1).build_rows(seen, Team.homogeneous(2))
     np.testing.assert_allclose(rows[:, 7:], [[0.05, 0.0, 1.0], [-0.1, 0.2, 1.0]], atol=1e-7)
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"neighbours": -1}, r"observation.neighbours: expected a whole number from 0 to 1000, got -1"),
+        ({"neighbours": -1}, r"observation.neighbors: expected a whole number from 0 to 1000, got -1"),
         ({"rays": 2.5}, r"observation.rays: expected a whole number"),
         ({"centroid": 1}, r"observation.centroid: expected true or false, got 1"),
     ],
@@ -142,4 +142,4 @@ def test_what_cannot_be_told(values: dict[str, object], message: str) -> None:
 def test_rays_want_a_scan() -> None:
     seen = seen_at(np.array([[1.0, 1.0]]), rays=4)
     with pytest.raises(ParameterError, match=r"observation.rays: expected 6 rays in a scan, got 4"):
-        ObservationLayout(rays=6).rows(seen, Team.homogeneous(1))
+        ObservationLayout(rays=6).build_rows(seen, Team.homogeneous(1))

@@ -203,11 +203,11 @@ from robocov_app.learning import ObservationLayout, PolicyController
 class Outwards(PolicyController):
     """Goes away from the nearest neighbour."""
 
-    layout: ObservationLayout = ObservationLayout(neighbours=1)
+    layout: ObservationLayout = ObservationLayout(neighbors=1)
     action: str = "velocity"
 
     def act(self, observation):
-        return -8.0 * observation[self.layout.blocks["neighbour"]][:2]
+        return -8.0 * observation[self.layout.blocks["neighbor"]][:2]
 '''
 
 

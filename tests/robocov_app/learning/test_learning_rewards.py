@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov_app.learning.task import REWARDS, checked_kind, reference_distance, shares
+from robocov_app.learning.rewards import REWARDS, compute_reference_distance, share_reward
+from robocov_app.learning.task import check_kind
 
 STEPS = st.integers(0, 2**32)
 
@@ -29,9 +30,9 @@ def test_parts_sum_up_to_the_decrease(cost: CoverageCost, seed: int) -> None:
     moved = begin + np.random.default_rng(seed).uniform(-0.1, 0.1, size=begin.shape)
     before, after = cost(begin), cost(moved)
     decrease = before.mean_distance - after.mean_distance
-    assert shares("shared", before, after, 0.1).tolist() == [decrease] * 4
-    assert shares("own", before, after, 0.1).sum() == pytest.approx(decrease, abs=1e-12)
-    assert shares("level", before, after, 0.1).tolist() == [-0.1 * after.mean_distance] * 4
+    assert share_reward("shared", before, after, 0.1).tolist() == [decrease] * 4
+    assert share_reward("own", before, after, 0.1).sum() == pytest.approx(decrease, abs=1e-12)
+    assert share_reward("level", before, after, 0.1).tolist() == [-0.1 * after.mean_distance] * 4
 
 
 def test_ones_own_part_is_what_one_has_done(cost: CoverageCost) -> None:
@@ -41,7 +42,7 @@ def test_ones_own_part_is_what_one_has_done(cost: CoverageCost) -> None:
         moved = begin.copy()
         moved[robot] += 0.02, 0.01
         before, after = cost(begin), cost(moved)
-        own = shares("own", before, after, 1.0)
+        own = share_reward("own", before, after, 1.0)
         decrease = before.mean_distance - after.mean_distance
         assert abs(decrease) > 1e-5
         assert own[robot] == pytest.approx(decrease, rel=0.03)
@@ -54,7 +55,7 @@ def test_those_who_stay_get_next_to_nothing(cost: CoverageCost) -> None:
         begin = places(cost.environment, seed)
         moved = begin.copy()
         moved[0] += 0.2, 0.1
-        own = shares("own", cost(begin), cost(moved), 1.0)
+        own = share_reward("own", cost(begin), cost(moved), 1.0)
         assert np.ptp(own[1:]) < 1e-15
         left.append(abs(own[1]))
     assert np.mean(left) < 2e-4
@@ -66,13 +67,13 @@ def test_no_placement_goes_below_the_reference(empty: Environment) -> None:
     for n in (1, 4, 9):
         side = round(n**0.5)
         grid = (np.stack(np.meshgrid(*[np.arange(side) + 0.5] * 2), -1).reshape(-1, 2)) * 10.0 / side
-        best = cost(grid).mean_distance / reference_distance(100.0, n)
+        best = cost(grid).mean_distance / compute_reference_distance(100.0, n)
         assert 1.0 < best < 1.03
         for seed in range(5):
-            assert cost(places(empty, seed, n)).mean_distance > reference_distance(100.0, n)
+            assert cost(places(empty, seed, n)).mean_distance > compute_reference_distance(100.0, n)
 
 
 def test_names() -> None:
-    checked_kind("reward", "own", REWARDS)
+    check_kind("reward", "own", REWARDS)
     with pytest.raises(ParameterError, match="unknown kind of reward 'share': did you mean 'shared'"):
-        checked_kind("reward", "share", REWARDS)
+        check_kind("reward", "share", REWARDS)

@@ -8,7 +8,7 @@ from robocov.conditions import Conditions
 from robocov.errors import ParameterError
 from robocov.team import Team
 from robocov_app.learning import CoverageTask
-from robocov_app.learning.task import changed_task
+from robocov_app.learning.task import change_task
 
 
 def test_times() -> None:
@@ -20,9 +20,9 @@ def test_times() -> None:
 def test_the_team_goes_before_the_number() -> None:
     task = CoverageTask(robots=9, team=Team.homogeneous(3, max_speed=0.5))
     assert task.robots == 3 and task.agents == ["robot_1", "robot_2", "robot_3"]
-    assert len(changed_task(task, {"robots": 5}).whole_team) == 5
-    assert changed_task(task, {"duration": 5.0}).team is task.team
-    assert changed_task(None, {"robots": 2}).robots == 2
+    assert len(change_task(task, {"robots": 5}).whole_team) == 5
+    assert change_task(task, {"duration": 5.0}).team is task.team
+    assert change_task(None, {"robots": 2}).robots == 2
     assert repr(task) == "<CoverageTask 3 robots, 60 s, 600 actions, force, reward shared>"
 
 
@@ -43,7 +43,7 @@ def test_the_team_goes_before_the_number() -> None:
         ),
         ({"contact_penalty": -1.0}, r"contact_penalty: expected a finite number from 0, got -1\.0"),
         ({"team": 6}, "team: expected a Team, got 6"),
-        ({"observation": None}, "observation: expected a ObservationLayout, got None"),
+        ({"observation": None}, "observation: expected an ObservationLayout, got None"),
         (
             {"conditions": Conditions(failures=((7, 3.0),))},
             r"conditions\.failures\[0\]: expected a robot from 1 to 6, got robot 7",
@@ -57,4 +57,4 @@ def test_what_makes_no_sense(values: dict[str, Any], message: str) -> None:
 
 def test_an_unknown_part() -> None:
     with pytest.raises(ParameterError, match="unknown part of a task 'robot': did you mean 'robots'"):
-        changed_task(None, {"robot": 6})
+        change_task(None, {"robot": 6})

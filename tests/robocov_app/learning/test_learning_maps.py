@@ -9,26 +9,26 @@ from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import load_map, save_map
 from robocov_app.learning import GeneratedMaps
-from robocov_app.learning.task import Scenarios
+from robocov_app.learning.maps import MapSampler
 
 
-def drawn(scenarios: Scenarios, seed: int, count: int) -> list[str]:
+def drawn(sampler: MapSampler, seed: int, count: int) -> list[str]:
     rng = np.random.default_rng(seed)
-    return [scenarios.draw(rng).name for _ in range(count)]
+    return [sampler.draw(rng).name for _ in range(count)]
 
 
 def test_one_map_by_name_path_or_itself(empty: Environment, tmp_path: Path) -> None:
     save_map(empty, tmp_path / "mine.json")
     for maps in (empty, tmp_path / "mine.json", str(tmp_path / "mine.json")):
-        assert drawn(Scenarios(maps, 8), 0, 2) == ["empty", "empty"]
-    assert drawn(Scenarios("square", 8), 0, 1) == [load_map("square").name]
+        assert drawn(MapSampler(maps, 8), 0, 2) == ["empty", "empty"]
+    assert drawn(MapSampler("square", 8), 0, 1) == [load_map("square").name]
 
 
 def test_each_of_several_is_drawn_as_often(empty: Environment, cluttered: Environment) -> None:
-    names = drawn(Scenarios([empty, cluttered], 8), 0, 200)
+    names = drawn(MapSampler([empty, cluttered], 8), 0, 200)
     assert 75 <= names.count("empty") <= 125
-    assert names == drawn(Scenarios([empty, cluttered], 8), 0, 200)
-    assert names != drawn(Scenarios([empty, cluttered], 8), 1, 200)
+    assert names == drawn(MapSampler([empty, cluttered], 8), 0, 200)
+    assert names != drawn(MapSampler([empty, cluttered], 8), 1, 200)
 
 
 def test_makers_get_new_seeds() -> None:
@@ -38,38 +38,38 @@ def test_makers_get_new_seeds() -> None:
         asked.append(seed)
         return Environment(f"map {seed}", ((0, 0), (1, 0), (1, 1), (0, 1)))
 
-    names = drawn(Scenarios(make, 8), 3, 5)
+    names = drawn(MapSampler(make, 8), 3, 5)
     assert len(set(asked)) == 5 and names == [f"map {seed}" for seed in asked]
 
 
 def test_generated_maps_are_those_of_the_seeds() -> None:
     maps = GeneratedMaps("polygons", seeds=[3, 8], parameters={"obstacles": 2, "area": 0.05})
-    names = set(drawn(Scenarios(maps, 8), 0, 12))
+    names = set(drawn(MapSampler(maps, 8), 0, 12))
     assert names == {"polygons 3", "polygons 8"}
     assert len(maps(0).obstacles) == 2
     assert GeneratedMaps(parameters={"obstacles": 2, "area": 0.05})(5).name == "polygons 5"
 
 
 def test_costs_are_kept(empty: Environment, cluttered: Environment) -> None:
-    scenarios = Scenarios([empty, cluttered], 8)
-    first = scenarios.cost(empty)
-    assert scenarios.cost(empty) is first and scenarios.cost(cluttered) is not first
+    sampler = MapSampler([empty, cluttered], 8)
+    first = sampler.get_cost(empty)
+    assert sampler.get_cost(empty) is first and sampler.get_cost(cluttered) is not first
     assert first.lattice == 8
     for k in range(70):  # so many that the first is forgotten
-        scenarios.cost(Environment(f"map {k}", ((0, 0), (1, 0), (1, 1), (0, 1))))
+        sampler.get_cost(Environment(f"map {k}", ((0, 0), (1, 0), (1, 1), (0, 1))))
         if k == 40:
-            later = scenarios.cost(cluttered)
-    assert scenarios.cost(empty) is not first and scenarios.cost(cluttered) is later
+            later = sampler.get_cost(cluttered)
+    assert sampler.get_cost(empty) is not first and sampler.get_cost(cluttered) is later
 
 
 def test_what_is_no_map(empty: Environment) -> None:
     with pytest.raises(ParameterError, match="maps: expected at least one, got none"):
-        Scenarios([], 8)
+        MapSampler([], 8)
     with pytest.raises(ParameterError, match=r"maps\[1\]: expected a map, its name or path"):
-        Scenarios([empty, 3], 8)
+        MapSampler([empty, 3], 8)
     with pytest.raises(MapError, match="did you mean"):
-        Scenarios("roomss", 8)
+        MapSampler("roomss", 8)
     with pytest.raises(ParameterError, match=r"maps: expected an Environment"):
-        Scenarios(lambda seed: "x", 8).draw(np.random.default_rng(0))
+        MapSampler(lambda seed: "x", 8).draw(np.random.default_rng(0))
     with pytest.raises(ParameterError, match="maps: seeds: expected at least one, got none"):
         GeneratedMaps(seeds=[])

@@ -1,0 +1,121 @@
+"""Actions of robots: forces or velocities, and the forces that drive the robots by them."""
+
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import ParameterError, quote
+from robocov.team import Team
+
+Action: TypeAlias = Literal["force", "velocity"]
+"""Kind of an action: a force in N, or a velocity in m/s."""
+ACTIONS: tuple[Action, ...] = get_args(Action)
+VELOCITY_TIME_CONSTANT_S = 0.1
+"""Time constant with which a robot follows a desired velocity."""
+
+
+def compute_action_limits(action: Action, team: Team) -> Array:
+    """Compute the largest useful component of an action for each robot.
+
+    A force of m a + ν v suffices to move at the maximum speed v and to accelerate by the maximum acceleration
+    a at the same time; a larger force has no effect. Larger actions are no error: the world limits speed and
+    acceleration, for learners as for all controllers.
+
+    Parameters
+    ----------
+    action : str
+        Kind of the actions.
+    team : Team
+
+    Returns
+    -------
+    (n,) array, N or m/s
+    """
+    if action == "velocity":
+        return team.max_speed
+    return np.asarray(team.mass * team.max_acceleration + team.viscosity * team.max_speed)
+
+
+def compute_driving_forces(action: Action, actions: Array, velocities: Array, team: Team) -> Array:
+    """Compute the forces of actions.
+
+    Parameters
+    ----------
+    action : str
+        Kind of the actions.
+    actions : (n, 2) array, N or m/s
+    velocities : (n, 2) array, m/s
+        Present velocities.
+    team : Team
+
+    Returns
+    -------
+    (n, 2) array, N
+
+    Notes
+    -----
+    For a desired velocity u the force is ``F = ν u + m (u - q') / τ``, where q' is the present velocity, and
+    τ is `VELOCITY_TIME_CONSTANT_S`. It compensates the viscosity of (28), and accelerates towards u.
+    """
+    if action == "force":
+        return actions
+    viscosity, stiffness = _compute_velocity_gains(team)
+    return np.asarray(viscosity * actions + stiffness * (actions - velocities))
+
+
+def compute_actions(action: Action, forces: Array, velocities: Array, team: Team) -> Array:
+    """Compute the actions that give forces, the inverse of `compute_driving_forces`.
+
+    Parameters
+    ----------
+    action : str
+        Kind of the actions.
+    forces : (n, 2) array, N
+    velocities : (n, 2) array, m/s
+        Present velocities.
+    team : Team
+
+    Returns
+    -------
+    (n, 2) array, N or m/s
+    """
+    if action == "force":
+        return forces
+    viscosity, stiffness = _compute_velocity_gains(team)
+    return np.asarray((forces + stiffness * velocities) / (viscosity + stiffness))
+
+
+def _compute_velocity_gains(team: Team) -> tuple[Array, Array]:
+    """Return ν and m / τ of each robot, (n, 1) each."""
+    return team.viscosity[:, None], team.mass[:, None] / VELOCITY_TIME_CONSTANT_S
+
+
+def check_actions(actions: Any, count: int) -> Array:
+    """Check the actions of a team.
+
+    Parameters
+    ----------
+    actions : array_like
+    count : int
+        Number of robots.
+
+    Returns
+    -------
+    (count, 2) array
+
+    Raises
+    ------
+    ParameterError
+        If the shape is another one, or a number is not finite.
+    """
+    array = np.asarray(actions, dtype=np.float64)
+    if array.shape != (count, 2):
+        raise ParameterError(f"expected actions of shape {(count, 2)}, got {array.shape}")
+    is_finite = np.isfinite(array).all(axis=1)
+    if not is_finite.all():
+        robot = int(np.flatnonzero(~is_finite)[0])
+        raise ParameterError(
+            f"action of robot_{robot + 1}: expected finite numbers, got {quote(array[robot].tolist())}"
+        )
+    return array

@@ -1,0 +1,241 @@
+"""Base class of learning environments: episodes that are drawn, and pictures of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
+from robocov.scenario import Scenario
+from robocov_app.learning.episode import Episode, SharedRun
+from robocov_app.learning.maps import SEED_LIMIT, MapSampler, build_map
+from robocov_app.learning.task import CoverageTask, change_task
+
+if TYPE_CHECKING:
+    from robocov_app.render.picture import Painter
+    from robocov_app.render.scene import Scene
+    from robocov_app.runs.encoding import Frame
+
+RENDER_MODES = ("rgb_array", "human")
+THEMES = ("light", "dark")
+MIN_SIDE_PX = 64
+MAX_SIDE_PX = 8192
+_FRAME_RATE = 10
+"""Frames per second of a video of the default task, one for each action."""
+
+
+def draw_episode(
+    task: CoverageTask,
+    sampler: MapSampler,
+    rng: np.random.Generator,
+    options: Mapping[str, Any] | None = None,
+    shared_run: SharedRun | None = None,
+) -> Episode:
+    """Draw a new episode.
+
+    Parameters
+    ----------
+    task : CoverageTask
+    sampler : MapSampler
+        Maps of the task.
+    rng : numpy.random.Generator
+    options : Mapping, optional
+        What is not left to chance. ``map``: a map, its name or path. ``start``: the name of one of its
+        starts. ``start_seed``: the seed of the positions, as in `robocov run`. ``positions``: the positions
+        themselves, (n, 2) m. ``conditions_seed``: the seed of the task's conditions.
+    shared_run : SharedRun, optional
+        A simulation that is shared with other episodes on the same map.
+
+    Returns
+    -------
+    Episode
+
+    Raises
+    ------
+    StartError
+        If the positions are invalid, or there is no such start.
+    InputError
+        If a map cannot be read.
+    """
+    options = options or {}
+    environment = sampler.draw(rng)
+    if "map" in options:
+        environment = build_map(options["map"], int(rng.integers(SEED_LIMIT)))
+    # Seeds are drawn even if an option replaces them, so that the others stay the same.
+    start_names = list(environment.starts) or ["uniform"]
+    random_start = start_names[int(rng.integers(len(start_names)))]
+    start_seed = int(rng.integers(SEED_LIMIT))
+    conditions_seed = int(rng.integers(SEED_LIMIT))
+    start = options.get("start", task.start)
+    if start == "*":
+        start = random_start
+    placement: dict[str, Any] = {
+        "start": environment.start(start).name,
+        "seed": options.get("start_seed", start_seed),
+    }
+    conditions = task.conditions
+    if conditions is not None:
+        conditions = replace(conditions, seed=options.get("conditions_seed", conditions_seed))
+    cost = sampler.get_cost(environment)
+    if "positions" in options:
+        placement = {"starts": _parse_positions(options["positions"]), "start": None, "seed": None}
+    scenario = Scenario(
+        environment,
+        team=task.whole_team,
+        duration=task.duration,
+        dt=task.dt,
+        conditions=conditions,
+        **placement,
+    )
+    return Episode(task, scenario, cost, shared_run)
+
+
+def _parse_positions(positions: Any) -> Array:
+    try:
+        return np.asarray(positions, dtype=float)
+    except (TypeError, ValueError):
+        raise StartError(f"positions: expected an array of shape (n, 2), got {quote(positions)}") from None
+
+
+class EpisodeEnv:
+    """Base class of learning environments.
+
+    Parameters
+    ----------
+    task : CoverageTask, optional
+        By default the task with all defaults.
+    render_mode : str, optional
+        "rgb_array", or "human", which opens a window and needs a display.
+    size : (int, int)
+        Width and height of the pictures, px.
+    theme : str
+        "light" or "dark".
+    sampler : MapSampler, optional
+        Maps of the task. Several environments may share one.
+    **changes
+        Attributes of the task that differ.
+
+    Attributes
+    ----------
+    episode : Episode or None
+        The present episode; None before the first one.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range.
+    InputError
+        If a map cannot be read.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": _FRAME_RATE}
+
+    def __init__(
+        self,
+        task: CoverageTask | None = None,
+        *,
+        render_mode: str | None = None,
+        size: tuple[int, int] = (640, 480),
+        theme: str = "light",
+        sampler: MapSampler | None = None,
+        **changes: Any,
+    ) -> None:
+        self.task = change_task(task, changes)
+        _check_rendering(render_mode, size, theme)
+        self.render_mode = render_mode
+        self._theme = theme
+        self._size = (int(size[0]), int(size[1]))
+        self._sampler = MapSampler(self.task.maps, self.task.lattice) if sampler is None else sampler
+        self.episode: Episode | None = None
+        self._painter: Painter | None = None
+        self._window: Any = None
+        self._clock: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state to pickle or to copy, without the window and the painter."""
+        return {**vars(self), "_painter": None, "_window": None, "_clock": None}
+
+    def _get_episode(self) -> Episode:
+        if self.episode is None:
+            raise RobocovError("environment: call reset() first")
+        return self.episode
+
+    def render(self) -> Frame | None:
+        """Return a picture, (height, width, 3) from 0 to 255, in the mode "rgb_array", else None."""
+        episode = self._get_episode()
+        if self.render_mode != "rgb_array":
+            return None
+        painter = self._get_painter(episode)
+        return painter.frame(self._build_scene(episode)).copy()
+
+    def close(self) -> None:
+        """Close the window."""
+        if self._window is not None:
+            import pygame
+
+            pygame.display.quit()
+            self._window = None
+            self._clock = None
+
+    def _get_painter(self, episode: Episode) -> Painter:
+        from robocov_app.render.picture import Painter
+        from robocov_app.render.theme import theme_named
+
+        if self._painter is None or self._painter.environment is not episode.environment:
+            self._painter = Painter(episode.environment, self._size, theme_named(self._theme))
+        return self._painter
+
+    def _build_scene(self, episode: Episode) -> Scene:
+        from robocov_app.render.scene import Scene
+
+        trail = np.array(episode.trail)
+        return Scene.of(
+            episode.environment,
+            episode.team,
+            episode.take_snapshot(),
+            starts=trail[0],
+            trail=trail,
+            trail_time=np.arange(float(len(trail))) * episode.task.period,
+            label=f"action {episode.cycle} of {episode.task.cycles}",
+            cost=f"mean distance {episode.result.mean_distance:.3f} m",
+        )
+
+    def _update_window(self) -> None:
+        """Draw the present episode in the window, in the mode "human"."""
+        if self.render_mode != "human":
+            return
+        import pygame
+
+        if self._window is None:
+            self._open_window()
+        pygame.event.pump()
+        episode = self._get_episode()
+        self._get_painter(episode).draw(self._window, self._build_scene(episode))
+        pygame.display.flip()
+        self._clock.tick(1.0 / self.task.period)
+
+    def _open_window(self) -> None:
+        import pygame
+
+        try:
+            pygame.display.init()
+            self._window = pygame.display.set_mode(self._size)
+        except pygame.error as error:
+            raise RobocovError(f"render_mode: 'human', but there is no display ({error})") from error
+        pygame.display.set_caption("robocov")
+        self._clock = pygame.time.Clock()
+
+
+def _check_rendering(render_mode: str | None, size: tuple[int, int], theme: str) -> None:
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise ParameterError(f"render_mode: {describe_unknown_name('mode', str(render_mode), RENDER_MODES)}")
+    if len(size) != 2 or not all(MIN_SIDE_PX <= side <= MAX_SIDE_PX for side in size):
+        raise ParameterError(
+            f"size: expected width and height from {MIN_SIDE_PX} to {MAX_SIDE_PX} pixels, got {size}"
+        )
+    if theme not in THEMES:
+        raise ParameterError(f"theme: {describe_unknown_name('theme', str(theme), THEMES)}")

@@ -1,0 +1,69 @@
+"""Driving robots by actions, and measuring their contacts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.metrics import MAX_CONTACT_GAP_M
+from robocov.observation import Decision, Snapshot
+from robocov.observation.close_pairs import find_close_pairs
+from robocov.simulation import Simulation, SimulationBatch
+from robocov_app.learning.actions import compute_driving_forces
+from robocov_app.learning.task import CoverageTask
+
+_REACH_MARGIN = 1.001
+"""Factor of the radius in which pairs in contact are searched for."""
+
+
+def hold_actions(
+    task: CoverageTask,
+    simulation: Simulation | SimulationBatch,
+    actions: Array,
+    snapshots: list[Snapshot] | None = None,
+) -> Array:
+    """Hold actions for the time of one decision.
+
+    Parameters
+    ----------
+    task : CoverageTask
+    simulation : Simulation or SimulationBatch
+    actions : (n, 2) or (runs, n, 2) array, N or m/s
+    snapshots : list of Snapshot, optional
+        The snapshots of the steps of a single simulation are appended.
+
+    Returns
+    -------
+    (n,) or (runs, n) array, s
+        Time in contact.
+    """
+    contact_time = np.zeros(actions.shape[:-1])
+    for _ in range(task.repeat):
+        forces = compute_driving_forces(task.action, actions, simulation.velocities, simulation.team)
+        forces = np.where(simulation.working[..., None], forces, 0.0)
+        if snapshots is not None and isinstance(simulation, Simulation):
+            snapshots.append(replace(simulation.observe_and_decide(), decision=Decision(forces)))
+        simulation.step(forces=forces)
+        contact_time += task.dt * _find_contacts(simulation)
+    return contact_time
+
+
+def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
+    """Return which working robots touch a wall or another robot, (n,) or (runs, n)."""
+    shape = simulation.working.shape
+    robots = len(simulation.team)
+    positions = simulation.positions.reshape(-1, 2)
+    working = simulation.working.ravel()
+    radius = np.broadcast_to(simulation.team.radius, shape).ravel()
+    nearest = simulation.sensor.find_nearest_points(positions, radius + MAX_CONTACT_GAP_M)
+    has_contact = working & ~np.isnan(nearest[:, 0])
+    reach = 2.0 * float(radius.max()) + MAX_CONTACT_GAP_M
+    # Robots of different runs are moved far apart, so that only pairs of one run are close.
+    run = np.arange(len(positions)) // robots
+    separated = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
+    first, second, _ = find_close_pairs(separated, _REACH_MARGIN * reach)
+    if len(first) > 0:
+        x, y = (positions[first] - positions[second]).T
+        is_contact = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + MAX_CONTACT_GAP_M
+        has_contact[first[is_contact & working[first] & working[second]]] = True
+    return has_contact.reshape(shape)

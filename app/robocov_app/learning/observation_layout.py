@@ -1,0 +1,208 @@
+"""Layout of observations as rows of numbers."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.controllers.known_cells import compute_known_cells
+from robocov.errors import ParameterError, require_number, require_type
+from robocov.observation import MAX_RAYS, Observations, Scans
+from robocov.observation.region import Region
+from robocov.team import Team
+
+Rows: TypeAlias = NDArray[np.float32]
+"""(n, size): one row for each robot."""
+MAX_NEIGHBORS = 1000
+"""Maximum number of neighbors in a row."""
+_MIN_SENSING_RANGE_M = 1e-9
+_FIXED_SIZE = 7
+"""Numbers of a row without neighbors, rays and centroid."""
+
+
+@dataclass(frozen=True)
+class ObservationLayout:
+    """Layout of an observation: its numbers and their order.
+
+    Row i contains only what robot i knows (see `robocov.observation`). All numbers are from -1 to 1. The unit
+    of ``D`` is the diagonal of the known region's bounding box, that of ``S`` the robot's sensing range, or
+    ``D`` if that is shorter.
+
+    =============  ==================  =====================================================================
+    block          numbers             content
+    =============  ==================  =====================================================================
+    ``position``   2                   from the center of the region's bounding box, D
+    ``velocity``   2                   relative to the robot's maximum speed
+    ``obstacle``   3                   offset of the nearest sensed obstacle point, S; then 1; all 0 for none
+    ``neighbor``   3 x `neighbors`     the nearest robots that are heard, nearest first: offset, D; then 1;
+                                       all 0 if there is none
+    ``rays``       `rays`              distance along each ray, evenly spaced from +x, S; 1 if it is free
+    ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
+    =============  ==================  =====================================================================
+
+    Each ray costs a query of the physics. The centroid is the only number that a robot has to compute from
+    the others: Lloyd's algorithm moves towards it.
+
+    Parameters
+    ----------
+    neighbors : int
+    rays : int
+    centroid : bool
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+
+    Examples
+    --------
+    >>> layout = ObservationLayout(neighbors=2)
+    >>> layout.size, layout.blocks["neighbor"]
+    (13, slice(7, 13, None))
+    """
+
+    neighbors: int = 4
+    rays: int = 0
+    centroid: bool = False
+
+    def __post_init__(self) -> None:
+        require_number("observation.neighbors", self.neighbors, 0, MAX_NEIGHBORS, whole=True)
+        require_number("observation.rays", self.rays, 0, MAX_RAYS, whole=True)
+        require_type("observation.centroid", self.centroid, bool, "true or false")
+
+    @cached_property
+    def blocks(self) -> dict[str, slice]:
+        """Slices of the blocks of a row in their order, only of those that it has."""
+        sizes = {
+            "position": 2,
+            "velocity": 2,
+            "obstacle": 3,
+            "neighbor": 3 * self.neighbors,
+            "rays": self.rays,
+            "centroid": 2 * self.centroid,
+        }
+        ends = accumulate(sizes.values())
+        return {
+            name: slice(end - size, end)
+            for (name, size), end in zip(sizes.items(), ends, strict=True)
+            if size
+        }
+
+    @property
+    def size(self) -> int:
+        """Number of numbers in a row."""
+        return _FIXED_SIZE + 3 * self.neighbors + self.rays + 2 * self.centroid
+
+    @property
+    def bounds(self) -> tuple[Rows, Rows]:
+        """Lowest and highest values of a row, (size,) each."""
+        low = np.full(self.size, -1.0, dtype=np.float32)
+        first_ray = _FIXED_SIZE + 3 * self.neighbors
+        low[_FIXED_SIZE - 1 : first_ray : 3] = 0.0  # Whether there is a point or neighbor.
+        low[first_ray : first_ray + self.rays] = 0.0
+        return low, np.ones(self.size, dtype=np.float32)
+
+    def build_rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
+        """Build the observations of all robots.
+
+        Parameters
+        ----------
+        seen : Observations
+        team : Team
+        scans : Scans, optional
+            The latest scans, by default those of `seen`.
+
+        Returns
+        -------
+        (n, size) array
+
+        Raises
+        ------
+        ParameterError
+            If the layout has rays, and there is no scan with the same number of rays.
+        """
+        n = len(seen.positions)
+        unit = seen.region.diameter
+        sensing_range = np.clip(team.sensing_range, _MIN_SENSING_RANGE_M, unit)[:, None]
+        blocks = self.blocks
+        rows = np.zeros((n, self.size))
+        rows[:, blocks["position"]] = normalize_positions(seen.positions, seen.region)
+        rows[:, blocks["velocity"]] = seen.velocities / team.max_speed[:, None]
+        is_sensed = ~np.isnan(seen.obstacle_points[:, 0])
+        obstacle = rows[:, blocks["obstacle"]]
+        obstacle[is_sensed, :2] = ((seen.obstacle_points - seen.positions) / sensing_range)[is_sensed]
+        obstacle[:, 2] = is_sensed
+        if self.neighbors:
+            rows[:, blocks["neighbor"]] = self._find_neighbors(seen).reshape(n, -1)
+        if self.rays:
+            scans = self._check_scans(seen.scans if scans is None else scans)
+            rows[:, blocks["rays"]] = np.where(scans.hit, scans.distances / sensing_range, 1.0)
+        if self.centroid:
+            centroid = compute_known_cells(seen, "distance", None).centroid
+            rows[:, blocks["centroid"]] = (centroid - seen.positions) / unit
+        # Believed positions may be outside the region.
+        return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
+
+    def _find_neighbors(self, seen: Observations) -> Array:
+        """Return offset and presence of the nearest neighbors, (n, neighbors, 3)."""
+        n = len(seen.positions)
+        unit = seen.region.diameter
+        robot, _, offset, distance = seen.find_near_neighbors(4.0 * unit)
+        nearest = np.zeros((n, self.neighbors, 3))
+        distances = np.full((n, self.neighbors), np.inf)
+        _insert_nearest(robot, offset / -unit, distance, distances, nearest)
+        return nearest
+
+    def _check_scans(self, scans: Scans | None) -> Scans:
+        if scans is None or scans.rays != self.rays:
+            actual = "none" if scans is None else scans.rays
+            raise ParameterError(f"observation.rays: expected {self.rays} rays in a scan, got {actual}")
+        return scans
+
+
+def normalize_positions(positions: Array, region: Region) -> Array:
+    """Return positions from the center of a region's bounding box, relative to its diagonal, (n, 2)."""
+    min_x, min_y, max_x, max_y = region.bounds
+    center = np.array([(min_x + max_x) / 2.0, (min_y + max_y) / 2.0])
+    return np.asarray((positions - center) / region.diameter)
+
+
+@kernel
+def _insert_nearest(
+    robot: IntArray, offset: Array, distance: Array, distances: Array, nearest: Array
+) -> None:
+    """Insert pairs of robots into lists of the nearest neighbors, which stay sorted.
+
+    Parameters
+    ----------
+    robot : (k,) array of int
+        Robot of each pair.
+    offset : (k, 2) array
+        Offset of its neighbor.
+    distance : (k,) array
+    distances : (n, count) array
+        Distances of the nearest neighbors, modified.
+    nearest : (n, count, 3) array
+        Their offsets and presence, modified.
+    """
+    count = distances.shape[1]
+    for k in range(len(robot)):
+        i = robot[k]
+        place = count
+        # Neighbors at equal distances stay in the order of their numbers.
+        while place > 0 and distance[k] < distances[i, place - 1]:
+            place -= 1
+        for later in range(count - 1, place, -1):
+            distances[i, later] = distances[i, later - 1]
+            for c in range(3):
+                nearest[i, later, c] = nearest[i, later - 1, c]
+        if place < count:
+            distances[i, place] = distance[k]
+            nearest[i, place, 2] = 1.0
+            for c in range(2):
+                nearest[i, place, c] = offset[k, c]
