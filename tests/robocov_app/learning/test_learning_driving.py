@@ -10,12 +10,12 @@ from robocov.team import Team
 from robocov_app.learning.actions import (
     ACTIONS,
     VELOCITY_TIME_CONSTANT_S,
-    check_kind,
     compute_action_limits,
     compute_actions,
     compute_driving_forces,
 )
 from robocov_app.learning.episode import ExternalController
+from robocov_app.learning.task import check_kind
 
 TEAM = Team.homogeneous(2, mass=2.0, viscosity=3.0, max_speed=0.5, max_acceleration=4.0)
 
