@@ -135,7 +135,7 @@ def test_without_the_extra_it_says_how_it_is_had(
 
 def test_public_names() -> None:
     assert all(getattr(learning, name) is not None for name in learning.__all__)
-    assert sorted(learning._HOME) == sorted(learning.__all__) and set(learning.__all__) <= {*dir(learning)}
+    assert sorted(learning._MODULES) == sorted(learning.__all__) and set(learning.__all__) <= {*dir(learning)}
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         learning.nothing
 

@@ -100,7 +100,7 @@ class TestMaps:
         assert environment.region.bounds == (0.0, 0.0, 10.0, 10.0)
 
     def test_the_same_density_is_drawn_again(self):
-        (first, *_), (again, *_) = studies.density_maps(QUICK), studies.density_maps(QUICK)
+        (first, *_), (again, *_) = study_maps.build_density_maps(QUICK), study_maps.build_density_maps(QUICK)
         assert first.environment == again.environment
         density = first.environment.density
         assert density is not None and not density.is_uniform
