@@ -1,4 +1,4 @@
-"""Steps of learning environments against a plain one of gymnasium: point masses in an empty square."""
+"""Steps of learning environments in comparison with a plain one of gymnasium: point masses in a square."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -10,62 +10,86 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from robocov_app.bench.measure import Case, Row, in_turn
+from robocov_app.bench.measure import Case, Row, measure_in_alternation
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 
-ROBOTS, LATTICE, TOGETHER = 6, 32, 64
-SIDE = 20.0  # of the square that the point masses are in, m
+ROBOTS = 6
+LATTICE = 32
+ENVIRONMENTS = 64
+"""Number of environments that are stepped together."""
+SIDE_M = 20.0
+"""Side of the square of the point masses."""
 YARDSTICK = f"{ROBOTS} point masses, gymnasium"
+SINGLE_GOAL = 0.7
+VECTOR_GOAL = 4.0
+"""Minimum numbers of steps per second, relative to the yardstick."""
+_BEFORE = 10.0
+_DT_S = 1.0 / 60.0
+_MAX_FORCE_N = 4.0
+_VISCOSITY = 2.0
+_ACTION_SETS = 100
 
 
 class PointMasses(gymnasium.Env[Any, Any]):
-    """Robots without bodies, rewarded each step by distances as the crow flies, in numpy."""
+    """Robots without bodies, rewarded in each step by straight distances, in numpy."""
 
     def __init__(self) -> None:
-        self.action_space = Box(-4.0, 4.0, (ROBOTS, 2), np.float32)
-        self.observation_space = Box(-SIDE, SIDE, (ROBOTS, 4), np.float32)
-        axis = (np.arange(LATTICE) + 0.5) * (SIDE / LATTICE)
+        self.action_space = Box(-_MAX_FORCE_N, _MAX_FORCE_N, (ROBOTS, 2), np.float32)
+        self.observation_space = Box(-SIDE_M, SIDE_M, (ROBOTS, 4), np.float32)
+        axis = (np.arange(LATTICE) + 0.5) * (SIDE_M / LATTICE)
         self._sites = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 1, 2)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
+        """Place the robots at random."""
         super().reset(seed=seed)
-        self._positions = self.np_random.uniform(0.0, SIDE, (ROBOTS, 2))
+        self._positions = self.np_random.uniform(0.0, SIDE_M, (ROBOTS, 2))
         self._velocities = np.zeros((ROBOTS, 2))
-        return self._seen(), {}
+        return self._observe(), {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Any]:
-        self._velocities += (action - 2.0 * self._velocities) / 60.0
+        """Move the robots by forces."""
+        self._velocities += (action - _VISCOSITY * self._velocities) * _DT_S
         self._velocities /= np.maximum(np.hypot(*self._velocities.T)[:, None], 1.0)
-        self._positions = np.clip(self._positions + self._velocities / 60.0, 0.0, SIDE)
+        self._positions = np.clip(self._positions + self._velocities * _DT_S, 0.0, SIDE_M)
         distances = np.hypot(*np.moveaxis(self._sites - self._positions, -1, 0))
-        return self._seen(), -float(distances.min(axis=1).mean()), False, False, {}
+        return self._observe(), -float(distances.min(axis=1).mean()), False, False, {}
 
-    def _seen(self) -> Any:
+    def _observe(self) -> Any:
         return np.hstack([self._positions, self._velocities]).astype(np.float32)
 
 
-def cases(*, quick: bool = False) -> list[Case]:
-    return [partial(_rows, quick)]
+def list_cases(*, quick: bool = False) -> list[Case]:
+    """Return the cases of learning environments."""
+    return [partial(_measure_environments, quick)]
 
 
-def _rows(quick: bool) -> Iterator[Row]:
+def _measure_environments(quick: bool) -> Iterator[Row]:
     options: dict[str, Any] = {"robots": ROBOTS, "lattice": LATTICE, "repeat": 1, "duration": 1e6}
-    plain, single = PointMasses(), CoverageEnv(**options)
-    many = CoverageVectorEnv(TOGETHER, **options)
-    for env in (plain, single, many):
-        env.reset(seed=0)
+    plain = PointMasses()
+    single = CoverageEnv(**options)
+    vector = CoverageVectorEnv(ENVIRONMENTS, **options)
+    for environment in (plain, single, vector):
+        environment.reset(seed=0)
     rng = np.random.default_rng(0)
-    actions = cycle(rng.normal(scale=2.0, size=(100, TOGETHER, ROBOTS, 2)).clip(-4.0, 4.0).astype(np.float32))
+    samples = rng.normal(scale=2.0, size=(_ACTION_SETS, ENVIRONMENTS, ROBOTS, 2))
+    actions = cycle(samples.clip(-_MAX_FORCE_N, _MAX_FORCE_N).astype(np.float32))
     calls = {
         "plain": lambda: plain.step(next(actions)[0]),
         "single": lambda: single.step(next(actions)[0]),
-        "many": lambda: many.step(next(actions)),
+        "vector": lambda: vector.step(next(actions)),
     }
-    # processor time: a step of many is long enough to be interrupted by other programs
-    taken = in_turn(calls, 20 if quick else 200, clock=process_time)
-    for name, count, goal in (("single", 1, 0.7), ("many", TOGETHER, 4.0)):
-        each, plain_step = taken[name] / count, taken["plain"]
-        rate = f"{plain_step / each:.2f} times its steps a second"
-        yardstick = YARDSTICK, plain_step, 1 / goal
-        size = {"environments": count}
-        yield Row("learning", "a step with reward", size, each, *yardstick, note=rate, before=10.0)
+    # Processor time: a step of many environments is long enough to be interrupted by other programs.
+    times = measure_in_alternation(calls, 20 if quick else 200, clock=process_time)
+    for name, count, goal in (("single", 1, SINGLE_GOAL), ("vector", ENVIRONMENTS, VECTOR_GOAL)):
+        seconds = times[name] / count
+        yield Row(
+            "learning",
+            "a step with reward",
+            {"environments": count},
+            seconds,
+            yardstick=YARDSTICK,
+            yardstick_seconds=times["plain"],
+            goal=1 / goal,
+            note=f"{times['plain'] / seconds:.2f} times its steps a second",
+            before=_BEFORE,
+        )

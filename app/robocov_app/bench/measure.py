@@ -1,4 +1,4 @@
-"""Times that can be trusted on a shared machine: calls in turn, medians, ratios."""
+"""Measuring times that are meaningful on a shared machine: calls in alternation, medians, ratios."""
 
 import gc
 import itertools
@@ -9,46 +9,81 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 Call: TypeAlias = Callable[[], object]
-Case: TypeAlias = Callable[[], Iterable["Row"]]  # something to measure
+"""Work whose time is measured."""
+Case: TypeAlias = Callable[[], Iterable["Row"]]
+"""Measures some rows."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One median time, and that of its yardstick in the same run if there is one."""
+    """A median time, and that of its yardstick in the same measurement.
+
+    Parameters
+    ----------
+    part : str
+        Part of the benchmark, as in `robocov bench PART`.
+    name : str
+        What is measured.
+    parameters : Mapping
+        What is varied, for example ``{"robots": 50}``.
+    seconds : float
+        Median time, s.
+    yardstick : str, optional
+        Name of the yardstick.
+    yardstick_seconds : float, optional
+        Its median time, s.
+    goal : float, optional
+        Maximum ratio of both times.
+    goal_seconds : float, optional
+        Maximum time, s.
+    note : str
+        The time in other words, for example "95 x real time".
+    before : float, optional
+        Approximate ratio when nothing was compiled (commit 8838167).
+    """
 
     part: str
     name: str
-    parameters: Mapping[str, int | str]  # what is varied, as in {"robots": 50}
+    parameters: Mapping[str, int | str]
     seconds: float
     yardstick: str | None = None
     yardstick_seconds: float | None = None
-    goal: float | None = None  # largest ratio that is wanted
-    goal_seconds: float | None = None  # longest time
-    note: str = ""  # the time in other words: 95 x real time
-    before: float | None = None  # about the ratio when nothing was compiled (commit 8838167)
+    goal: float | None = None
+    goal_seconds: float | None = None
+    note: str = ""
+    before: float | None = None
 
     @property
     def ratio(self) -> float | None:
+        """Ratio of the time to that of the yardstick; None without a yardstick."""
         return None if self.yardstick_seconds is None else self.seconds / self.yardstick_seconds
 
     @property
     def met(self) -> bool | None:
-        """Whether what is wanted is reached; None where nothing is."""
+        """Whether all goals are met; None without any goal."""
         limits = ((self.ratio, self.goal), (self.seconds, self.goal_seconds))
-        reached = [value <= goal for value, goal in limits if value is not None and goal is not None]
-        return all(reached) if reached else None
+        results = [value <= goal for value, goal in limits if value is not None and goal is not None]
+        return all(results) if results else None
 
     @property
     def case(self) -> str:
-        words = {"lattice": "{0} x {0}", "map": "{0}"}
-        given = self.parameters.items()
-        return ", ".join(words.get(name, "{0} " + name).format(value) for name, value in given)
+        """The parameters as text, for example "128 x 128, 6 robots"."""
+        texts = []
+        for name, value in self.parameters.items():
+            if name == "lattice":
+                texts.append(f"{value} x {value}")
+            elif name == "map":
+                texts.append(str(value))
+            else:
+                texts.append(f"{value} {name}")
+        return ", ".join(texts)
 
     def to_dict(self) -> dict[str, Any]:
+        """Return the row for JSON."""
         return asdict(self) | {"ratio": self.ratio, "met": self.met}
 
 
-def in_turn(
+def measure_in_alternation(
     calls: Mapping[str, Call],
     count: int,
     seconds: float = 0.0,
@@ -56,27 +91,45 @@ def in_turn(
     clock: Callable[[], float] = perf_counter,
     before: Call = lambda: None,
 ) -> dict[str, float]:
-    """Return median times of calls in turn, as a shared machine slows all alike; `before` is not timed.
+    """Measure calls in alternation, so that other programs slow all of them equally.
 
-    There are at least `count` rounds, and `seconds` of them, after one that does not count.
+    The first round does not count.
+
+    Parameters
+    ----------
+    calls : Mapping
+        The calls by name.
+    count : int
+        Minimum number of rounds.
+    seconds : float
+        Minimum time of all rounds, s.
+    clock : callable
+        Returns a time, s.
+    before : callable
+        Called before each round. Its time does not count.
+
+    Returns
+    -------
+    dict
+        Median time of each call, s.
     """
-    taken: dict[str, list[float]] = {name: [] for name in calls}
-    collecting = gc.isenabled()
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    is_collecting = gc.isenabled()
     gc.collect()
     gc.disable()
     try:
         for call in calls.values():
             call()
-        until = clock() + seconds
-        for made in itertools.count():
-            if made >= count and clock() >= until:
+        end = clock() + seconds
+        for rounds in itertools.count():
+            if rounds >= count and clock() >= end:
                 break
             before()
             for name, call in calls.items():
-                begin = clock()
+                start = clock()
                 call()
-                taken[name].append(clock() - begin)
+                times[name].append(clock() - start)
     finally:
-        if collecting:
+        if is_collecting:
             gc.enable()
-    return {name: median(times) for name, times in taken.items()}
+    return {name: median(measured) for name, measured in times.items()}

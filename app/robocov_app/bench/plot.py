@@ -1,9 +1,11 @@
-"""The ratios of a benchmark as a figure: a dot each."""
+"""The ratios of a benchmark as a figure, with a dot for each."""
 
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import cast
+
+from matplotlib.axes import Axes
 
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
@@ -11,69 +13,117 @@ from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, ton
 from robocov_app.render.theme import LIGHT, Theme
 
 NOTE = "medians of calls in turn on one thread; below 1 robocov is quicker; a bar marks what is wanted"
-WIDTH = 1100
-ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90  # pixels: for the title, for a line, for its words, for its value
-GAP = 66  # pixels between what belongs to one part and the next, for its heading
 HEADINGS = {
-    "step": "Simulated step", "maps": "Exact coverage cost on maps",
-    "cost": "Exact coverage cost among random obstacles", "learning": "Learning environments",
-    "sweep": "Sweeps", "render": "Pictures", "window": "Window", "start": "Start",
-}  # fmt: skip
+    "step": "Simulated step",
+    "maps": "Exact coverage cost on maps",
+    "cost": "Exact coverage cost among random obstacles",
+    "learning": "Learning environments",
+    "sweep": "Sweeps",
+    "render": "Pictures",
+    "window": "Window",
+    "start": "Start",
+}
+"""Headings of the parts."""
+_WIDTH_PX = 1100
+_TITLE_HEIGHT_PX = 92
+_ROW_HEIGHT_PX = 26
+_LEFT_PX = 400
+"""Width of the labels of rows."""
+_RIGHT_PX = 90
+"""Width of the values of rows."""
+_HEADING_HEIGHT_PX = 66
+"""Space between two parts, for the heading of the second."""
+_PART_BOTTOM_PX = 16
+_AXES_OFFSET_PX = 26
+_MAX_TICKS = 7
 
 
 def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
-    """Draw every ratio and every goal on logarithmic axes, and write them as `save_figure` does."""
-    rows = [row for row in rows if row.ratio is not None]
-    parts = [(part, list(group)) for part, group in groupby(rows, key=lambda row: row.part)]
-    height = ABOVE + sum(GAP + ROW * len(group) + 16 for _, group in parts)
+    """Draw all ratios and goals on logarithmic axes, and save the figure.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Those without a ratio are left out.
+    path : Path
+        A file as in `robocov_app.figures.files.save_figure`.
+    theme : Theme
+    """
+    with_ratio = [row for row in rows if row.ratio is not None]
+    parts = [(part, list(group)) for part, group in groupby(with_ratio, key=lambda row: row.part)]
+    height = _TITLE_HEIGHT_PX + sum(_compute_part_height(group) for _, group in parts)
     with plain_style():
-        page = Page((WIDTH, height), theme, scale=1.0)
+        page = Page((_WIDTH_PX, height), theme, scale=1.0)
         page.text("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
         page.text(NOTE, 24, 58, colour=theme.faint)
-        top = float(ABOVE)
+        top = float(_TITLE_HEIGHT_PX)
         for part, group in parts:
             _draw_part(page, HEADINGS[part], group, top)
-            top += GAP + ROW * len(group) + 16
+            top += _compute_part_height(group)
     save_figure(page.figure, path)
 
 
+def _compute_part_height(rows: Sequence[Row]) -> int:
+    return _HEADING_HEIGHT_PX + _ROW_HEIGHT_PX * len(rows) + _PART_BOTTOM_PX
+
+
 def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> None:
-    theme = page.theme
+    """Draw the heading and the rows of a part, below a vertical position, px."""
     page.text(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
-    axes = page.axes((LEFT, top + GAP - 26, WIDTH - LEFT - RIGHT, ROW * len(rows)))
-    quiet_axes(axes, theme, grid="x")
+    axes_top = top + _HEADING_HEIGHT_PX - _AXES_OFFSET_PX
+    width = _WIDTH_PX - _LEFT_PX - _RIGHT_PX
+    axes = page.axes((_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
+    quiet_axes(axes, page.theme, grid="x")
     axes.set_xscale("log")
-    values = [1.0, *(value for row in rows for value in (row.ratio, row.goal) if value is not None)]
-    low, high = 0.75 * min(values), 1.35 * max(values)
-    axes.axvline(1.0, color=tone(theme.faint), linewidth=1)
-    for place, row in enumerate(rows):
-        ratio, y = cast("float", row.ratio), len(rows) - 1 - place
-        colour = tone(theme.controller("rpf" if row.met is False else "rapf"))
-        axes.plot([1.0, ratio], [y, y], color=colour, linewidth=1.6, alpha=0.5)
-        axes.plot(ratio, y, "o", color=colour, markersize=6.5)
-        if row.goal is not None:
-            axes.plot([row.goal] * 2, [y - 0.36, y + 0.36], color=tone(theme.ink), linewidth=2)
-        words = f"{', '.join(filter(None, (row.name, row.case)))}  /  {row.yardstick}"
-        middle = top + GAP - 26 + ROW * (place + 0.5)
-        page.text(words, LEFT - 14, middle, points=SMALL, room=LEFT - 38, align="right")
-        page.text(f"{ratio:.2f}", WIDTH - RIGHT + 14, middle, points=SMALL, bold=row.met is False)
+    axes.axvline(1.0, color=tone(page.theme.faint), linewidth=1)
+    for number, row in enumerate(rows):
+        _draw_row(axes, row, len(rows) - 1 - number, page.theme)
+        _draw_row_texts(page, row, axes_top + _ROW_HEIGHT_PX * (number + 0.5))
+    low, high = _find_limits(rows)
     axes.set_ylim(-0.5, len(rows) - 0.5)
     axes.set_xlim(low, high)
-    ticks = _ticks(low, high)
+    ticks = _choose_ticks(low, high)
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_yticks([])
     axes.minorticks_off()
 
 
-def _ticks(low: float, high: float) -> list[float]:
-    """Return round numbers between two bounds, few enough to be read.
+def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
+    ratio = cast("float", row.ratio)
+    color = tone(theme.controller("rpf" if row.met is False else "rapf"))
+    axes.plot([1.0, ratio], [y, y], color=color, linewidth=1.6, alpha=0.5)
+    axes.plot(ratio, y, "o", color=color, markersize=6.5)
+    if row.goal is not None:
+        axes.plot([row.goal] * 2, [y - 0.36, y + 0.36], color=tone(theme.ink), linewidth=2)
 
-    >>> _ticks(0.08, 6.0)
+
+def _draw_row_texts(page: Page, row: Row, y: float) -> None:
+    """Draw the label of a row to the left of the axes, and its ratio to the right."""
+    label = ", ".join(text for text in (row.name, row.case) if text)
+    page.text(
+        f"{label}  /  {row.yardstick}", _LEFT_PX - 14, y, points=SMALL, room=_LEFT_PX - 38, align="right"
+    )
+    page.text(f"{row.ratio:.2f}", _WIDTH_PX - _RIGHT_PX + 14, y, points=SMALL, bold=row.met is False)
+
+
+def _find_limits(rows: Sequence[Row]) -> tuple[float, float]:
+    """Return the horizontal limits: all ratios and goals, and 1, with some margin."""
+    values = [1.0]
+    for row in rows:
+        values += [value for value in (row.ratio, row.goal) if value is not None]
+    return 0.75 * min(values), 1.35 * max(values)
+
+
+def _choose_ticks(low: float, high: float) -> list[float]:
+    """Return round numbers between two limits, few enough to be legible.
+
+    >>> _choose_ticks(0.08, 6.0)
     [0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
     """
-    for leading in ((1, 2, 5), (1, 3), (1,)):
-        numbers = [float(f"{digit}e{power}") for power in range(-4, 6) for digit in leading]
-        found = [tick for tick in numbers if low <= tick <= high]
-        if len(found) <= 7:
+    ticks: list[float] = []
+    for leading_digits in ((1, 2, 5), (1, 3), (1,)):
+        numbers = [float(f"{digit}e{power}") for power in range(-4, 6) for digit in leading_digits]
+        ticks = [number for number in numbers if low <= number <= high]
+        if len(ticks) <= _MAX_TICKS:
             break
-    return found
+    return ticks

@@ -1,4 +1,4 @@
-"""Sweeps, per run, and the start of commands, against an interpreter that imports numpy."""
+"""Sweeps, and the start of commands, in comparison with an interpreter that imports numpy."""
 
 import os
 import subprocess
@@ -9,57 +9,93 @@ from functools import partial
 from itertools import count
 
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row, in_turn
+from robocov_app.bench.measure import Case, Row, measure_in_alternation
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
-NUMPY = "import numpy"  # the yardstick
-BEFORE = 6.0  # see `Row.before`
-MAPS, CONTROLLERS, DURATION, WORKERS = ("rooms", "museum", "campus"), ("rapf", "lloyd"), 20.0, 2
+YARDSTICK = "import numpy"
+"""Code of the yardstick."""
+MAPS = ("rooms", "museum", "campus")
+CONTROLLERS = ("rapf", "lloyd")
+DURATION_S = 20.0
+WORKERS = 2
+BEFORE = 6.0
+"""Earlier ratio of a run; see `Row.before`."""
+_SWEEP_SPEEDUP = 4.0
+_FULL_SEEDS = 84
+_YARDSTICK_REPEATS = 5
+"""Number of interpreters that are started in each round."""
 
-
-def cases(*, quick: bool = False) -> list[Case]:
-    return [partial(_rows, 1 if quick else 84)]
-
-
-def _rows(seeds: int) -> Iterator[Row]:
-    maps = tuple(StudyMap(name, load_map(name)) for name in MAPS)
-    study = Study(maps=maps, controllers=CONTROLLERS, seeds=range(seeds), robots=(6,), duration=DURATION)
-    folders = count()
-    with tempfile.TemporaryDirectory() as folder:
-        calls = {
-            "sweep": lambda: sweep(study, f"{folder}/{next(folders)}", workers=WORKERS, quiet=True),
-            "numpy": lambda: [subprocess.run([sys.executable, "-c", NUMPY]) for _ in range(5)],
-        }
-        # processor time of all processes: a sweep takes all cores there are
-        taken = in_turn(calls, 1, clock=lambda: sum(os.times()[:4]))
-    size, each = {"runs": len(study), "workers": WORKERS}, taken["sweep"] / len(study)
-    note, yardstick = f"{WORKERS / each:.1f} runs a second, all cores free", (NUMPY, taken["numpy"] / 5)
-    shown = "sweep", f"a run of {DURATION:g} s", size, each
-    yield Row(*shown, *yardstick, goal=BEFORE / 4, note=note, before=BEFORE)
-
-
-# how long a command takes before it does anything
-
-EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
-WORDS: dict[str, tuple[str, ...]] = {  # first actions of a user, with the interpreter's arguments for each
+_IMPORT_EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
+COMMANDS: dict[str, tuple[str, ...]] = {
     "robocov --help": ("-m", "robocov_app", "--help"),
     "robocov run --help": ("-m", "robocov_app", "run", "--help"),
     "robocov maps": ("-m", "robocov_app", "maps"),
     "import robocov": ("-c", "import robocov"),
-    "import robocov, all of it": ("-c", EVERYTHING),
+    "import robocov, all of it": ("-c", _IMPORT_EVERYTHING),
 }
-GOALS = {"robocov --help": 2.0}
+"""First commands of a user, with the arguments of the interpreter."""
+START_GOALS = {"robocov --help": 2.0}
+"""Maximum ratios of commands."""
 
 
-def start_cases(*, quick: bool = False) -> list[Case]:
-    return [partial(_start_rows, quick)]
+def list_cases(*, quick: bool = False) -> list[Case]:
+    """Return the case of a sweep."""
+    return [partial(_measure_sweep, 1 if quick else _FULL_SEEDS)]
 
 
-def _start_rows(quick: bool) -> Iterator[Row]:
-    silent = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
-    words = {NUMPY: ("-c", NUMPY), **WORDS}
-    calls = {name: partial(silent, [sys.executable, *given]) for name, given in words.items()}
-    taken = in_turn(calls, 3 if quick else 15)
-    for name in WORDS:
-        yield Row("start", name, {}, taken[name], NUMPY, taken[NUMPY], GOALS.get(name))
+def list_start_cases(*, quick: bool = False) -> list[Case]:
+    """Return the case of the start of commands."""
+    return [partial(_measure_starts, quick)]
+
+
+def _measure_sweep(seeds: int) -> Iterator[Row]:
+    maps = tuple(StudyMap(name, load_map(name)) for name in MAPS)
+    study = Study(maps=maps, controllers=CONTROLLERS, seeds=range(seeds), robots=(6,), duration=DURATION_S)
+    numbers = count()
+    with tempfile.TemporaryDirectory() as folder:
+        calls = {
+            "sweep": lambda: sweep(study, f"{folder}/{next(numbers)}", workers=WORKERS, quiet=True),
+            "numpy": lambda: [
+                subprocess.run([sys.executable, "-c", YARDSTICK]) for _ in range(_YARDSTICK_REPEATS)
+            ],
+        }
+        # Processor time of all processes: a sweep uses all cores.
+        times = measure_in_alternation(calls, 1, clock=_get_processor_time)
+    seconds = times["sweep"] / len(study)
+    yield Row(
+        "sweep",
+        f"a run of {DURATION_S:g} s",
+        {"runs": len(study), "workers": WORKERS},
+        seconds,
+        yardstick=YARDSTICK,
+        yardstick_seconds=times["numpy"] / _YARDSTICK_REPEATS,
+        goal=BEFORE / _SWEEP_SPEEDUP,
+        note=f"{WORKERS / seconds:.1f} runs a second, all cores free",
+        before=BEFORE,
+    )
+
+
+def _get_processor_time() -> float:
+    """Return the processor time of this process and of those that it has waited for, s."""
+    return sum(os.times()[:4])
+
+
+def _measure_starts(quick: bool) -> Iterator[Row]:
+    """Measure how long commands take before they do anything."""
+    run_silently = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
+    commands = {YARDSTICK: ("-c", YARDSTICK), **COMMANDS}
+    calls = {
+        name: partial(run_silently, [sys.executable, *arguments]) for name, arguments in commands.items()
+    }
+    times = measure_in_alternation(calls, 3 if quick else 15)
+    for name in COMMANDS:
+        yield Row(
+            "start",
+            name,
+            {},
+            times[name],
+            yardstick=YARDSTICK,
+            yardstick_seconds=times[YARDSTICK],
+            goal=START_GOALS.get(name),
+        )

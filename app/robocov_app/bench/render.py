@@ -1,4 +1,4 @@
-"""Drawing a frame against filling and copying an empty one; films and PNGs against drawing their frames."""
+"""Drawing a frame in comparison with filling and copying an empty one; encoding with drawing."""
 
 import tempfile
 from collections.abc import Iterator
@@ -13,59 +13,80 @@ from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Call, Case, Row, in_turn
+from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import record_scene
 from robocov_app.runs.encoding import encode_png, save_video
 from robocov_app.runs.frames import draw_frames
 from robocov_app.runs.settings import VideoSettings
 
-SIZE = (1280, 720)
-FRAME_GOALS = {50: 4e-3}  # wanted seconds for a frame, by number of robots
+SIZE_PX = (1280, 720)
+FRAME_GOALS_S = {50: 4e-3}
+"""Maximum time of a frame by number of robots."""
+FRAME_YARDSTICK = "clear and flip"
+_FRAME_CASES = (("rooms", 6), ("rooms", 50), ("campus", 200))
+"""Maps and numbers of robots."""
+_RUN_DURATION_S = 5.0
+_WHITE = (255, 255, 255)
 
 
-def cases(*, quick: bool = False) -> list[Case]:
-    frames = [partial(_frames, name, n, quick) for name, n in (("rooms", 6), ("rooms", 50), ("campus", 200))]
-    return [*frames, partial(_films, quick)]
+def list_cases(*, quick: bool = False) -> list[Case]:
+    """Return the cases of frames, videos and PNGs."""
+    frames = [partial(_measure_frames, name, robots, quick) for name, robots in _FRAME_CASES]
+    return [*frames, partial(_measure_encoding, quick)]
 
 
-def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
-    record = _travelled(name, n)
-    painter = Painter(record.environment, SIZE)
-    canvas = pygame.Surface(SIZE)
+def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
+    record = _simulate(name, robots)
+    painter = Painter(record.environment, SIZE_PX)
+    canvas = pygame.Surface(SIZE_PX)
     scenes = cycle([record_scene(record, k) for k in range(len(record))])
-    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": cleared(canvas)}
-    taken = in_turn(calls, 40 if quick else 150)
-    frame, bare = taken["frame"], ("clear and flip", taken["bare"])
-    goal = FRAME_GOALS.get(n)
-    yield Row("render", "one frame", {"robots": n, "map": name}, frame, *bare, goal_seconds=goal)
+    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": build_clearing_call(canvas)}
+    times = measure_in_alternation(calls, 40 if quick else 150)
+    yield Row(
+        "render",
+        "one frame",
+        {"robots": robots, "map": name},
+        times["frame"],
+        yardstick=FRAME_YARDSTICK,
+        yardstick_seconds=times["bare"],
+        goal_seconds=FRAME_GOALS_S.get(robots),
+    )
 
 
-def cleared(canvas: pygame.Surface | None) -> Call:
+def build_clearing_call(canvas: pygame.Surface | None) -> Call:
+    """Return a call that fills an empty surface and copies it to a canvas."""
     assert canvas is not None
-    empty = pygame.Surface(SIZE)
-    return lambda: (empty.fill((255, 255, 255)), canvas.blit(empty, (0, 0)))
+    empty = pygame.Surface(SIZE_PX)
+    return lambda: (empty.fill(_WHITE), canvas.blit(empty, (0, 0)))
 
 
-def _films(quick: bool) -> Iterator[Row]:
-    record = _travelled("rooms", 6)
-    look = VideoSettings(colours="robots")
-    shown = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
-    frames = list(draw_frames(record, look, size=SIZE, rows=shown))
+def _measure_encoding(quick: bool) -> Iterator[Row]:
+    record = _simulate("rooms", 6)
+    settings = VideoSettings(colours="robots")
+    rows = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
+    frames = list(draw_frames(record, settings, size=SIZE_PX, rows=rows))
     with tempfile.TemporaryDirectory() as folder:
-        film = Path(folder) / "film.mp4"
+        path = Path(folder) / "film.mp4"
         calls = {
-            "draw": lambda: list(draw_frames(record, look, size=SIZE, rows=shown)),
-            "film": lambda: save_video(film, frames),
+            "draw": lambda: list(draw_frames(record, settings, size=SIZE_PX, rows=rows)),
+            "video": lambda: save_video(path, frames),
             "png": lambda: [encode_png(frame) for frame in frames],
         }
-        taken = in_turn(calls, 1 if quick else 3)
-    for name, call in (("film encoded", "film"), ("PNGs encoded", "png")):
-        rate, drawn = len(frames) / taken[call], ("drawing the frames", taken["draw"])
-        size = {"frames": len(frames)}
-        yield Row("render", name, size, taken[call], *drawn, note=f"{rate:.0f} frames a second")
+        times = measure_in_alternation(calls, 1 if quick else 3)
+    for name, call in (("film encoded", "video"), ("PNGs encoded", "png")):
+        yield Row(
+            "render",
+            name,
+            {"frames": len(frames)},
+            times[call],
+            yardstick="drawing the frames",
+            yardstick_seconds=times["draw"],
+            note=f"{len(frames) / times[call]:.0f} frames a second",
+        )
 
 
-def _travelled(name: str, n: int) -> Record:
+def _simulate(name: str, robots: int) -> Record:
     environment = load_map(name)
-    return Simulation(environment, Rapf(), environment.start("uniform").sample(n, seed=0)).run(5.0)
+    starts = environment.start("uniform").sample(robots, seed=0)
+    return Simulation(environment, Rapf(), starts).run(_RUN_DURATION_S)

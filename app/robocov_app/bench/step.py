@@ -1,7 +1,8 @@
-"""A whole step (observe, cells, forces, physics) against Qhull's Delaunay triangulation and bare physics."""
+"""A whole step (observe, cells, forces, physics) compared with Qhull's triangulation and bare physics."""
 
 from collections.abc import Iterator
 from functools import partial
+from typing import NamedTuple
 
 import pymunk
 from scipy.spatial import Delaunay
@@ -9,57 +10,127 @@ from scipy.spatial import Delaunay
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation, SimulationBatch
-from robocov_app.bench.measure import Call, Case, Row, in_turn
-
-GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
-"""Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
-BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}  # see `Row.before`
-TOGETHER, TOGETHER_GOAL = 64, 5.0  # runs moved on together; wanted multiple of bare physics for each
-BARE = "bare Space.step"  # the physics engine alone: the same bodies in an empty space
-WARM_UP = 120  # steps before the first that counts: two seconds, by when the team is on its way
+from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
 
 
-def cases(*, quick: bool = False) -> list[Case]:
-    return [*(partial(_rows, n, quick) for n in GOALS), partial(_together, quick)]
+class Ratios(NamedTuple):
+    """Ratios of the time of a step to those of its yardsticks."""
+
+    triangulation: float
+    physics: float
 
 
-def _rows(n: int, quick: bool) -> Iterator[Row]:
+GOALS = {
+    6: Ratios(triangulation=1.0, physics=16.0),
+    50: Ratios(triangulation=0.7, physics=12.0),
+    200: Ratios(triangulation=0.5, physics=9.0),
+    1000: Ratios(triangulation=0.5, physics=8.0),
+}
+"""Maximum ratios by number of robots."""
+BEFORE = {
+    6: Ratios(triangulation=4.2, physics=80.0),
+    50: Ratios(triangulation=2.6, physics=57.0),
+    200: Ratios(triangulation=1.4, physics=38.0),
+    1000: Ratios(triangulation=1.0, physics=31.0),
+}
+"""Earlier ratios; see `Row.before`."""
+BATCH_RUNS = 64
+"""Number of runs that are simulated together."""
+BATCH_GOAL = 5.0
+"""Maximum ratio of a step of one of them to bare physics."""
+BATCH_ROBOTS = 6
+BARE_PHYSICS = "bare Space.step"
+"""Yardstick: the physics engine alone, with the same bodies in an empty space."""
+TRIANGULATION = "Qhull's Delaunay"
+WARM_UP_STEPS = 120
+"""Steps before the measurement: two seconds, after which the team is moving."""
+_MIN_SPEED = 60.0
+"""Minimum ratio of simulation time to real time for six robots."""
+_LARGE_TEAM = 500
+"""Number of robots above which fewer rounds are measured."""
+_ROBOT_RADIUS_M = 0.1
+
+
+def list_cases(*, quick: bool = False) -> list[Case]:
+    """Return the cases of single simulations, and of a batch."""
+    return [*(partial(_measure_step, robots, quick) for robots in GOALS), partial(_measure_batch, quick)]
+
+
+def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
     campus = load_map("campus")
-    simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(n, seed=0))
-    space = _warmed_up(simulation, n)
-    rounds = (60 if quick else 300) if n <= 500 else 30 if quick else 100
-    calls: dict[str, Call] = {"step": simulation.step, "space": partial(space.step, simulation.dt)}
-    calls["delaunay"] = lambda: Delaunay(simulation.positions)
-    taken = in_turn(calls, rounds)
-    step = taken["step"]
-    # six robots 60 times as fast as real ones
-    slowest = simulation.dt / 60.0 if n == 6 else None
-    shown, triangulated = ("step", "one step", {"robots": n}, step), ("Qhull's Delaunay", taken["delaunay"])
-    (goal, bare_goal), (before, bare_before) = GOALS[n], BEFORE[n]
-    yield Row(*shown, *triangulated, goal, slowest, f"{simulation.dt / step:.0f} x real time", before)
-    yield Row(*shown, BARE, taken["space"], bare_goal, before=bare_before)
+    simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(robots, seed=0))
+    space = _warm_up(simulation, robots)
+    calls: dict[str, Call] = {
+        "step": simulation.step,
+        "space": partial(space.step, simulation.dt),
+        "delaunay": lambda: Delaunay(simulation.positions),
+    }
+    times = measure_in_alternation(calls, _get_rounds(robots, quick))
+    step = times["step"]
+    goals = GOALS[robots]
+    before = BEFORE[robots]
+    yield Row(
+        "step",
+        "one step",
+        {"robots": robots},
+        step,
+        yardstick=TRIANGULATION,
+        yardstick_seconds=times["delaunay"],
+        goal=goals.triangulation,
+        goal_seconds=simulation.dt / _MIN_SPEED if robots == 6 else None,
+        note=f"{simulation.dt / step:.0f} x real time",
+        before=before.triangulation,
+    )
+    yield Row(
+        "step",
+        "one step",
+        {"robots": robots},
+        step,
+        yardstick=BARE_PHYSICS,
+        yardstick_seconds=times["space"],
+        goal=goals.physics,
+        before=before.physics,
+    )
 
 
-def _together(quick: bool) -> Iterator[Row]:
-    campus, n = load_map("campus"), 6
-    starts = [campus.start("uniform").sample(n, seed=seed) for seed in range(TOGETHER)]
+def _get_rounds(robots: int, quick: bool) -> int:
+    if robots > _LARGE_TEAM:
+        return 30 if quick else 100
+    return 60 if quick else 300
+
+
+def _measure_batch(quick: bool) -> Iterator[Row]:
+    campus = load_map("campus")
+    starts = [campus.start("uniform").sample(BATCH_ROBOTS, seed=seed) for seed in range(BATCH_RUNS)]
     simulation = SimulationBatch(campus, Rapf(), starts)
-    # as often as there are runs: what one call takes is too short for the clock
-    bare = [partial(_warmed_up(simulation, n).step, simulation.dt)] * TOGETHER
-    calls: dict[str, Call] = {"step": simulation.step, "space": lambda: [call() for call in bare]}
-    taken = in_turn(calls, 60 if quick else 300)
-    size, each = {"robots": n, "runs together": TOGETHER}, taken["step"] / TOGETHER
-    bare_each = BARE, taken["space"] / TOGETHER, TOGETHER_GOAL
-    yield Row("step", "one step of one run", size, each, *bare_each, before=BEFORE[n][1])
+    space = _warm_up(simulation, BATCH_ROBOTS)
+
+    def step_spaces() -> None:
+        # One call is too short for the clock, so there are as many as runs.
+        for _ in range(BATCH_RUNS):
+            space.step(simulation.dt)
+
+    calls: dict[str, Call] = {"step": simulation.step, "space": step_spaces}
+    times = measure_in_alternation(calls, 60 if quick else 300)
+    yield Row(
+        "step",
+        "one step of one run",
+        {"robots": BATCH_ROBOTS, "runs together": BATCH_RUNS},
+        times["step"] / BATCH_RUNS,
+        yardstick=BARE_PHYSICS,
+        yardstick_seconds=times["space"] / BATCH_RUNS,
+        goal=BATCH_GOAL,
+        before=BEFORE[BATCH_ROBOTS].physics,
+    )
 
 
-def _warmed_up(simulation: Simulation | SimulationBatch, n: int) -> pymunk.Space:
-    """Send the team on its way; return a space with discs where its first n robots are, and nothing else."""
-    for _ in range(WARM_UP):
+def _warm_up(simulation: Simulation | SimulationBatch, robots: int) -> pymunk.Space:
+    """Run a simulation for a while; return an empty space with discs at the positions of its first robots."""
+    for _ in range(WARM_UP_STEPS):
         simulation.step()
     space = pymunk.Space()
-    for x, y in simulation.positions.reshape(-1, 2)[:n].tolist():
+    for x, y in simulation.positions.reshape(-1, 2)[:robots].tolist():
         body = pymunk.Body(1.0, float("inf"))
         body.position = (x, y)
-        space.add(body, pymunk.Circle(body, 0.1))
+        space.add(body, pymunk.Circle(body, _ROBOT_RADIUS_M))
     return space

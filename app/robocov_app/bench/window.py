@@ -1,6 +1,7 @@
 """The interactive window, used for some seconds with its live cost, without a display."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -10,8 +11,8 @@ import pygame
 
 from robocov.defaults import DEFAULT_LATTICE
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Call, Case, Row, in_turn
-from robocov_app.bench.render import SIZE, cleared
+from robocov_app.bench.measure import Case, Row, measure_in_alternation
+from robocov_app.bench.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.display import collect_garbage_rarely, open_display
 from robocov_app.toolkit.window import FPS
@@ -21,57 +22,105 @@ from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, Team
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
-DRAWING_GOAL, FRAME_GOALS = {50: 4e-3}, {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
-"""Wanted seconds for the drawing of a frame and for everything that it takes, by number of robots."""
-LONGEST = 50e-3  # seconds that no frame may exceed
-_CROWD = 100  # from so many robots on they are smaller, so that there is room for them
+TEAM_SIZES = (6, 50, 200, 1000)
+DRAWING_GOALS_S = {50: 4e-3}
+"""Maximum time to draw a frame, by number of robots."""
+FRAME_GOALS_S = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
+"""Maximum time of everything that a frame needs, by number of robots."""
+MAX_FRAME_S = 50e-3
+"""Maximum time of any frame."""
+_MIN_CROWD = 100
+"""Number of robots from which they are smaller, so that there is space for them."""
+_CROWD_RADIUS_M = 0.05
+_MAX_FIRST_START = 10
+"""Maximum number of robots for which the first start of the map has space."""
 
 
-def cases(*, quick: bool = False) -> list[Case]:
-    return [partial(_used, n, 4.0 if quick else 15.0) for n in (6, 50, 200, 1000)]
+@dataclass
+class _Measurements:
+    """Times of frames, and the number of costs that were computed meanwhile."""
+
+    frames: list[float] = field(default_factory=list)
+    """Time of each frame, s."""
+    drawing: list[float] = field(default_factory=list)
+    """Time of the drawing of each frame, s."""
+    costs: int = 0
 
 
-def _used(n: int, seconds: float) -> Iterator[Row]:
-    limits = TeamSpec(radius=0.05) if n >= _CROWD else TeamSpec()
-    start = "uniform" if n > 10 else None
-    session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), n, start, limits=limits))
+def list_cases(*, quick: bool = False) -> list[Case]:
+    """Return the cases of the window, one for each size of the team."""
+    seconds = 4.0 if quick else 15.0
+    return [partial(_measure_window, robots, seconds) for robots in TEAM_SIZES]
+
+
+def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
+    session = _build_session(robots)
     with open_display(headless=True):
-        shown = {layer.name for layer in standard_layers() if layer.default}
-        viewer = Presenter(session, Costs(DEFAULT_LATTICE), shown, Path(), "rooms")
-        window = Window(viewer, SIZE, 1.0)
+        layers = {layer.name for layer in standard_layers() if layer.default}
+        presenter = Presenter(session, Costs(DEFAULT_LATTICE), layers, Path(), "rooms")
+        window = Window(presenter, SIZE_PX, 1.0)
         try:
             with collect_garbage_rarely():
-                frames, drawing, answers = _played(window, seconds)
+                measured = _use_window(window, seconds)
         finally:
-            viewer.costs.close()
-        clear_and_flip: list[Call] = [cleared(pygame.display.get_surface()), pygame.display.flip]
-        bare = in_turn({"bare": lambda: [call() for call in clear_and_flip]}, len(frames))["bare"]
-    for name, took, goal, note in (
-        ("all of a frame", median(frames), FRAME_GOALS[n], f"{answers / seconds:.0f} costs a second"),
-        ("drawing", median(drawing), DRAWING_GOAL.get(n), ""),
-        ("the longest", max(frames), LONGEST, f"of {len(frames)} frames"),
-    ):
-        yield Row("window", name, {"robots": n}, took, "clear and flip", bare, goal_seconds=goal, note=note)
+            presenter.costs.close()
+        clear = build_clearing_call(pygame.display.get_surface())
+
+        def clear_and_flip() -> None:
+            clear()
+            pygame.display.flip()
+
+        bare = measure_in_alternation({"bare": clear_and_flip}, len(measured.frames))["bare"]
+    figures = (
+        (
+            "all of a frame",
+            median(measured.frames),
+            FRAME_GOALS_S[robots],
+            f"{measured.costs / seconds:.0f} costs a second",
+        ),
+        ("drawing", median(measured.drawing), DRAWING_GOALS_S.get(robots), ""),
+        ("the longest", max(measured.frames), MAX_FRAME_S, f"of {len(measured.frames)} frames"),
+    )
+    for name, time, goal, note in figures:
+        yield Row(
+            "window",
+            name,
+            {"robots": robots},
+            time,
+            yardstick=FRAME_YARDSTICK,
+            yardstick_seconds=bare,
+            goal_seconds=goal,
+            note=note,
+        )
 
 
-def _played(window: Window, seconds: float) -> tuple[list[float], list[float], int]:
-    """Return what each frame took, what its drawing took, and how many costs were answered."""
+def _build_session(robots: int) -> Session:
+    limits = TeamSpec(radius=_CROWD_RADIUS_M) if robots >= _MIN_CROWD else TeamSpec()
+    start = "uniform" if robots > _MAX_FIRST_START else None
+    scenario = Scenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, start, limits=limits)
+    return Session(scenario)
+
+
+def _use_window(window: Window, seconds: float) -> _Measurements:
+    """Advance and draw the window for some seconds."""
     clock = pygame.time.Clock()
-    frames: list[float] = []
-    drawing: list[float] = []
-    # the first moments prepare the map's cost and draw all that is kept afterwards
+    # The first frames prepare the cost of the map, and draw everything that is stored afterwards.
     for _ in range(FPS):
         window.frame(clock.tick(FPS) / 1000.0)
     curve = window.viewer.pane.curve
-    known = len(curve)
-    began = before = perf_counter()
-    while perf_counter() - began < seconds:
+    known_costs = len(curve)
+    measured = _Measurements()
+    start = perf_counter()
+    previous = start
+    while perf_counter() - start < seconds:
         now = perf_counter()
-        window.advance(now - before)
-        before, drawn = now, perf_counter()
+        window.advance(now - previous)
+        previous = now
+        drawing_start = perf_counter()
         window.draw()
-        done = perf_counter()
-        frames.append(done - now)
-        drawing.append(done - drawn)
+        end = perf_counter()
+        measured.frames.append(end - now)
+        measured.drawing.append(end - drawing_start)
         clock.tick(FPS)
-    return frames, drawing, len(curve) - known
+    measured.costs = len(curve) - known_costs
+    return measured

@@ -38,12 +38,12 @@ class Part(NamedTuple):
 
     title: str
     module: str
-    function: str = "cases"
+    function: str = "list_cases"
 
 
 PARTS = {
     "step": Part("A step of RAPF on campus", "step"),
-    "maps": Part("The exact coverage cost on maps", "cost", "map_cases"),
+    "maps": Part("The exact coverage cost on maps", "cost", "list_map_cases"),
     "cost": Part("The exact coverage cost in a unit square with random obstacles", "cost"),
     "learning": Part(
         "Learning environments on rooms, with the exact cost in the reward of each step", "learning"
@@ -51,7 +51,7 @@ PARTS = {
     "sweep": Part("A sweep of short runs on three maps, processor time", "processes"),
     "render": Part("Pictures of 1280 x 720", "render"),
     "window": Part("The window of 1280 x 720 on rooms, in use", "window"),
-    "start": Part("Until a command begins", "processes", "start_cases"),
+    "start": Part("Until a command begins", "processes", "list_start_cases"),
 }
 """The parts by name, in the order in which they are measured."""
 PartName = Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]

@@ -14,7 +14,7 @@ from called import complaint
 from matplotlib.figure import Figure
 
 from robocov_app.bench import cost, learning, plot, processes, render, step, window
-from robocov_app.bench.measure import Row, in_turn
+from robocov_app.bench.measure import Row, measure_in_alternation
 from robocov_app.cli import main
 from robocov_app.commands import bench
 
@@ -40,7 +40,7 @@ class Clock:
         return call
 
 
-def test_calls_are_made_in_turn_and_their_medians_taken():
+def test_calls_alternate_and_have_median_times():
     clock, order = Clock(), []
     slow, quick = clock.work(9.0, 3.0, 1.0, 2.0), clock.work(9.0, 0.5, 0.25, 1.5)
 
@@ -50,7 +50,7 @@ def test_calls_are_made_in_turn_and_their_medians_taken():
 
     calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
     prepared = partial(noted, "before", clock.work(*[100.0] * 3))
-    assert in_turn(calls, 3, clock=clock, before=prepared) == {"slow": 2.0, "quick": 0.5}
+    assert measure_in_alternation(calls, 3, clock=clock, before=prepared) == {"slow": 2.0, "quick": 0.5}
     # the first round does not count, and nothing is collected meanwhile
     round_ = [("slow", False), ("quick", False)]
     assert order == [*round_, *[("before", False), *round_] * 3]
@@ -58,11 +58,11 @@ def test_calls_are_made_in_turn_and_their_medians_taken():
 
 
 @pytest.mark.slow
-def test_rounds_go_on_until_the_time_is_over():
+def test_rounds_continue_until_the_minimum_time():
     clock = Clock()
     for least, seconds, rounds in ((2, 6.5, 7), (5, 2.0, 5)):
         made, work = [], clock.work(*[1.0] * 20)
-        in_turn({"one": lambda: made.append(work())}, least, seconds, clock=clock)  # noqa: B023 - at once
+        measure_in_alternation({"one": lambda: made.append(work())}, least, seconds, clock=clock)  # noqa: B023 - at once
         assert len(made) == 1 + rounds
 
 
@@ -79,14 +79,14 @@ def test_a_goal_is_met_or_missed(goal, goal_seconds, met):
     assert list(row.to_dict()) == KEYS
 
 
-def test_without_a_yardstick_there_is_no_ratio_to_want():
+def test_without_a_yardstick_there_is_no_ratio():
     row = Row("cost", "evaluated", {"lattice": 128, "robots": 6}, 0.4, goal=1.0)
     assert (row.ratio, row.met) == (None, None)
     assert bench.format_goals(row) == ""
     assert row.case == "128 x 128, 6 robots"
 
 
-def test_one_thread_is_wanted_before_there_are_any():
+def test_threads_are_limited_before_numpy_is_loaded():
     """The variables that say how many are read when numpy is loaded."""
     script = "import sys\nfrom robocov_app.cli import main\nfrom robocov_app.commands import bench\n"
     script += "bench.command = lambda options: print('numpy' in sys.modules)\nmain(['bench', 'start'])"
@@ -94,28 +94,30 @@ def test_one_thread_is_wanted_before_there_are_any():
     assert said.stdout == "False\n"
 
 
-def small(monkeypatch):
+def shrink_parts(monkeypatch):
     """Make every part a matter of a second or two."""
-    monkeypatch.setattr(step, "GOALS", {6: (None, 16.0)})
-    monkeypatch.setattr(step, "TOGETHER", 2)
+    monkeypatch.setattr(step, "GOALS", {6: step.GOALS[6]})
+    monkeypatch.setattr(step, "BATCH_RUNS", 2)
     monkeypatch.setattr(cost, "BEFORE", {("rooms", 64, 6): 4.5})
-    monkeypatch.setattr(learning, "TOGETHER", 2)
+    monkeypatch.setattr(learning, "ENVIRONMENTS", 2)
     monkeypatch.setattr(processes, "MAPS", ("square",))
-    monkeypatch.setattr(processes, "DURATION", 1.0)
-    monkeypatch.setattr(step, "WARM_UP", 2)
-    monkeypatch.setattr(cost, "random_map", lambda vertices: cost_map(vertices))
-    monkeypatch.setattr(processes, "WORDS", {"import robocov": ("-c", "import robocov")})
-    monkeypatch.setattr(render, "cases", lambda quick: [partial(render._frames, "rooms", 6, quick)])
-    monkeypatch.setattr(window, "cases", lambda quick: [partial(window._used, 6, 0.5)])
+    monkeypatch.setattr(processes, "DURATION_S", 1.0)
+    monkeypatch.setattr(step, "WARM_UP_STEPS", 2)
+    monkeypatch.setattr(cost, "build_random_map", lambda vertices: build_small_map(vertices))
+    monkeypatch.setattr(processes, "COMMANDS", {"import robocov": ("-c", "import robocov")})
+    monkeypatch.setattr(
+        render, "list_cases", lambda quick: [partial(render._measure_frames, "rooms", 6, quick)]
+    )
+    monkeypatch.setattr(window, "list_cases", lambda quick: [partial(window._measure_window, 6, 0.5)])
 
 
-def cost_map(vertices, real=cost.random_map):
+def build_small_map(vertices, real=cost.build_random_map):
     return real(min(vertices, 20))
 
 
 @pytest.mark.slow
 def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
-    small(monkeypatch)
+    shrink_parts(monkeypatch)
     target = tmp_path / "ratios.png"
     assert main(["bench", "all", "--quick", "--json", "--plot", str(target)]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -129,8 +131,8 @@ def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
     assert target.stat().st_size > 10_000
 
 
-def test_a_table_for_people(monkeypatch, capsys):
-    small(monkeypatch)
+def test_the_table_has_yardsticks_and_notes(monkeypatch, capsys):
+    shrink_parts(monkeypatch)
     assert main(["bench", "step", "--quick"]) == 0
     said = capsys.readouterr()
     assert "Qhull's Delaunay" in said.out
@@ -139,10 +141,10 @@ def test_a_table_for_people(monkeypatch, capsys):
     assert re.search(r"measuring: 2 of 2 in", said.err)
 
 
-def test_the_cost_is_measured_beside_its_yardstick(monkeypatch):
+def test_the_cost_is_compared_with_its_yardstick(monkeypatch):
     pytest.importorskip("skfmm", reason="the yardstick is an extra")
-    small(monkeypatch)
-    built, few, many = cost._rows(128, 200, quick=True)
+    shrink_parts(monkeypatch)
+    built, few, many = cost._measure_size(128, 200, quick=True)
     assert built.yardstick is None
     assert (few.goal, many.goal) == (cost.GOALS[128, 200, 6], cost.GOALS[128, 200, 50])
     assert few.ratio is not None
@@ -150,30 +152,30 @@ def test_the_cost_is_measured_beside_its_yardstick(monkeypatch):
 
 def test_fast_marching_measures_the_same_distances():
     pytest.importorskip("skfmm", reason="the yardstick is an extra")
-    evaluated = cost.CoverageCost(cost_map(20), 64)
-    places = cost.Places(evaluated, 6)
-    exact = evaluated(places.now).mean_distance
-    assert cost._marched(evaluated, places) == pytest.approx(exact, rel=0.1)
+    evaluated = cost.CoverageCost(build_small_map(20), 64)
+    moving = cost.MovingRobots(evaluated, 6)
+    exact = evaluated(moving.positions).mean_distance
+    assert cost._measure_by_marching(evaluated, moving) == pytest.approx(exact, rel=0.1)
 
 
 def test_robots_of_the_benchmark_move_a_little_and_stay_free():
-    evaluated = cost.CoverageCost(cost_map(200), 64)
-    places = cost.Places(evaluated, 20)
-    former = places.now
+    evaluated = cost.CoverageCost(build_small_map(200), 64)
+    moving = cost.MovingRobots(evaluated, 20)
+    former = moving.positions
     for _ in range(20):
-        places.move()
-        assert 0.0 < np.abs(places.now - former).max() <= evaluated.spacing / 4.0
-        evaluated(places.now)
+        moving.move()
+        assert 0.0 < np.abs(moving.positions - former).max() <= evaluated.spacing / 4.0
+        evaluated(moving.positions)
 
 
 @pytest.mark.slow
-def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
+def test_without_the_yardstick_the_message_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
     assert "pip install 'robocov[bench]'" in complaint(capsys, "bench", "cost")
-    small(monkeypatch)
-    monkeypatch.setattr(processes, "start_cases", lambda quick: [])
+    shrink_parts(monkeypatch)
+    monkeypatch.setattr(processes, "list_start_cases", lambda quick: [])
     for other in (step, render, window):
-        monkeypatch.setattr(other, "cases", lambda quick: [])
+        monkeypatch.setattr(other, "list_cases", lambda quick: [])
     assert main(["bench", "all", "--quick", "--json"]) == 0
     said = capsys.readouterr()
     assert "pip install 'robocov[bench]'" in said.err
@@ -184,19 +186,19 @@ def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
     assert all(row["ratio"] is None and row["met"] is None for row in rows)
 
 
-def test_what_was_measured_until_the_interruption_is_told(monkeypatch, capsys):
+def test_an_interruption_leaves_the_measured_rows(monkeypatch, capsys):
     def interrupted():
         yield Row("step", "one step", {"robots": 7}, 1.0, "yardstick", 0.5)
 
     def stop():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(step, "cases", lambda quick: [interrupted, stop, stop])
+    monkeypatch.setattr(step, "list_cases", lambda quick: [interrupted, stop, stop])
     assert main(["bench", "step"]) == 130
     assert "7 robots" in capsys.readouterr().out
 
 
-def test_a_plot_that_cannot_be_written_is_told_before_anything_is_measured(capsys, tmp_path):
+def test_an_invalid_plot_file_is_rejected_before_anything_is_measured(capsys, tmp_path):
     assert "'.gif'" in complaint(capsys, "bench", "step", "--plot", str(tmp_path / "ratios.gif"))
     assert "there is no folder" in complaint(capsys, "bench", "step", "--plot", str(tmp_path / "a" / "b.png"))
 
@@ -216,7 +218,7 @@ ROWS = [
 
 
 @pytest.mark.parametrize("rows", [ROWS, ROWS[-3:], ROWS[:12]], ids=["all", "no cost", "only cost"])
-def test_every_word_of_the_plot_is_inside_and_alone(rows, tmp_path, monkeypatch):
+def test_no_text_of_the_plot_is_cut_off_or_overlaps(rows, tmp_path, monkeypatch):
     drawn: list[Figure] = []
     save = plot.save_figure
 

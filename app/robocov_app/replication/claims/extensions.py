@@ -62,7 +62,7 @@ def judge_density(outcomes: Outcomes) -> Claim:
 
 def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
     """Judge whether a mixed team arrives earlier with cells by time than with cells by distance."""
-    by_distance, by_time = (contender for contender in TEAMS if contender.controller == controller)
+    by_distance, by_time = [contender for contender in TEAMS if contender.controller == controller]
     label = by_time.label.partition(",")[0]
     return judge_pairs(
         Claim(

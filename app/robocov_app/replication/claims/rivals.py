@@ -11,7 +11,7 @@ from robocov.controllers import get_information, load_controller_class
 from robocov_app.figures.statistics import bootstrap_by
 from robocov_app.replication.claims.claim import RIVALS, Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import describe_losses
-from robocov_app.replication.claims.thresholds import MOST_OF_GAP
+from robocov_app.replication.claims.thresholds import MIN_CLOSED_FRACTION
 from robocov_app.replication.contenders import OURS, PAPER, Contender, select_strongest
 from robocov_app.replication.formatting import format_median
 from robocov_app.replication.outcomes import Outcomes
@@ -78,5 +78,5 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
         f"Medians of J/J_ref - 1 in the same runs: {format_median(own_gaps, '%')} and "
         f"{format_median(other_gaps, '%')}."
     )
-    criterion = Criterion("part of the median gap that is closed", closed, low=MOST_OF_GAP, unit="%")
+    criterion = Criterion("part of the median gap that is closed", closed, low=MIN_CLOSED_FRACTION, unit="%")
     return claim.judge((criterion,), explanation, known, runs_per_instance=2)

@@ -52,8 +52,8 @@ MAX_REST_TIME_S = 40.0
 """Maximum median time until rest."""
 MAX_STEP_RATIO = 10.0
 """Maximum ratio of the step time of a large team to that of RAPF."""
-MOST_OF_GAP = 0.5
-"""Most of a gap is closed if more than half of it is."""
+MIN_CLOSED_FRACTION = 0.5
+"""Minimum fraction of a gap that is closed, if most of it is."""
 
 TOLERATED = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
 """Disturbances that RAPF should tolerate: axis and value, and their description."""
