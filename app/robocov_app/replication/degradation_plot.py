@@ -13,7 +13,7 @@ from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.replication.paper_figures import CAPTIONS
 from robocov_app.replication.results import Degradation
-from robocov_app.sweep.study import UNITS
+from robocov_app.sweep.parameters import UNITS
 
 _SIZE_PX = (1180, 720)
 _MAX_COLUMNS = 3

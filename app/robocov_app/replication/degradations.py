@@ -12,7 +12,7 @@ from robocov_app.replication.contenders import RAPF_SHARED
 from robocov_app.replication.plan import Plan
 from robocov_app.replication.results import IDEAL, Degradation
 from robocov_app.replication.step_times import UNKNOWN
-from robocov_app.sweep.study import parameter_column
+from robocov_app.sweep.parameters import name_parameter_column
 
 Costs: TypeAlias = dict[tuple[str, int], float]
 """Final costs, m, by map and seed."""
@@ -46,7 +46,7 @@ def read_degradations(folder: Path, plan: Plan) -> list[Degradation]:
             degradations.append(_build_degradation(IDEAL, None, controller, costs, rapf_costs))
         for axis, values in axes.items():
             table = _read_costs(
-                folder / f"{part}-{axis.replace('_', '-')}", parameter_column(axis), default=values[1]
+                folder / f"{part}-{axis.replace('_', '-')}", name_parameter_column(axis), default=values[1]
             )
             for value, controller in product(values, controllers):
                 ideal_costs = ideal.get((controller, None), {})

@@ -43,7 +43,8 @@ from robocov_app.replication.study_maps import (
     build_unseen_maps,
 )
 from robocov_app.sweep import worker
-from robocov_app.sweep.study import Study, tasks_of
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.tasks import generate_tasks
 
 _WORST_RUNS = 4
 """Number of RAPF's worst runs that are shown."""
@@ -273,13 +274,12 @@ def repeat_worst_runs(study: Study, outcomes: Outcomes, contender: Contender, co
     for k in np.argsort(-known.get_values(contender.key, "gap"), kind="stable").tolist():
         if len(worst) < count:
             worst.setdefault(known.instances[k].map, known.instances[k])
-    environments = {study_map.name: study_map.environment for study_map in study.maps}
     records = {}
-    for task in tasks_of(study):
+    for task in generate_tasks(study):
         instance = ProblemInstance(task.map, task.start, task.seed)
         is_contender = task.controller == contender.controller and dict(task.gains) == contender.all_gains
         if is_contender and instance in worst.values():
-            records[instance] = worker.simulated(task, environments[task.map]).thin(_SHOWN_RATE_HZ)
+            records[instance] = worker.simulate(task).thin(_SHOWN_RATE_HZ)
     return [(instance, records[instance]) for instance in worst.values()]
 
 

@@ -12,7 +12,8 @@ from robocov_app.replication.contenders import UNTUNED, Contender, build_paper_c
 from robocov_app.replication.plan import Plan
 from robocov_app.replication.runner import get_study_folder
 from robocov_app.sweep import worker
-from robocov_app.sweep.study import Study, tasks_of
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.tasks import generate_tasks
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def forecast_study(folder: Path, plan: Plan, workers: int, *, claims: bool, beyo
     for name, study in sweeps.items():
         study_speeds = []
         for controller in study.controllers:
-            study_speeds += [speeds[controller]] * len(study.gains_of(controller).choices)
+            study_speeds += [speeds[controller]] * len(study.get_gains(controller).choices)
         total += left[name] * float(np.mean(study_speeds)) * study.duration
     return Forecast(
         runs,
@@ -121,7 +122,7 @@ def _measure_speeds(plan: Plan, *, beyond: bool) -> dict[str, float]:
     """Return the computing time of one second of simulation time, s, by controller."""
     speeds: dict[str, float] = {}
     for study in studies.build_probe_studies(plan, beyond=beyond):
-        for task in tasks_of(study):
+        for task in generate_tasks(study):
             if not speeds:
                 # The time of loading and compiling on the first run does not count.
                 worker.perform(task)
@@ -134,4 +135,4 @@ def _measure_speeds(plan: Plan, *, beyond: bool) -> dict[str, float]:
 def is_gain_grid_finished(folder: Path, plan: Plan) -> bool:
     """Return whether all runs of the gain grids of RAPF and RPF are finished."""
     runs = get_study_folder(folder, "gains") / "runs"
-    return all((runs / task.name).exists() for task in tasks_of(studies.build_gains_study(plan)))
+    return all((runs / task.name).exists() for task in generate_tasks(studies.build_gains_study(plan)))

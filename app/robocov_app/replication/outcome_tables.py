@@ -99,7 +99,7 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
         Outcomes by controller.
     """
     instances = list_instances(study)
-    gain_sets = {name: study.gains_of(name).choices for name in study.controllers}
+    gain_sets = {name: study.get_gains(name).choices for name in study.controllers}
     excess = {name: np.full((len(sets), len(instances)), np.nan) for name, sets in gain_sets.items()}
     cells = {}
     for name, sets in gain_sets.items():
@@ -117,7 +117,7 @@ def list_instances(study: Study) -> tuple[ProblemInstance, ...]:
     """Return the problem instances of a sweep: all maps, starts and seeds."""
     instances: list[ProblemInstance] = []
     for study_map in study.maps:
-        for start in study.starts_on(study_map):
+        for start in study.list_starts(study_map):
             instances += [ProblemInstance(study_map.name, start, seed) for seed in study.seeds]
     return tuple(instances)
 

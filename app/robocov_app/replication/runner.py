@@ -15,8 +15,9 @@ from robocov_app.replication.references import References, find_references
 from robocov_app.sweep import worker
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import Ledger, opened
-from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
+from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.terminal.interruption import Interruption
 
 STUDY_FILE = "paper.json"
@@ -154,8 +155,8 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
     with ExitStack() as stack:
         for name, study in studies.items():
             ledger = stack.enter_context(opened(get_study_folder(folder, name), study.to_json()))
-            survey = ledger.survey(tasks_of(study), keep_versions=options.keep_versions)
-            for task in compress(tasks_of(study), survey.todo):
+            survey = ledger.survey(generate_tasks(study), keep_versions=options.keep_versions)
+            for task in compress(generate_tasks(study), survey.todo):
                 tasks[task.digest] = task
                 ledgers.setdefault(task.digest, []).append(ledger)
             notes += [f"{name}: {line}" for line in survey.words(keep_versions=options.keep_versions)]

@@ -140,7 +140,7 @@ def _measure(
     clock: Callable[[], float],
 ) -> dict[str, list[float]] | None:
     """Return the step times of controllers in each block, s; None if it was stopped."""
-    scenario = Scenario(TIMING_MAP, team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
+    scenario = Scenario(TIMING_MAP, team=build_swept_team(robots, TEAM), start="uniform", dt=plan.dt)
     simulations = {name: scenario.replace(controller=name).build_simulation() for name in controllers}
     for simulation in simulations.values():
         for _ in range(plan.beyond.warm_up):

@@ -24,7 +24,7 @@ from robocov_app.replication.study_maps import (
     build_unseen_maps,
     load_study_map,
 )
-from robocov_app.sweep import study as sweep_study
+from robocov_app.sweep.parameters import TEAM_PARAMETERS
 from robocov_app.sweep.study import Study, StudyMap
 
 
@@ -309,7 +309,7 @@ def build_conditions_studies(plan: Plan) -> dict[str, Study]:
         for name, values in disturbances.axes.items():
             disturbed = list(values[1:])
             changes: dict[str, Any] = {"conditions": {**COMMON_CONDITIONS, name: disturbed}}
-            if name in sweep_study.TEAM:
+            if name in TEAM_PARAMETERS:
                 changes = {name: disturbed}
             studies[f"{part}-{name.replace('_', '-')}"] = Study(**{**options, **changes})
     return studies

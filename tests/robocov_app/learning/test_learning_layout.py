@@ -129,7 +129,7 @@ def test_a_message_that_is_old_is_told_as_it_came() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"neighbours": -1}, r"observation.neighbors: expected a whole number from 0 to 1000, got -1"),
+        ({"neighbors": -1}, r"observation.neighbors: expected a whole number from 0 to 1000, got -1"),
         ({"rays": 2.5}, r"observation.rays: expected a whole number"),
         ({"centroid": 1}, r"observation.centroid: expected true or false, got 1"),
     ],

@@ -159,7 +159,7 @@ class TestPaper:
         assert len(studies.build_gains_study(FULL)) == 12 * 2 * (20 + 80)
 
     def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
-        tasks = list(tasks_of(studies.build_claims_contest(TINY, PAPERS).study))
+        tasks = list(generate_tasks(studies.build_claims_contest(TINY, PAPERS).study))
         assert len({(task.duration, task.dt, task.lattice, str(task.team)) for task in tasks}) == 1
         scenarios = {(task.map, task.start, task.seed) for task in tasks}
         for scenario in scenarios:
@@ -231,7 +231,7 @@ class TestBeyond:
 
     @both
     def test_baselines_begin_where_the_papers_controllers_began(self, plan):
-        papers = list(tasks_of(studies.build_claims_contest(plan, PAPERS).study))
+        papers = list(generate_tasks(studies.build_claims_contest(plan, PAPERS).study))
         places = {(task.document, task.start, task.seed) for task in papers}
         limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
         for each in baseline_contests(plan).values():
@@ -250,13 +250,13 @@ class TestBeyond:
 
     def test_who_knows_the_density_begins_where_the_other_does(self):
         contests = studies.build_beyond_contests(QUICK, {}, UNTUNED)
-        known, ignored = (tasks_of(contests[name].study) for name in ("density", "density-ignored"))
+        known, ignored = (generate_tasks(contests[name].study) for name in ("density", "density-ignored"))
         for with_, without in zip(known, ignored, strict=True):
             assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
             assert with_.document != without.document
 
     def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
-        tasks = list(tasks_of(studies.build_beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
+        tasks = list(generate_tasks(studies.build_beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
         by_distance, by_time = (
             [task for task in tasks if task.gains["cells"] == cells] for cells in ("distance", "time")
         )
@@ -267,7 +267,8 @@ class TestBeyond:
 
     def test_each_disturbance_stands_alone(self):
         found = {
-            name: list(tasks_of(study)) for name, study in studies.build_conditions_studies(TINY).items()
+            name: list(generate_tasks(study))
+            for name, study in studies.build_conditions_studies(TINY).items()
         }
         names = "ideal", *(name.replace("_", "-") for name in studies.AXES)
         parts = "conditions", "conditions-others"

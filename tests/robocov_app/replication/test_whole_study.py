@@ -46,7 +46,8 @@ from robocov_app.replication.forecast import forecast_study
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.paper_figures import CAPTIONS, describe_figure, find_arrival_time
 from robocov_app.replication.runner import StudyInterrupted, open_folder
-from robocov_app.sweep.study import Study, tasks_of
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.tasks import generate_tasks
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
@@ -131,7 +132,7 @@ class TestRuns:
     def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
         monkeypatch.setattr("robocov_app.sweep.worker.perform", lambda task: None)
         without = forecast_study(tmp_path, TINY, 2, claims=False, beyond=True)
-        for task in tasks_of(studies.build_gains_study(TINY)):
+        for task in generate_tasks(studies.build_gains_study(TINY)):
             (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)
         # what a former version has done lies there as well
         (tmp_path / "studies" / "gains" / "runs" / "of-a-former-version").mkdir()
