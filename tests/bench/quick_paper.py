@@ -12,7 +12,7 @@ import json
 import pytest
 
 from robocov_app.cli import main
-from robocov_app.replication.claims import GOALS
+from robocov_app.replication.claims.claim import GOALS
 
 
 def test_the_quick_study_finds_what_is_plain(tmp_path):
