@@ -113,14 +113,14 @@ class RatedController:
         Returns
         -------
         dict
-            Name, label, information, all gains, the gains that were set, and for a controller in a file the
-            SHA-256 of its source code.
+            Name, label, information, all gains, the gains that were set, and for a controller in a user's
+            file the SHA-256 of its source code. The oracle is part of robocov, whose version is known.
         """
         name = study.controllers[0]
         controller_class = study.load_controller_class(name)
         source = study.sources.get(name)
         source_hash = None
-        if source is not None:
+        if source is not None and self.controller != ORACLE:
             texts = [source.text, *(module.text for module in source.modules.values())]
             source_hash = hashlib.sha256("\0".join(texts).encode()).hexdigest()
         return {

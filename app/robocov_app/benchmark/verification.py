@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from robocov.errors import InputError
-from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
+from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_result
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import difference_of
@@ -96,7 +96,7 @@ def _build_studies(result: Mapping[str, Any], path: Path, controller: str | None
     """Return the sweeps of a result by track, after checking that the controller is the rated one."""
     entry = result["entry"]
     name = controller or entry["controller"]
-    if entry["source_sha256"] and controller is None and name != ORACLE:
+    if entry["source_sha256"] and controller is None:
         raise InputError(f"{path}: its controller {name} is a file; pass --controller FILE.py:CLASS")
     selected = result["selection"]
     selection = Selection(selected["quick"], tuple(selected["tracks"]), tuple(selected["maps"]))
