@@ -102,7 +102,7 @@ def waited(asked: ImportDialog) -> None:
 @pytest.mark.slow
 def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     # every older import is given up
-    worker: Any = LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=0.0)
+    worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportJob", "imports", patience=0.0)
     asked = question(plan, worker)
     for text in ("0", "0.", "0.1"):
         asked.set("cell", text)

@@ -39,7 +39,8 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
     assert note.startswith("degrees projected to metres about longitude")
     azimuth, _, length = _GLOBE.inv(*degrees[:-1].T, *degrees[1:].T)
     step = np.diff(metres, axis=0)
-    assert np.hypot(*step.T) == pytest.approx(length, rel=1e-6, abs=1e-5)
+    # PROJ puts points that are about a millimeter from the origin onto it.
+    assert np.hypot(*step.T) == pytest.approx(length, rel=1e-6, abs=2e-3)
     # north is up in the middle; elsewhere meridians lean to the pole
     long = np.asarray(length) > 1.0
     lean = (np.degrees(np.arctan2(*step.T)) - azimuth + 180.0) % 360.0 - 180.0
