@@ -372,7 +372,7 @@ class Atlas(BaseController):
     def _plan(
         self, seen: Observations, team: Team, before: PlannerState, robot: int, reports: Sequence[Teammates]
     ) -> tuple[PlannerState, Array | None]:
-        """Return the state of a robot after its plan, and its next goal; None if it keeps its route."""
+        """Update a robot's plan; return its state, and its goal or None if it keeps its route."""
         position = seen.positions[robot]
         radius = float(team.radius[robot])
         max_speed = float(team.max_speed[robot])

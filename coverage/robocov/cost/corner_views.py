@@ -30,14 +30,14 @@ class CornerViews(NamedTuple):
 
 
 def build_corner_views(tiles: int, numbers: IntArray, lengths: Array) -> CornerViews:
-    """Build the views from the rows that `find_corner_views` has written.
+    """Group the views that `find_corner_views` has found by their tiles.
 
     Parameters
     ----------
     tiles : int
         Number of tiles.
     numbers : (r, 3) int array
-        Corner, tile and mask.
+        Corner, tile, and mask of the sites of the tile that see the corner.
     lengths : (r, 2) array, grid steps
         Distances of the nearest and the farthest site.
 

@@ -339,7 +339,7 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
 
 @kernel
 def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: float, y: float) -> int:
-    """Return the one of the first `count` candidates that is nearest to a point in a straight line."""
+    """Return the candidate, of the first `count`, at the smallest Euclidean distance; -1 if none."""
     best2 = np.inf
     nearest = -1
     for k in range(count):

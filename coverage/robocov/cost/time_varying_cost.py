@@ -72,7 +72,7 @@ class TimeVaryingCost:
     def find_counted_robots(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> BoolArray:
-        """Find the robots from which the coverage cost at a time is computed.
+        """Find the robots that count: they work, and no moving obstacle covers them.
 
         Parameters
         ----------

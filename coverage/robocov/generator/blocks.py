@@ -297,7 +297,7 @@ def _to_polygon(cell: Cell) -> Polygon:
 
 
 def _trim_block(block: Cell, trim: Trim) -> Polygon:
-    """Return the polygon of a block with the cut at its corner, if the cut gives a valid polygon."""
+    """Cut the corner of a block off, or cut a yard out of it; return the whole block if that is not valid."""
     points = np.array([(edge.x, edge.y) for edge in block])
     index = trim.corner % len(points)
     point = points[index]

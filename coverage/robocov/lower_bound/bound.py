@@ -120,12 +120,12 @@ def compute_lower_bound(
     positions : (n, 2) array, m
         A placement of low cost, such as that of `find_optimum`. The lower its cost, the smaller the gap.
     radius : float, m
-        Radius of the robots, at least 1 µm: a single point could be where walls touch, in two rooms at once.
+        Radius of the robots, at least 1 µm: a point where walls touch would be in two rooms at once.
     lattice : int
         Number of cells along a side of the lattice; see `CoverageCost`.
     precision : float
         The search ends if the gap is at most this fraction of the cost, or if the bound is within about this
-        fraction of the best one that the dual can give.
+        fraction of the best one that the dual problem can give.
     progress : callable, optional
         Called regularly with the fraction that is done. It may raise an exception to stop.
 

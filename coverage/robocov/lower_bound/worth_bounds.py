@@ -72,6 +72,8 @@ def bound_worths(
 ) -> int:
     """Compute the worth of the center of each triangle, and an upper bound on the worth of all its points.
 
+    The worth of a point is the sum over the sites of weight * max(price - distance, 0).
+
     Parameters
     ----------
     site_data : SiteData

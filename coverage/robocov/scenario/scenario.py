@@ -381,8 +381,8 @@ class Scenario:
         Returns
         -------
         Scenario
-            It starts from the recorded positions, and has the duration of the record. Robots that the user
-            moved, added or removed in the window are not part of a scenario.
+            It starts from the recorded positions, and has the duration of the record. Changes that the user
+            made in the window during the run are not repeated.
         """
         has_velocities = bool(record.velocities[0].any())
         return cls(

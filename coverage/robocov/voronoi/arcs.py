@@ -135,7 +135,7 @@ def _split_piece(piece: list[float], max_deviation: float) -> Array:
     if chords == 1:
         return np.array([[x, y], [u, v]])
     angle = half_angle * np.linspace(-1.0, 1.0, chords + 1)
-    # In units of the length of the chord between the ends: along it, and to its right.
+    # Coordinates along the line between the ends, and to the right of it, as fractions of its length.
     along = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
     aside = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
     line = np.column_stack([x + along * (u - x) + aside * (v - y), y + along * (v - y) + aside * (x - u)])

@@ -235,7 +235,7 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 
 @kernel
 def _find_crossings(curves: Array, lines: int, crossings: Array) -> None:
-    """Find where each curve enters and leaves the cell's side of each other one.
+    """For each pair of curves, find the interval of the first one on the cell's side of the second one.
 
     The crossings are (k, k, 2) values of t on the first curve, nan if the two do not intersect. A curve that
     is nowhere on the cell's side of another one gets an empty interval. The lines of a cell are not compared
