@@ -28,7 +28,7 @@ _SHORTER = {
     "compare": ["--duration", "1", "--lattice", "16"],
 }
 _FASTER = (
-    *((", duration=60)", ", duration=2)"),),
+    (", duration=60)", ", duration=2)"),
     *(("run(60.0)", "run(20.0)"), ("several, 60.0", "several, 1.0"), ("--study full", "--study quick")),
     *(("seeds = 10 ", "seeds = 1 "), ("duration = 60.0", "duration = 0.5"), ("samples = 8", "samples = 1")),
     *(("--count 20", "--count 2"), ("[0.1, 0.3, 1.0]", "[0.1]"), ("lattice=128", "lattice=32")),

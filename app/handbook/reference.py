@@ -54,11 +54,11 @@ def gains_as_signature(*event: Any) -> tuple[str, None] | None:
 def commands() -> str:
     """Return the help of every command."""
     text = "# Commands\n\nWhat `robocov COMMAND -h` prints.\n"
-    for name, (_, line, _) in COMMANDS.items():
+    for name, command in COMMANDS.items():
         told = io.StringIO()
         with contextlib.redirect_stdout(told), contextlib.suppress(SystemExit):
             main([name, "-h"])
-        text += f"\n## robocov {name}\n\n{line[0].upper()}{line[1:]}.\n\n"
+        text += f"\n## robocov {name}\n\n{command.summary[0].upper()}{command.summary[1:]}.\n\n"
         text += f"```text\n{told.getvalue().strip()}\n```\n"
     return text
 

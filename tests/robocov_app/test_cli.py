@@ -18,9 +18,9 @@ from robocov_app.cli import COMMANDS, main
 def test_overview_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
     out = capsys.readouterr().out
-    for name, (_, line, _) in COMMANDS.items():
+    for name, command in COMMANDS.items():
         assert f"  {name}" in out
-        assert line in out
+        assert command.summary in out
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -85,7 +85,7 @@ class ParetoPoint(NamedTuple):
 
 
 class _Entries(NamedTuple):
-    """What the page shows of each controller, by its label."""
+    """Properties of the controllers on the page, by label."""
 
     styles: Mapping[str, CurveStyle]
     information: Mapping[str, str]

@@ -8,7 +8,7 @@ from robocov.arrays import Array
 from robocov.cost import CoverageResult
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
-"""How a reward is shared among robots; see `share_reward`."""
+"""Scheme by which a reward is shared among robots; see `share_reward`."""
 REWARDS: tuple[Reward, ...] = get_args(Reward)
 
 

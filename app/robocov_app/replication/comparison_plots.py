@@ -21,7 +21,7 @@ from robocov_app.replication.paper_figures import PAGE_SCALE, WIDE_PX
 Draw: TypeAlias = Callable[[], Figure]
 """Draws a figure."""
 Plots: TypeAlias = Mapping[str, Draw]
-"""How each plot is drawn, by its name. Those without any run are left out."""
+"""Plotting functions by name. Plots without any run are left out."""
 
 _GAP_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Ticks of an axis of gaps, %."""

@@ -26,7 +26,7 @@ _MIN_REPORTED_FRACTION = 0.05
 
 
 class ControllerProfile(NamedTuple):
-    """What is known of a controller."""
+    """Name, source and information of a controller."""
 
     controller: str
     label: str

@@ -35,9 +35,9 @@ class FigureFile(NamedTuple):
     height: int
     """px"""
     description: str
-    """What it shows, and what is visible there."""
+    """Caption, followed by the findings."""
     findings: str = ""
-    """What is visible there, in sentences; empty for plots."""
+    """Observations, in sentences; empty for plots."""
 
 
 def save_paper_figures(

@@ -248,7 +248,7 @@ class Guides:
 
 
 class ToolPreview:
-    """What the tool is about to do."""
+    """Preview of the active tool's next edit."""
 
     def draw(self, scene: Scene) -> None:
         """Draw the preview."""

@@ -36,7 +36,7 @@ OBSTACLE_OPACITY = 0.62  # over a picture
 
 @dataclass(frozen=True, eq=False)
 class _PageState:
-    """What the page shows."""
+    """Content of the page that was drawn last."""
 
     look: tuple[object, ...]  # everything but the position of the camera and the obstacles
     camera: Camera

@@ -47,7 +47,7 @@ _EDGE_TOLERANCE_M = 1e-9
 
 
 class CornerCut(NamedTuple):
-    """How a corner is cut off.
+    """Shape of the cut at a corner.
 
     Attributes
     ----------

@@ -160,7 +160,7 @@ Names: TypeAlias = Sequence[str | None]  # of the obstacles
 
 
 class ReadMarks(NamedTuple):
-    """What the editor has written to the free keys of a map.
+    """Data of the editor in the free keys of a map.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ _OUTLINE_POINTS = 64
 
 
 class _Hit(NamedTuple):
-    """What is under the pointer: a feature, and its corner or rim unless it is the feature as a whole."""
+    """The feature under the pointer, and its corner or rim if the pointer is on one."""
 
     feature: int | None = None
     corner: int | None = None  # of an area; 0 for the rim of a hot spot

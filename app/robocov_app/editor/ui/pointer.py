@@ -18,7 +18,7 @@ _NEVER_S = -1.0
 
 
 class Gesture(Enum):
-    """What a button that is held down does."""
+    """Action of a mouse button while it is held down."""
 
     NONE = "none"
     TOOL = "tool"

@@ -110,7 +110,7 @@ class InterpretationReport:
 
 @dataclass(eq=False)
 class Interpretation:
-    """What a drawing stands for.
+    """Map content that was recognized in a drawing.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ from robocov_app.formats.picture.brightness import STRIP_ROWS, Brightness, choos
 _PIECE_BYTES = 1 << 20
 """Number of bytes of plain text that are parsed at a time."""
 _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
-"""What separates the numbers of a header."""
+"""Separator of the numbers in a header: white space or a comment."""
 _DIGITS = re.compile(rb"\d+")
 _MAX_NUMBER_DIGITS = 9
 _MAX_LEVEL = 65535

@@ -41,7 +41,7 @@ def list_labels(
 
 @dataclass(frozen=True, eq=False)
 class ElementState:
-    """What an element takes over from the elements around it, and its own properties.
+    """Inherited and own properties of an element.
 
     Attributes
     ----------

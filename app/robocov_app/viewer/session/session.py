@@ -37,7 +37,7 @@ _SLICE = 0.03  # seconds of a frame for making a branch again
 
 @dataclass(frozen=True)
 class SavePoint:
-    """What a session has to remember to come back to this state after an unexpected error."""
+    """State to which a session returns after an unexpected error."""
 
     head: Node
     head_changes: tuple[Change, ...]
