@@ -340,14 +340,14 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
 @kernel
 def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: float, y: float) -> int:
     """Return the candidate, of the first `count`, at the smallest Euclidean distance; -1 if none."""
-    best2 = np.inf
+    min_squared_distance = np.inf
     nearest = -1
     for k in range(count):
         i = candidates[k]
         dx = x - robots[i, 0]
         dy = y - robots[i, 1]
-        if dx * dx + dy * dy < best2:
-            best2 = dx * dx + dy * dy
+        if dx * dx + dy * dy < min_squared_distance:
+            min_squared_distance = dx * dx + dy * dy
             nearest = i
     return nearest
 

@@ -71,17 +71,17 @@ class Trim(NamedTuple):
         Index of the corner, modulo the number of corners.
     before, after : float
         Fractions of the edges before and after the corner that are cut off.
-    is_yard : bool
+    is_notch : bool
         Whether the cut removes a parallelogram, rather than a triangle.
     """
 
     corner: int
     before: float
     after: float
-    is_yard: bool
+    is_notch: bool
 
 
-def build_town(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Build blocks between streets; streets that separate more blocks are wider.
 
     The streets are as wide as the blocked area allows, up to a limit. Then all blocks are scaled down.
@@ -89,7 +89,7 @@ def build_town(request: Request, corner: DiscStart, rng: np.random.Generator) ->
     Parameters
     ----------
     request : Request
-    corner : DiscStart
+    corner_disc : DiscStart
         Disc that stays free.
     rng : numpy.random.Generator
 
@@ -101,23 +101,25 @@ def build_town(request: Request, corner: DiscStart, rng: np.random.Generator) ->
     cells = divide_into_cells(request, rng)
     if cells is None:
         return None
-    max_widening = _find_max_widening(cells, request, corner)
-    if max_widening is None:
+    feasible_widening = _find_feasible_widening(cells, request, corner_disc)
+    if feasible_widening is None:
         return None
     trims: list[Trim | None] = [_draw_trim(rng) for _ in cells]
     for k, cell in enumerate(cells):
-        narrow_block = _build_block(cell, 0.0, corner, trims[k])
-        wide_block = _build_block(cell, max_widening, corner, trims[k])
+        narrow_block = _build_block(cell, 0.0, corner_disc, trims[k])
+        wide_block = _build_block(cell, feasible_widening, corner_disc, trims[k])
         if not _is_thick(narrow_block) or not _is_thick(wide_block):
             trims[k] = None
 
     def build_blocks(widening: float) -> list[Polygon]:
-        return [_build_block(cell, widening, corner, trim) for cell, trim in zip(cells, trims, strict=True)]
+        return [
+            _build_block(cell, widening, corner_disc, trim) for cell, trim in zip(cells, trims, strict=True)
+        ]
 
     if _sum_areas(build_blocks(0.0)) < request.blocked:
         return None
     low = 0.0
-    high = max_widening
+    high = feasible_widening
     for _ in range(_WIDENING_STEPS):
         middle = (low + high) / 2.0
         if _sum_areas(build_blocks(middle)) > request.blocked:
@@ -260,24 +262,24 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
     return block
 
 
-def _find_max_widening(cells: list[Cell], request: Request, corner: DiscStart) -> float | None:
+def _find_feasible_widening(cells: list[Cell], request: Request, corner_disc: DiscStart) -> float | None:
     """Return a widening of the streets that leaves no block too thin, m; None if there is none."""
     widening = _MAX_WIDENING_GAPS * request.gap
-    while not all(_is_thick(_build_block(cell, widening, corner, None)) for cell in cells):
+    while not all(_is_thick(_build_block(cell, widening, corner_disc, None)) for cell in cells):
         if widening == 0.0:
             return None
         widening = widening / 2.0 if widening > request.step else 0.0
     return widening
 
 
-def _build_block(cell: Cell, widening: float, corner: DiscStart, trim: Trim | None) -> Polygon:
+def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim | None) -> Polygon:
     """Return the block of a cell outside the square around the start; empty if nothing remains."""
     block = remove_streets(cell, widening)
     if not block:
         return Polygon()
-    x, y = corner.center
-    low = (x - corner.radius, y - corner.radius)
-    high = (x + corner.radius, y + corner.radius)
+    x, y = corner_disc.center
+    low = (x - corner_disc.radius, y - corner_disc.radius)
+    high = (x + corner_disc.radius, y + corner_disc.radius)
     if shapely.box(*low, *high).intersects(_to_polygon(block)):
         # The block ends at the side of the square that leaves the most of it.
         remaining_parts = [
@@ -297,13 +299,13 @@ def _to_polygon(cell: Cell) -> Polygon:
 
 
 def _trim_block(block: Cell, trim: Trim) -> Polygon:
-    """Cut the corner of a block off, or cut a yard out of it; return the whole block if that is not valid."""
+    """Cut off the corner of a block, or cut a notch into it; return the whole block if that is not valid."""
     points = np.array([(edge.x, edge.y) for edge in block])
     index = trim.corner % len(points)
     point = points[index]
     first = point + (points[index - 1] - point) * trim.before
     last = point + (points[(index + 1) % len(points)] - point) * trim.after
-    cut = [first, first + last - point, last] if trim.is_yard else [first, last]
+    cut = [first, first + last - point, last] if trim.is_notch else [first, last]
     trimmed = Polygon([*points[:index], *cut, *points[index + 1 :]])
     return trimmed if trimmed.is_valid else _to_polygon(block)
 
@@ -313,10 +315,10 @@ def _draw_trim(rng: np.random.Generator) -> Trim | None:
     corner = int(rng.integers(0, _MAX_CORNERS))
     if kind < _CHAMFER_PROBABILITY:
         fraction = rng.uniform(0.2, 0.45)
-        return Trim(corner, before=fraction, after=fraction, is_yard=False)
+        return Trim(corner, before=fraction, after=fraction, is_notch=False)
     if kind < _CHAMFER_PROBABILITY + _YARD_PROBABILITY:
         before, after = rng.uniform(0.35, 0.6, 2).tolist()
-        return Trim(corner, before=before, after=after, is_yard=True)
+        return Trim(corner, before=before, after=after, is_notch=True)
     return None
 
 

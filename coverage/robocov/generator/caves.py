@@ -58,13 +58,13 @@ _USED_AREA_TOLERANCE = 0.5 * AREA_TOLERANCE
 """The rest of the tolerance is left for rounding errors."""
 
 
-def build_cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Build the rock around a cave, and the pillars in it.
 
     Parameters
     ----------
     request : Request
-    corner : DiscStart
+    corner_disc : DiscStart
         Disc that stays free.
     rng : numpy.random.Generator
 
@@ -73,13 +73,13 @@ def build_cave(request: Request, corner: DiscStart, rng: np.random.Generator) ->
     list of Obstacle or None
         None if the map is too small, too much or too little is blocked, or narrow windows remain.
     """
-    site = _survey_site(request, corner)
+    site = _survey_site(request, corner_disc)
     if _build_inner_rectangle(request, 2.0 * site.min_radius).is_empty:
         return None
     points, values = draw_random_field(request, rng)
     boundary_distances = np.minimum(points, points[-1, -1] - points).min(axis=-1)
     values += _SHORE_RISE * np.exp(-((boundary_distances / (_SHORE_UNITS * request.unit)) ** 2))
-    start_distances = compute_lengths(points - np.array(corner.center))
+    start_distances = compute_lengths(points - np.array(corner_disc.center))
     values -= _HALL_DEPTH * np.exp(-((start_distances / (_HALL_UNITS * request.unit)) ** 2))
     seed = int(rng.integers(2**32))
     core = _choose_core(site, points, values, seed)
@@ -153,11 +153,11 @@ class _Site:
         return 1.0 - float(space.area) / (float(self.request.width) * float(self.request.height))
 
 
-def _survey_site(request: Request, corner: DiscStart) -> _Site:
+def _survey_site(request: Request, corner_disc: DiscStart) -> _Site:
     side = min(float(request.width), float(request.height))
     tolerance = min(_MAX_TOLERANCE_UNITS * request.unit, _MAX_TOLERANCE_SIDES * side)
     max_error = tolerance + 2.0 * request.step
-    disc = Point(corner.center).buffer(corner.radius + 2.0 * max_error)
+    disc = Point(corner_disc.center).buffer(corner_disc.radius + 2.0 * max_error)
     return _Site(
         request=request,
         tolerance=tolerance,

@@ -195,11 +195,11 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     )
     for attempt in range(_MAX_ATTEMPTS):
         rng = np.random.default_rng([int(seed), attempt])
-        corner = _choose_corner_disc(request, rng)
-        layout = map_kind.layout(request, corner, rng)
+        corner_disc = _choose_corner_disc(request, rng)
+        layout = map_kind.layout(request, corner_disc, rng)
         if layout is None:
             continue
-        environment = _build_environment(int(seed), kind, request, layout, corner)
+        environment = _build_environment(int(seed), kind, request, layout, corner_disc)
         if environment is not None:
             return environment
     raise ParameterError(
@@ -222,7 +222,7 @@ def _choose_corner_disc(request: Request, rng: np.random.Generator) -> DiscStart
 
 
 def _build_environment(
-    seed: int, kind: str, request: Request, layout: list[Obstacle], corner: DiscStart
+    seed: int, kind: str, request: Request, layout: list[Obstacle], corner_disc: DiscStart
 ) -> Environment | None:
     """Return the map with its starts; None if it is not valid, or does not fulfill the request."""
     width = float(request.width)
@@ -251,12 +251,12 @@ def _build_environment(
     try:
         if not _fulfills_request(environment, request):
             return None
-        corner_disc = _shrink_corner_disc(environment, request, corner)
-        center_disc = _choose_center_disc(environment, request, corner)
-        if corner_disc is None or center_disc is None:
+        start_disc = _shrink_corner_disc(environment, request, corner_disc)
+        center_disc = _choose_center_disc(environment, request, corner_disc)
+        if start_disc is None or center_disc is None:
             return None
         starts: dict[str, DiscStart | UniformStart] = {
-            "corner": corner_disc,
+            "corner": start_disc,
             "centre": center_disc,
             "uniform": UniformStart(),
         }
@@ -267,20 +267,24 @@ def _build_environment(
     return environment
 
 
-def _shrink_corner_disc(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+def _shrink_corner_disc(
+    environment: Environment, request: Request, corner_disc: DiscStart
+) -> DiscStart | None:
     """Return the disc, smaller and nearer to its corner if walls are near; None if it gets too small."""
-    center = np.array(corner.center)
+    center = np.array(corner_disc.center)
     outwards = np.sign(center - request.size / 2.0)
-    radius = corner.radius
-    while radius >= _MIN_DISC_FRACTION * corner.radius:
-        x, y = request.round_points(center + outwards * (corner.radius - radius)).tolist()
+    radius = corner_disc.radius
+    while radius >= _MIN_DISC_FRACTION * corner_disc.radius:
+        x, y = request.round_points(center + outwards * (corner_disc.radius - radius)).tolist()
         if environment.free.contains(shapely.Point(x, y).buffer(radius)):
             return DiscStart((x, y), radius)
         radius = request.round_down(_DISC_SHRINKAGE * radius)
     return None
 
 
-def _choose_center_disc(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+def _choose_center_disc(
+    environment: Environment, request: Request, corner_disc: DiscStart
+) -> DiscStart | None:
     """Return a disc near the middle with as much clearance as possible; None if nothing is free there."""
     max_offset = _MAX_CENTER_OFFSET_SIDES * float(request.size.min())
     steps = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)
@@ -292,7 +296,7 @@ def _choose_center_disc(environment: Environment, request: Request, corner: Disc
     points = points[is_free]
     offsets = offsets[is_free]
     clearances = shapely.distance(environment.free.boundary, shapely.points(points))
-    max_radius = _CENTER_DISC_FRACTION * corner.radius
+    max_radius = _CENTER_DISC_FRACTION * corner_disc.radius
     distances = np.hypot(offsets[:, 0], offsets[:, 1])
     scores = np.minimum(clearances, max_radius) - _CENTER_OFFSET_WEIGHT * distances
     best = int(np.round(scores, _SCORE_DIGITS).argmax())

@@ -46,7 +46,7 @@ _USED_AREA_TOLERANCE = 0.8 * AREA_TOLERANCE
 _GAP_TOLERANCE_M = 1e-9
 
 
-def build_maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Build walls between corridors of equal width.
 
     The thickness of the walls follows from the blocked area. Thicknesses are rounded; if they block too
@@ -55,7 +55,7 @@ def build_maze(request: Request, corner: DiscStart, rng: np.random.Generator) ->
     Parameters
     ----------
     request : Request
-    corner : DiscStart
+    corner_disc : DiscStart
         Disc that stays free of walls.
     rng : numpy.random.Generator
 
@@ -78,7 +78,7 @@ def build_maze(request: Request, corner: DiscStart, rng: np.random.Generator) ->
             return None
         obstacles = _build_walls(request, shape, trails, thickness)
         area_error = abs(_compute_union_area(obstacles) - request.blocked)
-        if _clear_disc(request, shape, walls, thickness, corner):
+        if _clear_disc(request, shape, walls, thickness, corner_disc):
             continue
         if area_error <= max_area_error:
             return [*obstacles]
@@ -157,7 +157,7 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
 
 
 def _clear_disc(
-    request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner: DiscStart
+    request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner_disc: DiscStart
 ) -> bool:
     """Remove the walls that a disc touches; return whether there were any."""
     x = _compute_lines(request, request.width, shape[0], thickness)
@@ -170,7 +170,7 @@ def _clear_disc(
     low = starts - half_widths
     high = ends + half_widths
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-    is_inside = shapely.intersects(boxes, shapely.Point(corner.center).buffer(corner.radius))
+    is_inside = shapely.intersects(boxes, shapely.Point(corner_disc.center).buffer(corner_disc.radius))
     walls[tuple(indices[is_inside].T)] = False
     return bool(is_inside.any())
 

@@ -29,13 +29,15 @@ _MIN_ROUNDNESS = 0.52
 _TOLERANCE_M = 1e-9
 
 
-def scatter_polygons(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+def scatter_polygons(
+    request: Request, corner_disc: DiscStart, rng: np.random.Generator
+) -> list[Obstacle] | None:
     """Scatter obstacles that are at least the requested gap from each other and from the boundary.
 
     Parameters
     ----------
     request : Request
-    corner : DiscStart
+    corner_disc : DiscStart
         Disc that stays free.
     rng : numpy.random.Generator
 
@@ -49,7 +51,7 @@ def scatter_polygons(request: Request, corner: DiscStart, rng: np.random.Generat
     areas *= request.blocked / areas.sum()
     if _are_too_large(areas, request):
         return None
-    kept_free = shapely.Point(corner.center).buffer(corner.radius)
+    kept_free = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
     shapely.prepare(kept_free)
     names = list(SHAPE_PROBABILITIES)
     shapes = rng.choice(names, size=request.obstacles, p=list(SHAPE_PROBABILITIES.values()))

@@ -204,13 +204,15 @@ class FloorPlan:
         return pieces
 
 
-def build_building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+def build_building(
+    request: Request, corner_disc: DiscStart, rng: np.random.Generator
+) -> list[Obstacle] | None:
     """Build walls, and furniture that touches walls or is at least the requested gap away from them.
 
     Parameters
     ----------
     request : Request
-    corner : DiscStart
+    corner_disc : DiscStart
         Disc that stays free of furniture.
     rng : numpy.random.Generator
 
@@ -227,7 +229,7 @@ def build_building(request: Request, corner: DiscStart, rng: np.random.Generator
     wall_area = 0.0
     if walls:
         wall_area = shapely.union_all([wall.polygon for wall in walls]).intersection(map_area).area
-    furniture = _place_furniture(request, corner, plan, request.blocked - wall_area, rng)
+    furniture = _place_furniture(request, corner_disc, plan, request.blocked - wall_area, rng)
     return None if furniture is None else [*walls, *furniture]
 
 
@@ -363,7 +365,7 @@ def _find_door_places(plan: FloorPlan) -> list[tuple[Wall, int, int]]:
 
 
 def _place_furniture(
-    request: Request, corner: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
+    request: Request, corner_disc: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
 ) -> list[Obstacle] | None:
     """Return furniture that blocks the given area, m²; None if it does not fit."""
     min_area = _AREA_TOLERANCE * request.width * request.height
@@ -373,7 +375,7 @@ def _place_furniture(
     room_areas = np.array([room.area for room in inner_rooms])
     if area > _MAX_FURNITURE_FRACTION * room_areas.sum():
         return None
-    start_disc = shapely.Point(corner.center).buffer(corner.radius)
+    kept_free = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
     shapes: list[list[Polygon]] = [[] for _ in inner_rooms]
     for door in plan.doors:
         opening = door.wall.build_piece(door.start, door.end, plan.thickness)
@@ -389,7 +391,7 @@ def _place_furniture(
         shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failures)
         piece_area = min(area, mean_piece_area * rng.uniform(0.5, 1.5) * shrinkage)
         piece = _draw_piece(request, piece_area, rng)
-        obstacle = _place_piece(request, piece, inner_rooms[room], shapes[room], start_disc, rng)
+        obstacle = _place_piece(request, piece, inner_rooms[room], shapes[room], kept_free, rng)
         if obstacle is None:
             failures += 1
             if failures == _MAX_FAILURES:

@@ -265,13 +265,13 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
     k = covered_end & (bins - 1)
     if covered_first <= covered_end < first_bin + bins and far2 < index.horizon2[source, k]:
-        chain_far2 = _compute_chain_far2(walls, wall, x, y, stop, (covered_end + 1) / scale, far2)
+        chain_far2 = _compute_max_squared_distance(walls, wall, x, y, stop, (covered_end + 1) / scale, far2)
         index.horizon2[source, k] = min(index.horizon2[source, k], chain_far2)
     return used
 
 
 @kernel
-def _compute_chain_far2(
+def _compute_max_squared_distance(
     walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, far2: float
 ) -> float:
     """Return the largest squared distance from (x, y) to a chain of walls up to a pseudo-angle.

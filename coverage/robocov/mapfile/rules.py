@@ -25,7 +25,7 @@ from robocov.errors import JsonPath, MapError, Mistake, StartError, format_path
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
 
-_MAX_FLATNESS = 1e-9
+_MIN_HULL_AREA_RATIO = 1e-9
 """A ring counts as a line if the area of its hull, relative to its squared extent, is smaller."""
 _MEETING_DISTANCE_M = 1e-6
 """Largest distance of an edge from a point at which it meets another one."""
@@ -86,7 +86,7 @@ def _find_ring_mistakes(path: JsonPath, ring: Ring) -> Iterator[Mistake]:
         return
     polygon = Polygon(points)
     # The area of a ring that crosses itself may vanish; that of its hull does not.
-    if shapely.convex_hull(polygon).area <= _MAX_FLATNESS * float(extent.max()) ** 2:
+    if shapely.convex_hull(polygon).area <= _MIN_HULL_AREA_RATIO * float(extent.max()) ** 2:
         message = f"expected points that are not on one line, got an area of {polygon.area:g} m²"
         yield Mistake.at_path(path, message)
     elif not polygon.is_valid:
