@@ -112,7 +112,7 @@ def plot_record(
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
-    colours: str = "paper",
+    colors: str = "paper",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
     mean_time: float | None = None,
@@ -125,8 +125,8 @@ def plot_record(
     axes : matplotlib.axes.Axes or None
         By default the axes of a new page.
     theme : {"light", "dark"}
-    colours : {"paper", "robots"}
-        Colours of the paper, or a hue for each robot.
+    colors : {"paper", "robots"}
+        Colors of the paper, or a hue for each robot.
     size : (width, height) or None, px
         Size of the page.
     mean_distance, mean_time : float or None, m, s
@@ -149,7 +149,7 @@ def plot_record(
         record,
         axes,
         theme,
-        colours,
+        colors,
         size=size,
         mean_distance=mean_distance,
         mean_time=mean_time,
@@ -177,7 +177,7 @@ def plot_history(
     label : str
         Label of the curve, at its end.
     controller : str
-        Name of the controller, which decides the colour of the curve.
+        Name of the controller, which decides the color of the curve.
     theme : {"light", "dark"}
     size : (width, height) or None, px
         Size of the page.
@@ -263,7 +263,7 @@ def plot_comparison(
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
-    colours: str = "paper",
+    colors: str = "paper",
     size: tuple[int, int] | None = None,
 ) -> Axes:
     """Plot the runs of a comparison side by side.
@@ -274,7 +274,7 @@ def plot_comparison(
     axes : None
         A comparison needs a page of its own.
     theme : {"light", "dark"}
-    colours : {"paper", "robots"}
+    colors : {"paper", "robots"}
     size : (width, height) or None, px
         Size of the page.
 
@@ -294,7 +294,7 @@ def plot_comparison(
         raise ParameterError("axes: expected None, because a comparison has one panel for each run")
     mean_distances = [float(history.mean_distance[-1]) for history in comparison.histories.values()]
     records = list(comparison.records.values())
-    figure = runs.plot_comparison(records, theme, colours, size, mean_distances=mean_distances)
+    figure = runs.plot_comparison(records, theme, colors, size, mean_distances=mean_distances)
     return figure.axes[-1]
 
 

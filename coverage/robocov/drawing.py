@@ -68,7 +68,7 @@ class Drawable:
             theme : {"light", "dark"}
             size : (width, height), px
                 Size of the page.
-            colours : {"paper", "robots"}
+            colors : {"paper", "robots"}
                 Of a record or comparison: green starts, red trajectories and blue final positions, or a hue
                 for each robot.
             mean_distance, mean_time : float, m, s

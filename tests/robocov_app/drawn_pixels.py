@@ -1,4 +1,4 @@
-"""Frames of single layers, and colours at their pixels."""
+"""Frames of single layers, and colors at their pixels."""
 
 import numpy as np
 import shapely
@@ -30,17 +30,17 @@ def changed(scene, *names, size=SIZE):
     return np.column_stack([columns, rows]), painter
 
 
-def distance(frame, pixel, colour):
-    """Return the largest difference of a channel at a pixel from a colour."""
+def distance(frame, pixel, color):
+    """Return the largest difference of a channel at a pixel from a color."""
     x, y = np.rint(pixel).astype(int)
-    return int(np.abs(frame[y, x] - np.array(colour)).max())
+    return int(np.abs(frame[y, x] - np.array(color)).max())
 
 
-def nearest(frame, pixel, colour, reach=1):
+def nearest(frame, pixel, color, reach=1):
     """Return the least such difference in the pixels around."""
     x, y = np.rint(pixel).astype(int)
     return min(
-        distance(frame, (x + dx, y + dy), colour)
+        distance(frame, (x + dx, y + dy), color)
         for dx in range(-reach, reach + 1)
         for dy in range(-reach, reach + 1)
     )

@@ -57,9 +57,9 @@ def chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def raw_png(width: int, height: int, bits: int, colours: int, rows: bytes, interlaced: int = 0) -> bytes:
+def raw_png(width: int, height: int, bits: int, colors: int, rows: bytes, interlaced: int = 0) -> bytes:
     """Return a PNG of rows that are ready, filter bytes and all."""
-    head = struct.pack(">IIBBBBB", width, height, bits, colours, 0, 0, interlaced)
+    head = struct.pack(">IIBBBBB", width, height, bits, colors, 0, 0, interlaced)
     return (
         b"\x89PNG\r\n\x1a\n"
         + chunk(b"IHDR", head)

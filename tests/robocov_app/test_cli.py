@@ -102,7 +102,7 @@ def test_cost_of_a_robot_in_the_middle_of_a_square(
     row = answer(
         capsys, "cost", "square", "--positions", str(positions), "--lattice", "64", "--sites", str(sites)
     )
-    # the mean distance to the centre of a unit square is (sqrt 2 + asinh 1) / 6
+    # the mean distance to the center of a unit square is (sqrt 2 + asinh 1) / 6
     assert row["mean_distance_m"] == pytest.approx(10 * (np.sqrt(2) + np.arcsinh(1)) / 6, rel=1e-3)
     assert row["cost_m3"] == pytest.approx(100 * row["mean_distance_m"])
     with np.load(sites) as saved:
@@ -204,13 +204,13 @@ def test_wrong_input_gets_one_clear_line(
 @pytest.mark.parametrize(
     ("content", "part"),
     [
-        (b"{}", "expected a list of [x, y] in metres"),
-        (b"[]", "expected a list of [x, y] in metres"),
+        (b"{}", "expected a list of [x, y] in meters"),
+        (b"[]", "expected a list of [x, y] in meters"),
         (b"[[1, 2], [3]]", "[1]: expected [x, y]"),
-        (b"[[1, true]]", "[0]: expected [x, y], two finite numbers in metres, got [1, True]"),
-        (b"[[1, NaN]]", "[0]: expected [x, y], two finite numbers in metres, got [1, nan]"),
-        (b"[[1, 1e999]]", "[0]: expected [x, y], two finite numbers in metres, got [1, inf]"),
-        (b"[[1, " + b"9" * 400 + b"]]", "[0]: expected [x, y], two finite numbers in metres, got [1, 999"),
+        (b"[[1, true]]", "[0]: expected [x, y], two finite numbers in meters, got [1, True]"),
+        (b"[[1, NaN]]", "[0]: expected [x, y], two finite numbers in meters, got [1, nan]"),
+        (b"[[1, 1e999]]", "[0]: expected [x, y], two finite numbers in meters, got [1, inf]"),
+        (b"[[1, " + b"9" * 400 + b"]]", "[0]: expected [x, y], two finite numbers in meters, got [1, 999"),
         (b"[[1, 2", "not JSON"),
         (b"\xff\xfe", "not JSON"),
         (b"[" * 100_000, "not JSON"),

@@ -113,8 +113,8 @@ class TestAxes:
             thing.plot(make())
 
     def test_an_option_that_there_is_not_is_named(self, thing):
-        with pytest.raises(TypeError, match="colour_of_the_sky"):
-            thing.plot(colour_of_the_sky="blue")
+        with pytest.raises(TypeError, match="color_of_the_sky"):
+            thing.plot(color_of_the_sky="blue")
 
 
 def test_the_pages_are_those_of_the_command_line():
@@ -124,7 +124,7 @@ def test_the_pages_are_those_of_the_command_line():
 
 
 @pytest.mark.parametrize("thing", THINGS[:3], ids=IDS[:3])
-def test_maps_on_given_axes_are_in_metres_and_not_distorted(thing):
+def test_maps_on_given_axes_are_in_meters_and_not_distorted(thing):
     figure = Figure(figsize=(9, 3))
     axes = thing.plot(figure.subplots())
     figure.draw_without_rendering()
@@ -137,7 +137,7 @@ def test_maps_on_given_axes_are_in_metres_and_not_distorted(thing):
 
 class TestDistances:
     def test_they_are_drawn_where_they_are(self):
-        """Each pixel has the colour that the scale beside the map has at the exact distance."""
+        """Each pixel has the color that the scale beside the map has at the exact distance."""
         figure = Figure(figsize=(8, 5), dpi=100)
         axes = figure.add_axes((0.1, 0.1, 0.7, 0.8))
         RESULT.plot(axes)
@@ -151,9 +151,9 @@ class TestDistances:
         distances = result.distances[reached]
         assert 0.5 * limit < distances.max() <= limit
         columns, heights = axes.transData.transform(fine.points[reached]).T
-        colours = pixels[len(pixels) - 1 - heights.astype(int), columns.astype(int)]
+        colors = pixels[len(pixels) - 1 - heights.astype(int), columns.astype(int)]
         scale = LIGHT.heat_table(1000)[np.minimum(distances / limit * 1000, 999).astype(int)].astype(int)
-        right = np.abs(colours - scale).max(axis=1) <= 8
+        right = np.abs(colors - scale).max(axis=1) <= 8
         # borders, walls' edges, robots and their numbers cover the others
         assert right.mean() > 0.85
 
@@ -187,7 +187,7 @@ class TestDistances:
                 lost.plot()
 
 
-def test_a_curve_has_its_name_and_its_controllers_colour():
+def test_a_curve_has_its_name_and_its_controllers_color():
     blue = HISTORY.plot(label="RAPF", controller="rapf")
     assert [text.get_text() for text in blue.texts] == [f"RAPF  {HISTORY.mean_distance[-1]:.3f} m"]
     assert blue.lines[0].get_color() != HISTORY.plot(controller="rpf").lines[0].get_color()
@@ -246,7 +246,7 @@ class TestNotebook:
         assert "data-jp-theme-light" in html and "data-vscode-theme-kind" in html
         assert hex_code(DARK.background) in html
         (drawing,) = re.findall(r"<svg.*</svg>", html, flags=re.DOTALL)
-        assert "#" not in drawing, "colours of a theme in the drawing"
+        assert "#" not in drawing, "colors of a theme in the drawing"
 
     def test_the_scale_bar_is_as_long_as_it_says(self):
         html = ROOMS._repr_html_()

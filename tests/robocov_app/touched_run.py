@@ -62,7 +62,7 @@ def all_told(session: Session) -> list[object]:
 
 
 def too_deep(session: Session) -> float:
-    """Return by how many metres some robot is too near to a wall or an obstacle, inf inside of one."""
+    """Return by how many meters some robot is too near to a wall or an obstacle, inf inside of one."""
     deepest = -np.inf
     for pane in session.panes:
         free = pane.setup.solid.free

@@ -9,14 +9,14 @@ from robocov_app.render.picture import Painter
 from robocov_app.render.theme import robot_hues
 
 
-def places(frame, words, size, theme, colour):
+def places(frame, words, size, theme, color):
     """Return the (x, y) middles of all places where bold `words` stand on the background."""
-    alpha = pygame.surfarray.array_alpha(label(words, size, colour, True)).T.astype(float) / 255
+    alpha = pygame.surfarray.array_alpha(label(words, size, color, True)).T.astype(float) / 255
     rows, columns = np.nonzero(alpha)
     alpha = alpha[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     height, width = alpha.shape
     background = np.array(theme.background)
-    ink = ((frame - background) / (np.array(colour) - background)).mean(axis=2)
+    ink = ((frame - background) / (np.array(color) - background)).mean(axis=2)
     first_y, first_x = np.argwhere(alpha == alpha.max())[0]
     found = []
     for y, x in (np.argwhere(np.abs(ink - alpha.max()) < 0.1) - (first_y, first_x)).tolist():
@@ -39,11 +39,11 @@ def glyphs(layer, scene, theme, scale=2.0):
     return pictures
 
 
-def check_glyph(picture, theme, colour, scale=2.0):
-    """Fail unless a glyph shows a colour, around the middle, and within its 22 x 14 px."""
+def check_glyph(picture, theme, color, scale=2.0):
+    """Fail unless a glyph shows a color, around the middle, and within its 22 x 14 px."""
     rows, columns = np.nonzero((picture != np.array(theme.background)).any(axis=2))
     assert len(rows) > 30
     assert abs(columns.min() + columns.max() - 2 * 60) / 2 < 4 * scale
     assert columns.max() - columns.min() <= 22 * scale + 2
     assert rows.max() - rows.min() <= 14 * scale + 2
-    assert np.abs(picture - np.array(colour)).max(axis=2).min() < 12
+    assert np.abs(picture - np.array(color)).max(axis=2).min() < 12

@@ -55,7 +55,7 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     with plain_style():
         page = Page((_WIDTH_PX, height), theme, scale=1.0)
         page.text("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
-        page.text(NOTE, 24, 58, colour=theme.faint)
+        page.text(NOTE, 24, 58, color=theme.faint)
         top = float(_TITLE_HEIGHT_PX)
         for part, group in parts:
             _draw_part(page, HEADINGS[part], group, top)

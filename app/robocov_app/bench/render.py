@@ -63,7 +63,7 @@ def build_clearing_call(canvas: pygame.Surface | None) -> Call:
 
 def _measure_encoding(quick: bool) -> Iterator[Row]:
     record = _simulate("rooms", 6)
-    settings = VideoSettings(colours="robots")
+    settings = VideoSettings(colors="robots")
     rows = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
     frames = list(draw_frames(record, settings, size=SIZE_PX, rows=rows))
     with tempfile.TemporaryDirectory() as folder:

@@ -235,7 +235,7 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
     axes.plot(*front.T, color=tone(LIGHT.faint), linewidth=1.0, zorder=1)
     for point in points:
-        color = tone(point.style.colour(LIGHT))
+        color = tone(point.style.color(LIGHT))
         axes.plot(
             [point.x],
             [point.gap],

@@ -33,7 +33,7 @@ class Arguments(FigureOptions):
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")]
     """Path of a map file, or the name of a bundled map."""
     positions: Annotated[Path, tyro.conf.arg(metavar="FILE")]
-    """JSON file with a list of [x, y] in metres, one for each robot."""
+    """JSON file with a list of [x, y] in meters, one for each robot."""
     speeds: tuple[float, ...] = ()
     """Speed of each robot, or one for all, m/s; sites then belong to the first robot to arrive."""
     lattice: int = 128
@@ -148,10 +148,10 @@ def _read_positions(path: Path) -> Array:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {error}") from error
     if not isinstance(content, list) or not content:
-        raise InputError(f"{path}: expected a list of [x, y] in metres, got {quote(content)}")
+        raise InputError(f"{path}: expected a list of [x, y] in meters, got {quote(content)}")
     for index, pair in enumerate(content):
         if not _is_point(pair):
-            expected = "expected [x, y], two finite numbers in metres"
+            expected = "expected [x, y], two finite numbers in meters"
             raise InputError(f"{path}: [{index}]: {expected}, got {quote(pair)}")
     return np.array(content, dtype=float)
 

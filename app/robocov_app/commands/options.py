@@ -55,7 +55,7 @@ class FigureOptions(JsonOption):
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Draw it to a PNG, SVG or PDF."""
     theme: Literal["light", "dark"] = "light"
-    """Colours of the figure."""
+    """Colors of the figure."""
 
     def __post_init__(self) -> None:
         if self.plot is not None:
@@ -116,7 +116,7 @@ class WindowOptions(WebOptions):
     """The look of a window."""
 
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
-    """Colours; by default those of the last time."""
+    """Colors; by default those of the last time."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
     """Size of the window in pixels; by default that of the last time."""
     scale: float | None = None
@@ -212,9 +212,9 @@ class VideoOptions(LayerOptions):
     film_speed: float = 4.0
     """Simulated seconds per second of video."""
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
-    """Colours; by default light, in a window as the last time."""
-    colours: Literal["paper", "robots"] = "paper"
-    """Draw trajectories in the paper's red, or in a colour for each robot; in videos, too."""
+    """Colors; by default light, in a window as the last time."""
+    colors: Literal["paper", "robots"] = "paper"
+    """Draw trajectories in the paper's red, or in a color for each robot; in videos, too."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
     """Size in pixels; by default 1280x720 for the video of a run, otherwise what suits the map."""
 
@@ -261,7 +261,7 @@ class VideoOptions(LayerOptions):
             fps=self.fps,
             speed=self.film_speed,
             theme=self.theme or "light",
-            colours=self.colours,
+            colors=self.colors,
             size=self.parse_size(),
             shown_layers=shown_layers,
             hidden_layers=hidden_layers,

@@ -41,7 +41,7 @@ class Arguments(JsonOption):
     title: str | None = None
     """Page title; by default a description of the runs."""
     theme: Literal["auto", "light", "dark"] = "auto"
-    """Colours; auto follows the reader's preference."""
+    """Colors; auto follows the reader's preference."""
     optimum: bool = False
     """Search for the best placement on each map, some seconds each; cached ones are always used."""
 

@@ -66,7 +66,7 @@ class Editor(Workspace):
     tool : Tool
         The tool in use.
     theme : str
-        Colours: "light" or "dark".
+        Colors: "light" or "dark".
     panel : bool
         Whether the panel is shown.
     shown : set of str
@@ -317,7 +317,7 @@ class Editor(Workspace):
         self.set_robots(min(max(self.robots + count, 1), MAX_ROBOTS))
 
     def switch_theme(self) -> None:
-        """Switch between light and dark colours."""
+        """Switch between light and dark colors."""
         self.theme = "dark" if self.theme == "light" else "light"
 
     def toggle_panel(self) -> None:

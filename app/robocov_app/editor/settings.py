@@ -54,7 +54,7 @@ class EditorSettings(BaseModel):
     Attributes
     ----------
     theme : {"light", "dark"}
-        Colours of the window.
+        Colors of the window.
     scale : float or None
         Size of texts and widgets; None for that of the screen.
     width, height : int

@@ -21,7 +21,7 @@ from robocov_app.figures.page import figure_of, tone
 from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
-from robocov_app.render.theme import Colour, Theme, mix, readable_on, robot_hues
+from robocov_app.render.theme import Color, Theme, mix, readable_on, robot_hues
 
 # radius of a robot where it has room and in the densest crowd, and least size of its number, in points
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
@@ -30,7 +30,7 @@ _ARROW = 16.0  # length of the arrow on an obstacle that moves, in points
 _DOTS = 400  # dots of the shading of a density along the longer side of a map
 
 
-def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
+def ticks_in_meters(axes: Axes, environment: Environment, theme: Theme) -> None:
     low_x, low_y, high_x, high_y = environment.region.bounds
     axes.set(aspect="equal", xlim=(low_x, high_x), ylim=(low_y, high_y), xlabel="x (m)", ylabel="y (m)")
     for axis in (axes.xaxis, axes.yaxis):
@@ -84,30 +84,30 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
     axes.annotate("", xy=end, xytext=begin, arrowprops=arrow, zorder=2.3)
 
 
-def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
+def draw_run(axes: Axes, record: Record, theme: Theme, colors: str) -> None:
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
     cells = record.cells()
     outlines, owners = cells.outlines
     hues = robot_hues(n, working[cells.adjacency])
-    paper = colours == "paper"
+    paper = colors == "paper"
     tint = theme.paper_tint if paper else theme.tint
     areas = [k for k, outline in enumerate(outlines) if len(outline) > 2]
     style: Any = {"edgecolors": tone(theme.cell_edge), "linewidths": 0.8, "zorder": 1}
     own = [theme.robots[hue] for hue in hues[working[owners[areas]]].tolist()]
-    style["facecolors"] = [tone(mix(theme.background, colour, tint)) for colour in own]
+    style["facecolors"] = [tone(mix(theme.background, color, tint)) for color in own]
     axes.add_collection(PolyCollection([outlines[k] for k in areas], **style), autolim=False)
     ways = [record.positions[record.present[:, robot], robot] for robot in range(n)]
     style = {"capstyle": "round", "joinstyle": "round", "zorder": 4, "linewidths": 1.6 * line_crowding(n)}
-    style["colors"] = [tone(colour) for colour in theme.trails(hues.tolist(), paper)]
+    style["colors"] = [tone(color) for color in theme.trails(hues.tolist(), paper)]
     axes.add_collection(LineCollection(ways, **style), autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
     axes.plot(*begin.T, zorder=5, **_start_style(theme, mark_size(_in_points(axes, begin), 3.2, _START)))
     own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     failed = record.present[-1] & ~record.working[-1]
-    robots = [wreck_colour(theme) if failed[robot] else own[robot] for robot in there.tolist()]
+    robots = [wreck_color(theme) if failed[robot] else own[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if record.steering is not None:
         # where robots face, triangles at their discs
@@ -134,7 +134,7 @@ def draw_robots(
     axes: Axes,
     places: Array,
     radius: Array,
-    fills: Sequence[Colour],
+    fills: Sequence[Color],
     theme: Theme,
     numbers: Sequence[int] | None = None,
 ) -> list[float]:
@@ -191,22 +191,22 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
         mark["markeredgecolor"] = tone(theme.obstacle_edge)
         handles.append(Line2D([], [], label="moving obstacle and its path", **mark, **_path_style(theme)))
     if density and (words := density_label(environment)):
-        colour = mix(theme.background, theme.density, 0.7 * theme.density_strength)
-        handles.append(Patch(facecolor=tone(colour), linewidth=0.0, label=words))
+        color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
+        handles.append(Patch(facecolor=tone(color), linewidth=0.0, label=words))
     return handles
 
 
-def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
+def robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
     style: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
     return Line2D([], [], label=label, linestyle="none", marker="o", markersize=8.0, **style)
 
 
-def wreck_colour(theme: Theme) -> Colour:
+def wreck_color(theme: Theme) -> Color:
     return mix(theme.background, theme.ink, 0.3)
 
 
-def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
-    paper, n = colours == "paper", record.positions.shape[1]
+def run_handles(record: Record, theme: Theme, colors: str) -> list[Artist]:
+    paper, n = colors == "paper", record.positions.shape[1]
     failed = record.present[-1] & ~record.working[-1]
     line = theme.trails(list(range(n)), paper)[0]
     aims: list[Artist] = []
@@ -217,7 +217,7 @@ def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         robot_handle("final position", theme.final if paper else theme.robots[0], theme),
-        *([robot_handle("failed robot", wreck_colour(theme), theme)] if failed.any() else []),
+        *([robot_handle("failed robot", wreck_color(theme), theme)] if failed.any() else []),
         *aims,
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],

@@ -23,7 +23,7 @@ from robocov_app.figures.runs import plot_cost
 from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
 from robocov_app.render.layout import united
-from robocov_app.render.theme import LIGHT, Theme, border_colour, theme_named
+from robocov_app.render.theme import LIGHT, Theme, border_color, theme_named
 
 _FINE = 2  # dots of a map's picture for each pixel of the page
 _LEAST = 720, 400  # smallest page for curves and maps
@@ -70,7 +70,7 @@ def plot_coverage(
     title: str = "Coverage cost",
     times: Sequence[Curve] = (),
 ) -> Figure:
-    """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colours.
+    """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colors.
 
     `curves` may be empty, `moments` not: that raises ParameterError. `size`: (width, height) of the page;
     below 720 x 400 it has the curves alone. `times`: mean times, s, where robots are not equally fast.
@@ -102,7 +102,7 @@ def plot_coverage(
     width, height = page.size
     curves_room: Box = (margin, head, 0.5 * width - margin, height - head)
     maps_room: Box = ((1.0 - part) * width + margin, head, room, height - head - footer)
-    bar_y = 26 * s  # of the scale of colours
+    bar_y = 26 * s  # of the scale of colors
     if below:
         high = highest if size is None else min(highest, 0.4 * (height - head - footer))
         end = head + high
@@ -117,7 +117,7 @@ def plot_coverage(
     for moment, (box, slot) in zip(moments, panels, strict=True):
         _draw_moment(page.map_axes(box, low_x, low_y, high_x, high_y), moment, limit, theme, box, s)
         page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
-        page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
+        page.text(moment.facts, box[0], box[1] - 14 * s, color=theme.faint, room=slot)
     boxes = [box for box, _ in panels]
     page.footer(handles, boxes, boxes[0][2] / (high_x - low_x), maps_room[0])
     return page.figure
@@ -125,10 +125,10 @@ def plot_coverage(
 
 @plain_style()
 def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
-    """Plot distances on axes of somebody else, which get ticks in metres and a scale of colours."""
+    """Plot distances on axes of somebody else, which get ticks in meters and a scale of colors."""
     theme = theme_named(theme)
     limit = _limit([moment])
-    arena.ticks_in_metres(axes, moment.environment, theme)
+    arena.ticks_in_meters(axes, moment.environment, theme)
     axes.apply_aspect()
     extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
     # small axes may be saved large
@@ -149,16 +149,16 @@ def _limit(moments: Sequence[Moment]) -> float:
 
 
 def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
-    line = Line2D([], [], color=tone(border_colour(theme)), linewidth=1.6, label="geodesic cell border")
+    line = Line2D([], [], color=tone(border_color(theme)), linewidth=1.6, label="geodesic cell border")
     handles: list[Artist] = [arena.robot_handle("robot", theme.final, theme), line]
     every = [arena.map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
     for handle in united(every, arena.label_of):
         handle.set_label(arena.label_of(handle).removesuffix(" (unknown to robots)"))
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
-        colour, edge = tone(theme.unreached), tone(theme.obstacle_edge)
+        color, edge = tone(theme.unreached), tone(theme.obstacle_edge)
         closed: Any = {"hatch": "////", "linewidth": 0.0, "label": "no robot can come"}
-        handles.append(Patch(facecolor=colour, edgecolor=edge, **closed))
+        handles.append(Patch(facecolor=color, edgecolor=edge, **closed))
     return handles
 
 
@@ -206,7 +206,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     borders = moment.field.borders(x, y, width / zoom)
     part = strength(borders, zoom, width)[:, None]
     place = borders.row, borders.column
-    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(border_colour(theme)))
+    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(border_color(theme)))
     extent = low_x, high_x, low_y, high_y
     image = axes.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased", zorder=0)
     image.set_clip_path(Polygon(moment.environment.region.vertices, transform=axes.transData))
@@ -216,7 +216,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
 
 
 def _draw_bar(page: Page, limit: float, maps: Box, middle: float, least: float) -> float:
-    """Draw the scale of colours above the right edge of the maps; return where it, or its words, begin.
+    """Draw the scale of colors above the right edge of the maps; return where it, or its words, begin.
 
     Words that would reach to the left of `least` px are left out.
     """

@@ -20,7 +20,7 @@ WEIGHED = "mean distance to the nearest robot, weighed by φ (m)"
 
 
 def end_label(curve: Curve, unit: str = "m") -> str:
-    """Return a curve's name with its last finite value: millimetres, or four digits of what is large."""
+    """Return a curve's name with its last finite value: millimeters, or four digits of what is large."""
     label, _, _, values = curve
     last = float(values[np.isfinite(values)][-1])
     number = f"{last:.3f}"
@@ -53,36 +53,36 @@ def draw_curves(
     quiet_axes(axes, theme, "time (s)", label, grid="y")
     for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:
-            axes.fill_between(time, *band, color=tone(style.colour(theme)), alpha=0.16, linewidth=0.0)
+            axes.fill_between(time, *band, color=tone(style.color(theme)), alpha=0.16, linewidth=0.0)
     ends = []
     for below, (curve, style) in enumerate(zip(curves, chosen, strict=True)):
         _, _, time, values = curve
-        colour, dashes, above = tone(style.colour(theme)), style.dashes, min(len(curves) - 1 - below, 3)
+        color, dashes, above = tone(style.color(theme)), style.dashes, min(len(curves) - 1 - below, 3)
         width = weight * (2.2 + 0.9 * above)
         if not isinstance(dashes, str):
             dashes = 0, tuple(2.2 * weight / width * part for part in dashes[1])
-        axes.plot(time, values, color=colour, linewidth=width, linestyle=dashes, dash_capstyle="butt")
+        axes.plot(time, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
         last = int(np.nonzero(np.isfinite(values))[0][-1])
         end: Any = {"markersize": weight * (6.5 + 2.0 * above), "clip_on": False, "zorder": 5}
-        axes.plot(time[last], values[last], style.mark, color=colour, **end)
-        ends.append((float(time[last]), float(values[last]), colour, end_label(curve, unit)))
+        axes.plot(time[last], values[last], style.mark, color=color, **end)
+        ends.append((float(time[last]), float(values[last]), color, end_label(curve, unit)))
     _draw_end_labels(axes, ends)
 
 
 def _draw_end_labels(axes: Axes, ends: Sequence[tuple[float, float, Tone, str]]) -> None:
-    """Write the words of each end (x, y, colour, words) beside the axes, a line to what was moved."""
+    """Write the words of each end (x, y, color, words) beside the axes, a line to what was moved."""
     dpi, box = figure_of(axes).dpi, axes.get_window_extent()
     point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72
     places = axes.transData.transform([(x, y) for x, y, _, _ in ends])[:, 1]
     heights = spread(places, line_height, float(box.y0), float(box.y1))
     words: Any = {"textcoords": axes.transAxes, "annotation_clip": False, "va": "center", "ha": "left"}
     words |= {"fontsize": TEXT, "fontweight": "bold"}
-    for (x, y, colour, text), place, height in zip(ends, places, heights, strict=True):
+    for (x, y, color, text), place, height in zip(ends, places, heights, strict=True):
         fraction = (height - box.y0) / box.height
-        axes.annotate(text, (x, y), (1.0 + 12 * point, fraction), color=colour, **words)
+        axes.annotate(text, (x, y), (1.0 + 12 * point, fraction), color=color, **words)
         if abs(height - place) > 0.3 * line_height:
             line = [1.0 + 4 * point, 1.0 + 10 * point], [(place - box.y0) / box.height, fraction]
-            axes.plot(*line, transform=axes.transAxes, color=colour, linewidth=0.8, clip_on=False)
+            axes.plot(*line, transform=axes.transAxes, color=color, linewidth=0.8, clip_on=False)
 
 
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:

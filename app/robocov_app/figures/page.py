@@ -15,15 +15,15 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Color, Theme
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
-Tone: TypeAlias = tuple[float, float, float]  # a colour as matplotlib has it
+Tone: TypeAlias = tuple[float, float, float]  # a color as matplotlib has it
 
 
-def tone(colour: Colour) -> Tone:
-    red, green, blue = colour
+def tone(color: Color) -> Tone:
+    red, green, blue = color
     return red / 255, green / 255, blue / 255
 
 
@@ -37,7 +37,7 @@ def check_some(what: str, items: Sequence[object]) -> None:
 
 
 def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:
-    """Give axes the theme's colours, labels, a quiet grid, and no frame but the bottom below a grid."""
+    """Give axes the theme's colors, labels, a quiet grid, and no frame but the bottom below a grid."""
     ink, faint = tone(theme.ink), tone(theme.faint)
     axes.set_facecolor(tone(theme.background))
     axes.tick_params(colors=faint, labelcolor=ink, labelsize=SMALL, left=False)
@@ -155,13 +155,13 @@ class Page:
         *,
         points: float = TEXT,
         bold: bool = False,
-        colour: Colour | None = None,
+        color: Color | None = None,
         room: float | None = None,
         align: str = "left",
     ) -> None:
         """Write one line, its middle at height `y`; with `room` it is cut to so many pixels."""
         style: Any = {"fontsize": points, "fontweight": "bold" if bold else "normal", "ha": align}
-        style |= {"va": "center", "color": tone(colour or self.theme.ink)}
+        style |= {"va": "center", "color": tone(color or self.theme.ink)}
         written = self.figure.text(*self.at(x, y), text, **style)
         # the same words are up to a pixel wider in one place than in another
         while room is not None and len(text) > 1 and self.width_of(written) > room + 1:

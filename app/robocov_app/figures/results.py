@@ -183,7 +183,7 @@ def _row_frame(
     aside = -0.5 * (_BESIDE + 3.0) * figure_of(axes).dpi / 72 / axes.get_window_extent().width
     style: Any = {"markersize": 5.5, "transform": axes.get_yaxis_transform(), "clip_on": False}
     for place, look in zip(places, looks, strict=False):
-        axes.plot(aside, place, look.mark, color=tone(look.colour(theme)), **style)
+        axes.plot(aside, place, look.mark, color=tone(look.color(theme)), **style)
 
 
 def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:
@@ -209,17 +209,17 @@ def _thinned(marks: Sequence[float], apart: float) -> list[float]:
 
 def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: Theme) -> None:
     """Draw one row of sorted values: points and median, and from `FEW` values on their box and whiskers."""
-    colour = tone(style.colour(theme))
+    color = tone(style.color(theme))
     _draw_points(axes, values, place, style, theme)
     low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= FEW:
         reach = 1.5 * (high - low)
         begin, end = values[values >= low - reach].min(), values[values <= high + reach].max()
-        line: Any = {"color": colour, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
+        line: Any = {"color": color, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
         axes.plot([begin, low], [place, place], **line)
         axes.plot([high, end], [place, place], **line)
         corners = [low, high, high, low], [place - _HALF, place - _HALF, place + _HALF, place + _HALF]
-        axes.fill(*corners, facecolor=(*colour, 0.14), edgecolor=colour, linewidth=1.4, zorder=2)
+        axes.fill(*corners, facecolor=(*color, 0.14), edgecolor=color, linewidth=1.4, zorder=2)
     if len(values) > 1:
         _draw_median(axes, float(middle), place, theme)
 
@@ -229,12 +229,12 @@ def _draw_points(axes: Axes, values: Array, place: float, style: CurveStyle, the
     if len(values) > MOST_POINTS:
         values = values[np.rint(np.linspace(0, len(values) - 1, MOST_POINTS)).astype(int)]
     alone, powers = len(values) < FEW, np.arange(1, MOST_POINTS.bit_length() + 1)
-    # van der Corput's sequence, in which neighbours lie far apart
+    # van der Corput's sequence, in which neighbors lie far apart
     scattered = (np.arange(1, len(values) + 1)[:, None] >> (powers - 1) & 1) @ 0.5**powers
     aside = np.zeros(len(values)) if alone else (scattered - 0.5) * 1.5 * _HALF
     look: Any = {"markersize": 6.0, "alpha": 1.0} if alone else {"markersize": 3.6, "alpha": 0.65}
     rim: Any = {"markeredgecolor": tone(theme.background), "markeredgewidth": 0.4}
-    axes.plot(values, place + aside, "o", color=tone(style.colour(theme)), zorder=3.5, **look, **rim)
+    axes.plot(values, place + aside, "o", color=tone(style.color(theme)), zorder=3.5, **look, **rim)
 
 
 def _draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:
@@ -255,7 +255,7 @@ class Dependence(NamedTuple):
 def plot_gains(
     dependences: Sequence[Dependence], gain: str, size: tuple[int, int], label: str, words: Sequence[str] = ()
 ) -> Figure:
-    """Plot values against a gain, one colour and mark a controller, with a line through medians.
+    """Plot values against a gain, one color and mark a controller, with a line through medians.
 
     The axis of the gain is logarithmic where it spans much; null has a place of its own at the right. A gain
     that is one of `words` has even places, and no line.
@@ -287,15 +287,15 @@ def plot_gain_grid(
     """
     axes = on if isinstance(on, Axes) else _page_axes(on)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    colours = theme.quiet_heat
+    colors = theme.quiet_heat
     # numbers tell three digits, and a tenth of the way between the lowest and the highest
     digits = [2 - math.floor(math.log10(abs(size))) for size in (high, 10.0 * (high - low)) if size]
     decimals = min(max(0, *digits), 4) if digits else 2
     for row, column in np.argwhere(np.isfinite(values)).tolist():
         part = (values[row, column] - low) / (high - low) if high > low else 0.0
-        colour = tone(colours[round(part * (len(colours) - 1))])
+        color = tone(colors[round(part * (len(colors) - 1))])
         # a hair's breadth of the page between cells
-        axes.add_patch(Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=colour, linewidth=0.0))
+        axes.add_patch(Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=color, linewidth=0.0))
         style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": tone(theme.ink)}
         style["fontweight"] = "bold" if values[row, column] == low else "normal"
         axes.text(column, row, f"{values[row, column]:.{decimals}f}", **style)
@@ -343,10 +343,10 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
 
 def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined: bool) -> None:
     style, label = each.style, cut_to(each.label, len, MOST_LETTERS)
-    colour = tone(style.colour(LIGHT))
+    color = tone(style.color(LIGHT))
     where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
     step = -(-len(where) // MOST_RUNS)
-    dots: Any = {"color": colour, "markeredgewidth": 0.0, "linestyle": "none"}
+    dots: Any = {"color": color, "markeredgewidth": 0.0, "linestyle": "none"}
     axes.plot(where[::step], each.values[::step], style.mark, markersize=3.6, alpha=0.5, **dots)
     levels = np.unique(where)
     if len(levels) > MOST_LEVELS:
@@ -354,5 +354,5 @@ def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined
         return
     medians = np.array([np.median(each.values[where == level]) for level in levels])
     dashes = style.dashes if joined else "none"
-    line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": label}
+    line: Any = {"color": color, "linestyle": dashes, "linewidth": 2.0, "label": label}
     axes.plot(levels, medians, marker=style.mark, markersize=6.5, **line)

@@ -15,7 +15,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
-from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
+from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_meters
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import HEADING, TEXT, TITLE, Page, check_some, figure_of
@@ -41,7 +41,7 @@ def plot_environment(
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
         axes = _map_page(environment, theme, size, environment.name, facts, map_handles(environment, theme))
     else:
-        ticks_in_metres(axes, environment, theme)
+        ticks_in_meters(axes, environment, theme)
     draw_map(axes, environment, theme)
     return figure_of(axes)
 
@@ -51,26 +51,26 @@ def plot_trajectories(
     record: Record,
     axes: Axes | None = None,
     theme: Theme | str = LIGHT,
-    colours: str = "paper",
+    colors: str = "paper",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
     mean_time: float | None = None,
 ) -> Figure:
     """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
 
-    `axes`: None makes a page of `size` px. `colours`: those of the paper, or a hue for each robot.
+    `axes`: None makes a page of `size` px. `colors`: those of the paper, or a hue for each robot.
     `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
     """
-    if colours not in ("paper", "robots"):
-        raise ParameterError(f"colours: expected 'paper' or 'robots', got {quote(colours)}")
+    if colors not in ("paper", "robots"):
+        raise ParameterError(f"colors: expected 'paper' or 'robots', got {quote(colors)}")
     theme = theme_named(theme)
     if axes is None:
         facts = _line(*_facts(record, mean_distance, mean_time))
-        title, handles = _line(record.label, record.environment.name), run_handles(record, theme, colours)
+        title, handles = _line(record.label, record.environment.name), run_handles(record, theme, colors)
         axes = _map_page(record.environment, theme, size, title, facts, handles)
     else:
-        ticks_in_metres(axes, record.environment, theme)
-    draw_run(axes, record, theme, colours)
+        ticks_in_meters(axes, record.environment, theme)
+    draw_run(axes, record, theme, colors)
     return figure_of(axes)
 
 
@@ -78,7 +78,7 @@ def plot_trajectories(
 def plot_comparison(
     records: Sequence[Record],
     theme: Theme | str = LIGHT,
-    colours: str = "paper",
+    colors: str = "paper",
     size: tuple[int, int] | None = None,
     mean_distances: Sequence[float | None] | None = None,
     mean_times: Sequence[float | None] | None = None,
@@ -90,7 +90,7 @@ def plot_comparison(
     limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
     aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
     shared, captions = _captions(records, costs, times)
-    entries = united((run_handles(record, theme, colours) for record in records), label_of)
+    entries = united((run_handles(record, theme, colors) for record in records), label_of)
     scale = 1.5 if size is None else None
     page = Page(size or (1600, 1000), theme, scale)
     s = page.scale
@@ -113,15 +113,15 @@ def plot_comparison(
     panels = page.panels(len(records), columns, aspect, wide, above, top, page.footer_height(entries))
     first, room = panels[0]
     for record, text, (box, _) in zip(records, captions, panels, strict=True):
-        draw_run(page.map_axes(box, *limits), record, theme, colours)
+        draw_run(page.map_axes(box, *limits), record, theme, colors)
         left, edge, up = box[0], box[1], 16 * s
         if one_line:
             page.text(record.label, left, edge - up, points=TITLE, bold=True)
             right = left + max(box[2], min(room, wide))
-            page.text(text, right, edge - up, colour=theme.faint, align="right")
+            page.text(text, right, edge - up, color=theme.faint, align="right")
         else:
             page.text(record.label, left, edge - 38 * s, points=TITLE, bold=True, room=room)
-            page.text(text, left, edge - up, colour=theme.faint, room=room)
+            page.text(text, left, edge - up, color=theme.faint, room=room)
     if shared:
         page.text(shared, first[0], first[1] - above - 20 * s, points=HEADING, bold=True, room=page.room)
     taken = [(x, y, max(width, room if one_line else 0.0), height) for (x, y, width, height), _ in panels]
@@ -185,12 +185,12 @@ def _map_page(
     height = width / aspect
     box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
     lines = (title, 38, TITLE, True, theme.ink), (facts, 16, TEXT, False, theme.faint)
-    for text, up, points, bold, colour in lines:
+    for text, up, points, bold, color in lines:
         # above a narrow map lines may be wider than it
         wide = min(page.text_width(text, points=points, bold=bold), page.room)
         start = box[0] if wide <= width else max(box[0] + (width - wide) / 2, page.margin)
         y = box[1] - up * page.scale
-        page.text(text, start, y, points=points, bold=bold, colour=colour, room=page.room)
+        page.text(text, start, y, points=points, bold=bold, color=color, room=page.room)
     page.footer(handles, [box], width / (high_x - low_x))
     return page.map_axes(box, low_x, low_y, high_x, high_y)
 

@@ -1,10 +1,10 @@
-"""Curve styles of controllers: colours, dashes and marks, the same in every picture."""
+"""Curve styles of controllers: colors, dashes and marks, the same in every picture."""
 
 import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Color, Theme
 
 Look: TypeAlias = tuple[Any, str]  # dashes and end mark
 
@@ -34,13 +34,13 @@ MARKS = {
 
 
 class CurveStyle(NamedTuple):
-    """Colour, dashes and mark; `name` is a controller's own colour, or ``other-k`` of `Theme.others`."""
+    """Color, dashes and mark; `name` is a controller's own color, or ``other-k`` of `Theme.others`."""
 
     name: str
     dashes: Any
     mark: str
 
-    def colour(self, theme: Theme) -> Colour:
+    def color(self, theme: Theme) -> Color:
         kind, _, number = self.name.rpartition("-")
         return theme.others[int(number)] if kind == "other" else theme.controller(self.name)
 
@@ -52,9 +52,9 @@ def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
 
 
 def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
-    """Return a style for each curve: another colour, dashes and mark for each of a controller's variants."""
+    """Return a style for each curve: another color, dashes and mark for each of a controller's variants."""
     count = len(VARIANTS)
-    # after all colours once more with the next look each: 25 that differ
+    # after all colors once more with the next look each: 25 that differ
     turns = itertools.product(range(count), repeat=2)
     free = itertools.cycle(CurveStyle(f"other-{k}", *VARIANTS[(k + turn) % count]) for turn, k in turns)
     spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]

@@ -3,8 +3,8 @@
 `registry` lists them. Reading gives a `ForeignMap`: the free space in the file. `geometry` turns it into an
 `Environment`, in the same way for all formats.
 
-Shared parts are `files` (limits, JSON, YAML, XML), `geometry` (shapes, grids, polygons), `colours`,
-`georeference` (degrees to metres) and `building_floor` (rooms, walls and doors). `options` and `reports` are
+Shared parts are `files` (limits, JSON, YAML, XML), `geometry` (shapes, grids, polygons), `colors`,
+`georeference` (degrees to meters) and `building_floor` (rooms, walls and doors). `options` and `reports` are
 what a user gives and gets, `preview` draws an import, and `unsupported` names files that no format reads.
 """
 

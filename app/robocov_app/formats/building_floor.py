@@ -48,7 +48,7 @@ class FloorElement:
         ``wall`` lines and ``post`` points are obstacles; an ``opening`` is a line of two points, as wide as
         the door.
     geometry : SourceGeometry
-        Its geometry, in metres.
+        Its geometry, in meters.
     """
 
     role: Role
@@ -112,7 +112,7 @@ class _Spaces:
 def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, description: str) -> ForeignMap:
     """Build the map of a floor.
 
-    If there is no opening at all, nothing would be connected; spaces are then open to their neighbours.
+    If there is no opening at all, nothing would be connected; spaces are then open to their neighbors.
 
     Parameters
     ----------
@@ -207,11 +207,11 @@ def _add_passages(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes)
     tree = shapely.STRtree(list(floor.geoms))
     passages = []
     for gap in gaps:
-        neighbours = [floor.geoms[k] for k in tree.query(gap, predicate="intersects").tolist()]
-        if not neighbours:
+        neighbors = [floor.geoms[k] for k in tree.query(gap, predicate="intersects").tolist()]
+        if not neighbors:
             shapes.leave_out("opening", "that adjoins no space")
             continue
-        free_area = to_multipolygon(shapely.intersection(shapely.MultiPolygon(neighbours), gap))
+        free_area = to_multipolygon(shapely.intersection(shapely.MultiPolygon(neighbors), gap))
         if len(free_area.geoms) > 1:
             passages.append(gap)
     if not passages:

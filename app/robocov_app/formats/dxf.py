@@ -4,7 +4,7 @@ Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilate
 boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option ``thickness``.
 Names are those of layers and blocks: see `Shapes.build_foreign_map`. Blocks are carried out wherever they are
 inserted. Layers that are off or frozen, texts, dimensions and what has a third dimension are left out; so are
-hatches without the option ``hatches``. Curves become lines that stay within a millimetre. The option
+hatches without the option ``hatches``. Curves become lines that stay within a millimeter. The option
 ``scale`` overrules the unit of the header; one of them is needed.
 """
 
@@ -35,11 +35,11 @@ MAX_ENTITIES = 50_000
 """Largest number of entities on all layers: ezdxf takes an eighth of a millisecond and 5 kB for each."""
 MAX_DRAWN_ENTITIES = 200_000
 """Largest number of entities drawn, including those of inserted blocks."""
-UNITS = {  # of the header's $INSUNITS, with their metres
-    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
-    5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
-    10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
-    16: ("hectometres", 100.0), 21: ("US survey feet", 1200 / 3937),
+UNITS = {  # of the header's $INSUNITS, with their meters
+    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimeters", 0.001),
+    5: ("centimeters", 0.01), 6: ("meters", 1.0), 7: ("kilometers", 1000.0), 9: ("mils", 2.54e-5),
+    10: ("yards", 0.9144), 13: ("micrometers", 1e-6), 14: ("decimeters", 0.1), 15: ("decameters", 10.0),
+    16: ("hectometers", 100.0), 21: ("US survey feet", 1200 / 3937),
 }  # fmt: skip
 BINARY = b"AutoCAD Binary DXF"
 TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
@@ -58,11 +58,11 @@ def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
     left = float(MAX_POINTS)
     for (a, b), bulge in zip(pairwise(points), bulges[:-1].tolist(), strict=True):
         if abs(bulge) > _BULGE and (a != b).any():
-            centre, begin, end, radius = arcs.bulge_to_arc(a, b, bulge)
+            center, begin, end, radius = arcs.bulge_to_arc(a, b, bulge)
             left -= 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
             if not left > 0.0:
                 raise ValueError(f"expected at most {MAX_POINTS} points, got more")
-            arc = arcs.ConstructionArc(centre, radius, *np.degrees([begin, end]))
+            arc = arcs.ConstructionArc(center, radius, *np.degrees([begin, end]))
             curve = flat(list(arc.flattening(min(tolerance, radius / 8))))
             drawn.append((curve if bulge > 0.0 else curve[::-1])[1:-1])
         drawn.append(b[None])
@@ -95,7 +95,7 @@ def flat(points: Sequence[Any]) -> Array:
 
 
 class DxfDrawing:
-    """Adds the entities of a drawing to the shapes; `scale` is the size of a unit in metres."""
+    """Adds the entities of a drawing to the shapes; `scale` is the size of a unit in meters."""
 
     def __init__(self, document: Any, shapes: Shapes, scale: float) -> None:
         self.document, self.where, self.shapes, self.scale = document, shapes.where, shapes, scale
@@ -175,9 +175,9 @@ class DxfDrawing:
         elif not shapes.accept(labels):
             return
         elif kind == "POINT":
-            shapes.add_point(self._metres([entity.dxf.location])[0], at=at)
+            shapes.add_point(self._meters([entity.dxf.location])[0], at=at)
         elif kind in ("SOLID", "TRACE"):
-            shapes.add_outline([self._metres(entity.wcs_vertices())], labels, rule="evenodd", at=at)
+            shapes.add_outline([self._meters(entity.wcs_vertices())], labels, rule="evenodd", at=at)
         elif kind == "HATCH" and shapes.options.hatches:
             shapes.add_outline(self._hatch(entity), labels, rule="evenodd", at=at)
         elif kind == "HATCH":
@@ -185,12 +185,12 @@ class DxfDrawing:
         elif kind == "CIRCLE" and entity.dxf.radius and abs(entity.ocs().uz.z) > _LEVEL:
             radius = self._radius(entity)
             self.curved = True
-            (middle,) = self._metres([entity.ocs().to_wcs(entity.dxf.center)])
+            (middle,) = self._meters([entity.ocs().to_wcs(entity.dxf.center)])
             shapes.add_circle(middle, radius * self.scale, labels, at=at)
         elif kind in ("LWPOLYLINE", "POLYLINE"):
             self._polyline(entity, labels, at)
         elif kind == "LINE":
-            self._line(self._metres([entity.dxf.start, entity.dxf.end]), labels, at)
+            self._line(self._meters([entity.dxf.start, entity.dxf.end]), labels, at)
         elif (curve := self._curve(kind, entity)) is not None:
             self.curved = True
             self._require_near(curve)
@@ -198,7 +198,7 @@ class DxfDrawing:
         else:
             shapes.leave_out(to_one_line(kind)[:40])
 
-    def _metres(self, points: Sequence[Any]) -> Array:
+    def _meters(self, points: Sequence[Any]) -> Array:
         """Return points of the drawing as (k, 2) m; third coordinates are counted."""
         heights = np.array([point[2] if len(point) > 2 else 0.0 for point in points])
         self.shapes.tally.add_heights(heights[heights != 0.0])
@@ -276,7 +276,7 @@ class DxfDrawing:
         rings = []
         for path in from_hatch(entity):
             self._require_near(flat(path.control_vertices()))
-            rings.append(self._metres(list(path.flattening(self.tolerance))))
+            rings.append(self._meters(list(path.flattening(self.tolerance))))
         return rings
 
 
@@ -301,7 +301,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     elif code in UNITS:
         unit, scale = f"in {UNITS[code][0]}", UNITS[code][1]
     else:
-        hint = "--scale METRES says what it is, as in --scale 0.001 for millimetres"
+        hint = "--scale METERS says what it is, as in --scale 0.001 for millimeters"
         raise MapError(f"{where}: $INSUNITS: expected a unit, got {code}: {hint}")
     shapes = Shapes(where, options)
     shapes.notes.append(unit)

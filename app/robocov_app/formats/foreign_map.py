@@ -11,29 +11,29 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import CircleObstacle, WallObstacle
-from robocov_app.formats.colours import Colour
+from robocov_app.formats.colors import Color
 
 Primitive: TypeAlias = CircleObstacle | WallObstacle
 
 
 @dataclass(frozen=True, eq=False)
 class Painted:
-    """A coloured shape of a drawing.
+    """A colored shape of a drawing.
 
     Attributes
     ----------
     area : geometry, m
-    colour : tuple of 3 int
+    color : tuple of 3 int
         Red, green and blue, mixed with white if the shape is translucent.
     """
 
     area: BaseGeometry
-    colour: Colour
+    color: Color
 
 
 @dataclass(frozen=True, eq=False)
 class Thumbnail:
-    """A reduced picture in its colours.
+    """A reduced picture in its colors.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class ForeignMap:
     page : Polygon or None, m
         Page of a drawing, or frame of a picture.
     painted : tuple of Painted
-        Coloured shapes of a drawing, the lowest first.
+        Colored shapes of a drawing, the lowest first.
     thumbnail : Thumbnail or None
         The picture that the map was read from.
     """

@@ -1,9 +1,9 @@
-"""GeoJSON (RFC 7946), in degrees or metres.
+"""GeoJSON (RFC 7946), in degrees or meters.
 
 Polygons and lines are interpreted as in `Shapes.build_foreign_map`; the properties ``name``, ``kind`` and
 ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
-projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
-older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
+projected to meters, if that makes a map of at most 10 km; else they are meters. The member ``crs`` of the
+older standard is obeyed, as is a member ``units`` (``meters`` or ``degrees``), which `robocov export` writes;
 the option overrules both.
 
 A file may also be a sequence of such texts (GeoJSONSeq, RFC 8142): each after a record separator, or, as many
@@ -34,7 +34,7 @@ from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.polygons import DEFAULT_DIGITS, compute_free_area, snap_to_grid
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
-from robocov_app.formats.georeference import LocalPlane, convert_to_metres
+from robocov_app.formats.georeference import LocalPlane, convert_to_meters
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.reports import ExportReport
 
@@ -47,7 +47,7 @@ _RECORD_SEPARATOR = b"\x1e"
 _SEQUENCE_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".jsonl", ".ldjson", ".ndjson")
 _SECOND_RECORD = re.compile(rb"\}[ \t]*\r?\n\s*\{")
 _EXTRA_DIGITS_OF_DEGREES = 6
-"""Additional decimals of degrees: a degree is about a hundred kilometres."""
+"""Additional decimals of degrees: a degree is about a hundred kilometers."""
 _MAX_NAME_CHARACTERS = 80
 _MAX_DESCRIPTION_CHARACTERS = 1000
 
@@ -64,7 +64,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     Raises
     ------
     MapError
-        If the file is not GeoJSON, or its coordinates cannot be converted to metres.
+        If the file is not GeoJSON, or its coordinates cannot be converted to meters.
     """
     content = files.read_content(path, files.MAX_TEXT_BYTES)
     sequence = _convert_to_list(content, path.suffix.lower())
@@ -74,11 +74,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     collector.collect(is_sequence=sequence is not None)
     document = file.document if isinstance(file.document, dict) else {}
     units = document.get("units")
-    if units not in (None, "metres", "degrees") and options.units is None:
-        raise file.build_error(("units",), units, "metres or degrees")
+    if units == "metres":  # as written by earlier versions
+        units = "meters"
+    if units not in (None, "meters", "degrees") and options.units is None:
+        raise file.build_error(("units",), units, "meters or degrees")
     origin = _parse_origin(file, document)
     shapes.options = replace(options, units=options.units or units)
-    geometries = convert_to_metres(
+    geometries = convert_to_meters(
         collector.geometries, shapes, collector.crs, may_be_degrees=True, origin=origin
     )
     shapes.add_all(geometries)
@@ -321,9 +323,9 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         header["description"] = environment.description
     plane = None
     if origin is None:
-        header["units"] = "metres"
+        header["units"] = "meters"
         remark = "other programs take GeoJSON for degrees (--origin makes them)"
-        notes = [f"in metres, {digits} decimals; {remark}"]
+        notes = [f"in meters, {digits} decimals; {remark}"]
     else:
         plane = _build_plane(environment, origin)
         longitude, latitude = origin
@@ -369,10 +371,10 @@ def _format_shape(
         polygons = snap_to_grid(shape, digits)
         written.areas.append(MultiPolygon(polygons))
     else:
-        # Metres are rounded first, so that shapes which touch after reading touch here as well.
+        # Meters are rounded first, so that shapes which touch after reading touch here as well.
         rounded = MultiPolygon(snap_to_grid(shape, DEFAULT_DIGITS))
         polygons = snap_to_grid(shapely.transform(rounded, plane.to_degrees), digits)
-        written.areas.append(shapely.transform(MultiPolygon(polygons), plane.to_metres))
+        written.areas.append(shapely.transform(MultiPolygon(polygons), plane.to_meters))
         for polygon in polygons:
             west, _, east, _ = polygon.bounds
             written.crosses_antimeridian |= max(abs(west), abs(east)) > 180.0

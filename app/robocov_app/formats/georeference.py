@@ -1,4 +1,4 @@
-"""Conversion of coordinates on the globe to metres in a local plane, the unit of maps."""
+"""Conversion of coordinates on the globe to meters in a local plane, the unit of maps."""
 
 import math
 import re
@@ -20,19 +20,19 @@ from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 DEGREES = "OGC:CRS84"
 """Longitude and latitude on WGS 84, the system of all GeoJSON (RFC 7946, section 4)."""
 _SYSTEMS_IN_DEGREES = (DEGREES, "EPSG:4326")
-_WAY_OUT = "--units metres takes coordinates as they are"
+_WAY_OUT = "--units meters takes coordinates as they are"
 _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
 _URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
 _ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
 _DIGITS = 6
-"""Decimals of metres: free space is known to a micrometre."""
+"""Decimals of meters: free space is known to a micrometer."""
 _EARTH_RADIUS_M = 6_371_000.0
-"""Mean radius, to distinguish degrees from metres; nothing else is computed with it."""
+"""Mean radius, to distinguish degrees from meters; nothing else is computed with it."""
 _MAX_DEGREES = (360.0, 90.0)
 """Largest longitude and latitude: some files continue beyond the antimeridian."""
 
 
-def convert_to_metres(
+def convert_to_meters(
     geometries: list[SourceGeometry],
     shapes: Shapes,
     crs: str | None,
@@ -40,9 +40,9 @@ def convert_to_metres(
     may_be_degrees: bool = False,
     origin: Point | None = None,
 ) -> list[SourceGeometry]:
-    """Return geometries with coordinates in metres; the notes of `shapes` say what was done to them.
+    """Return geometries with coordinates in meters; the notes of `shapes` say what was done to them.
 
-    The option ``units`` overrules the file; ``scale`` is the size of a unit in metres if the file has none.
+    The option ``units`` overrules the file; ``scale`` is the size of a unit in meters if the file has none.
 
     Parameters
     ----------
@@ -76,11 +76,11 @@ def convert_to_metres(
     if scale not in (None, 1.0):
         shapes.notes.append(f"a unit is {scale:g} m")
     if may_be_degrees and units is None:
-        shapes.notes.append("coordinates taken as metres: as degrees the map would be larger than 10 km")
+        shapes.notes.append("coordinates taken as meters: as degrees the map would be larger than 10 km")
     if crs is not None:
         shapes.notes.append(f"coordinates of {crs} taken as they are")
-    metres_per_unit = 1.0 if scale is None else scale
-    return _replace_points(geometries, _join_points(geometries) * metres_per_unit)
+    meters_per_unit = 1.0 if scale is None else scale
+    return _replace_points(geometries, _join_points(geometries) * meters_per_unit)
 
 
 def _join_points(geometries: Sequence[SourceGeometry]) -> Array:
@@ -99,7 +99,7 @@ def _replace_points(geometries: Sequence[SourceGeometry], points: Array) -> list
 
 
 def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
-    """Return whether coordinates are degrees of a site, not metres of a plan: a plan is metres wide."""
+    """Return whether coordinates are degrees of a site, not meters of a plan: a plan is meters wide."""
     points = _join_points(geometries)
     if not (np.abs(points) <= _MAX_DEGREES).all():
         return False
@@ -109,9 +109,9 @@ def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
     return bool(size_rad * _EARTH_RADIUS_M <= MAX_SIZE_M)
 
 
-def _unwrap_longitudes(points: Array, centre: float) -> Array:
+def _unwrap_longitudes(points: Array, center: float) -> Array:
     """Return longitudes and latitudes without a jump at the antimeridian: all within 180 degrees of one."""
-    longitudes = centre + (points[:, 0] - centre + 180.0) % 360.0 - 180.0
+    longitudes = center + (points[:, 0] - center + 180.0) % 360.0 - 180.0
     return np.column_stack([longitudes, points[:, 1]])
 
 
@@ -127,7 +127,7 @@ def _parse_reference_system(crs: str, where: str) -> str:
 def _project(
     geometries: Sequence[SourceGeometry], system: str, shapes: Shapes, origin: Point | None
 ) -> list[SourceGeometry]:
-    """Return geometries in metres east and north of an origin, by the azimuthal equidistant projection."""
+    """Return geometries in meters east and north of an origin, by the azimuthal equidistant projection."""
     pyproj = _import_pyproj(system, shapes.where)
     points = _join_points(geometries)
     if system not in _SYSTEMS_IN_DEGREES:
@@ -144,11 +144,11 @@ def _project(
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         origin = (float(middle[0]), float(middle[1]))
     longitude, latitude = origin
-    points = LocalPlane(pyproj, longitude, latitude).to_metres(points)
+    points = LocalPlane(pyproj, longitude, latitude).to_meters(points)
     longitude = (longitude + 180.0) % 360.0 - 180.0
     about = f"about longitude {longitude:.5f}, latitude {latitude:.5f} (azimuthal equidistant)"
     label = "degrees" if system in _SYSTEMS_IN_DEGREES else system
-    shapes.notes.append(f"{label} projected to metres {about}")
+    shapes.notes.append(f"{label} projected to meters {about}")
     return _replace_points(geometries, points)
 
 
@@ -171,22 +171,22 @@ def _transform_to_degrees(pyproj: Any, points: Array, system: str, where: str) -
 
 
 class LocalPlane:
-    """Conversion between degrees and metres east and north of an origin on the globe.
+    """Conversion between degrees and meters east and north of an origin on the globe.
 
     Azimuthal equidistant on the ellipsoid of WGS 84 (Snyder 1987, Map Projections: A Working Manual,
-    section 25): within 5 km of the origin lengths are true to better than a millimetre.
+    section 25): within 5 km of the origin lengths are true to better than a millimeter.
     """
 
     def __init__(self, pyproj: Any, longitude: float, latitude: float) -> None:
         self._longitude = longitude
         self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
 
-    def to_metres(self, coordinates: Array) -> Array:
-        """Return longitudes and latitudes, (n, 2), as metres, rounded so that touching walls still touch."""
+    def to_meters(self, coordinates: Array) -> Array:
+        """Return longitudes and latitudes, (n, 2), as meters, rounded so that touching walls still touch."""
         return np.round(np.column_stack(self._project(*coordinates.T)), _DIGITS)
 
     def to_degrees(self, coordinates: Array) -> Array:
-        """Return metres, (n, 2), as longitudes, within 180 degrees of the origin, and latitudes."""
+        """Return meters, (n, 2), as longitudes, within 180 degrees of the origin, and latitudes."""
         return _unwrap_longitudes(
             np.column_stack(self._project(*coordinates.T, inverse=True)), self._longitude
         )

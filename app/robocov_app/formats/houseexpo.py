@@ -1,4 +1,4 @@
-"""HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in metres.
+"""HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in meters.
 
 The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
 corners cut by a step or two of it. Doors and furniture are not in the format.
@@ -68,7 +68,7 @@ def _parse_vertices(file: JsonFile, value: Any) -> Array:
     for k, point in enumerate(value):
         is_pair = isinstance(point, list) and len(point) == 2
         if not is_pair or not all(map(_is_coordinate, point)):
-            raise file.build_error(("verts", k), point, "a point [x, y] in metres")
+            raise file.build_error(("verts", k), point, "a point [x, y] in meters")
     return np.array(value, dtype=float)
 
 

@@ -19,7 +19,7 @@ from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geojson import GeometryCollector
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import DEGREES, convert_to_metres
+from robocov_app.formats.georeference import DEGREES, convert_to_meters
 from robocov_app.formats.options import ReadOptions
 
 MAX_ARCHIVE_FILES = 1000
@@ -127,7 +127,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                 geometries.append(_straighten(geometry) if role == "opening" else geometry)
     if without_floor:
         shapes.notes.append(f"stairs, lifts and openings to below taken as solid: {without_floor}")
-    geometries = convert_to_metres(geometries, shapes, DEGREES)
+    geometries = convert_to_meters(geometries, shapes, DEGREES)
     elements = [FloorElement(role, geometry) for role, geometry in zip(roles, geometries, strict=True)]
     map_name = _get_venue_name(archive) or files.get_map_name(path)
     return build_floor(shapes, elements, map_name, "A level of a venue, imported from IMDF.")

@@ -150,12 +150,12 @@ def _find_bundled(source: _Node) -> Path:
     return bundled[name]
 
 
-def _states(group: _Node, number: int, centre: Array, radius: float) -> list[Array] | None:
+def _states(group: _Node, number: int, center: Array, radius: float) -> list[Array] | None:
     """Return the states [x, y, theta] of a group, of which the last may stand for more; None by chance."""
     way = group["distribution"]
     name = way["name"].text("manual")
     if name == "circle":
-        middle, radius = way["center"].numbers([*centre.tolist(), 0.0]), way["radius"].number(radius)
+        middle, radius = way["center"].numbers([*center.tolist(), 0.0]), way["radius"].number(radius)
         turns = 2 * math.pi * np.arange(number) / max(number, 1)
         around = np.column_stack([np.cos(turns), np.sin(turns)]) * radius + middle[:2]
         return [*np.column_stack([around, turns - math.pi])]
@@ -176,7 +176,7 @@ class _ShapeDrawer:
         self.count = 0
 
     def draw(self, shape: _Node, around: Array, labels: tuple[str, ...]) -> None:
-        """Add a shape in a frame, a (3, 3) matrix to metres."""
+        """Add a shape in a frame, a (3, 3) matrix to meters."""
         self.count += 1
         files.require_shapes(self.count, self.shapes.where)
         name, at = shape["name"].text("circle").lower(), shape.at.partition(": ")[2]
@@ -184,9 +184,9 @@ class _ShapeDrawer:
         if shape["random_shape"].text().lower() in _TRUE_WORDS:
             self.shapes.leave_out("shape", "by chance")
         elif name == "circle":
-            centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
+            center = shape["center"].numbers([0.0, 0.0])[:2] + shift
             radius = shape["radius"].length(0.2)
-            self.shapes.add_circle(transform_points(around, centre[None])[0], radius, labels, at=at)
+            self.shapes.add_circle(transform_points(around, center[None])[0], radius, labels, at=at)
         elif name == "rectangle":
             size = np.array([shape["length"].length(1.0), shape["width"].length(1.0)])
             self.shapes.add_outline([transform_points(around, UNIT_SQUARE * size + shift)], labels, at=at)
@@ -256,7 +256,7 @@ class _Node:
         return value
 
     def length(self, default: float) -> float:
-        """Return a positive length in metres; raise MapError if it is out of range."""
+        """Return a positive length in meters; raise MapError if it is out of range."""
         value = self.number(default)
         files.require_length(value, self.at)
         return value

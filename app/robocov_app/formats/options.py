@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from robocov.errors import ParameterError, quote, require_number
-from robocov_app.formats.colours import ROLES, ColourKey
+from robocov_app.formats.colors import ROLES, ColorKey
 
 _MIN_LENGTH_M = 1e-6
 _MAX_LENGTH_M = 1e4
@@ -80,7 +80,7 @@ class ReadOptions(Options):
     """Options for reading a map that its file does not contain; the format chooses what is not given."""
 
     cell: float | None = None
-    """Side of a cell or pixel, or width of a tile, in metres. By default MovingAI's and Tiled's have 1."""
+    """Side of a cell or pixel, or width of a tile, in meters. By default MovingAI's and Tiled's have 1."""
     unknown: Literal["obstacle", "free", "cut"] | None = None
     """Treatment of unknown or transparent cells; with cut the map ends at the known cells."""
     threshold: float | None = None
@@ -95,22 +95,22 @@ class ReadOptions(Options):
     anywhere: bool = False
     """Pictures and includes that a file names may be outside of its folder."""
     scale: float | None = None
-    """Size in metres of a unit of a drawing, or of a pixel of a TMX."""
-    units: Literal["metres", "degrees"] | None = None
+    """Size in meters of a unit of a drawing, or of a pixel of a TMX."""
+    units: Literal["meters", "degrees"] | None = None
     """Unit of the coordinates of GeoJSON, which overrides the file."""
     thickness: float | None = None
-    """Width in metres of walls that are drawn as lines."""
+    """Width in meters of walls that are drawn as lines."""
     pillar: float | None = None
-    """Radius in metres of a pillar for each point; without it points are left out."""
+    """Radius in meters of a pillar for each point; without it points are left out."""
     outlines: Literal["free", "solid", "nested"] | None = None
     """Meaning of closed outlines of a drawing, except for the boundary. Nested outlines are free and solid
     by turns, from the outside in, so that the larger area is free."""
     boundary: str | None = None
     """Name, id, class or layer of the shape that is the outer boundary."""
     around: float | None = None
-    """Margin in metres around the shapes if none of them is the boundary."""
+    """Margin in meters around the shapes if none of them is the boundary."""
     snap: float | None = None
-    """Gaps between outlines of free space that are narrower than this, in metres, are closed where they cut
+    """Gaps between outlines of free space that are narrower than this, in meters, are closed where they cut
     it apart; 0 keeps all. By default 0.01, or a thousandth of the drawing if that is less."""
     only: tuple[str, ...] | None = None
     """Names, ids, classes or layers that are read; all others are left out."""
@@ -118,17 +118,17 @@ class ReadOptions(Options):
     """Names, ids, classes or layers that are left out."""
     level: str | None = None
     """Floor of a building that is read, by its number or name. By default the ground floor, 0."""
-    free_colour: tuple[str, ...] | None = None
-    """Colours that are free space, by name or as #rrggbb."""
-    solid_colour: tuple[str, ...] | None = None
-    """Colours that are obstacles."""
-    ignore_colour: tuple[str, ...] | None = None
-    """Colours that are left out: the colour around or below them counts."""
-    colour_tolerance: float | None = None
-    """Largest difference of a colour in each of red, green and blue, of 255. By default 24 in a picture,
+    free_color: tuple[str, ...] | None = None
+    """Colors that are free space, by name or as #rrggbb."""
+    solid_color: tuple[str, ...] | None = None
+    """Colors that are obstacles."""
+    ignore_color: tuple[str, ...] | None = None
+    """Colors that are left out: the color around or below them counts."""
+    color_tolerance: float | None = None
+    """Largest difference of a color in each of red, green and blue, of 255. By default 24 in a picture,
     and 0 in a drawing."""
     min_stroke: str | None = None
-    """Thinner strokes (door arcs, furniture, text) are dropped: a width in metres, or in pixels as in 3px."""
+    """Thinner strokes (door arcs, furniture, text) are dropped: a width in meters, or in pixels as in 3px."""
     hatches: bool = False
     """Hatches are areas, as outlines are."""
 
@@ -141,14 +141,14 @@ class ReadOptions(Options):
             around=_LENGTH_RANGE,
             threshold=(0.0, 1.0, ""),
             snap=(0.0, 10.0, "m"),
-            colour_tolerance=(0.0, 255.0, ""),
+            color_tolerance=(0.0, 255.0, ""),
         )
-        # These raise errors for a wrong width or colour before any file is read.
+        # These raise errors for a wrong width or color before any file is read.
         self.compute_stroke_width(1.0)
-        self.build_colour_key()
+        self.build_color_key()
 
-    def build_colour_key(self, default_tolerance: float = 0.0) -> ColourKey:
-        """Return the given colours with their roles.
+    def build_color_key(self, default_tolerance: float = 0.0) -> ColorKey:
+        """Return the given colors with their roles.
 
         Parameters
         ----------
@@ -158,14 +158,14 @@ class ReadOptions(Options):
         Raises
         ------
         ParameterError
-            If a colour is unknown, or given twice.
+            If a color is unknown, or given twice.
         """
-        tolerance = default_tolerance if self.colour_tolerance is None else self.colour_tolerance
-        names = {role: getattr(self, f"{role}_colour") or () for role in ROLES}
-        return ColourKey.from_names(names, tolerance)
+        tolerance = default_tolerance if self.color_tolerance is None else self.color_tolerance
+        names = {role: getattr(self, f"{role}_color") or () for role in ROLES}
+        return ColorKey.from_names(names, tolerance)
 
     def compute_stroke_width(self, pixel: float) -> float:
-        """Return the width in metres below which strokes are dropped, 0 for none.
+        """Return the width in meters below which strokes are dropped, 0 for none.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class ReadOptions(Options):
             return 0.0
         match = _STROKE_WIDTH.fullmatch(self.min_stroke.strip())
         if match is None:
-            expected = "a width in metres, as in 0.1, or in pixels, as in 3px"
+            expected = "a width in meters, as in 0.1, or in pixels, as in 3px"
             raise ParameterError(f"min_stroke: expected {expected}, got {quote(self.min_stroke)}")
         width = float(match[1])
         if match[2] == "px":
@@ -195,15 +195,15 @@ class WriteOptions(Options):
     """Options for writing a map; the format chooses what is not given."""
 
     cell: float | None = None
-    """Side of a cell, or of a pixel, in metres; 0.05 by default. Walls that are thinner stay whole."""
+    """Side of a cell, or of a pixel, in meters; 0.05 by default. Walls that are thinner stay whole."""
     mode: Literal["trinary", "scale", "raw"] | None = None
     """Encoding of occupancy in a ROS map; trinary by default."""
     image: Literal["pgm", "png"] | None = None
     """Format of the picture of a ROS map; pgm by default."""
     scale: float | None = None
-    """Size in metres of a millimetre of an SVG; 0.001, true scale, by default."""
+    """Size in meters of a millimeter of an SVG; 0.001, true scale, by default."""
     digits: int | None = None
-    """Decimals of coordinates; by default a micrometre."""
+    """Decimals of coordinates; by default a micrometer."""
     origin: tuple[float, float] | None = None
     """Longitude and latitude of [0, 0] m, for GeoJSON in degrees. Needs pyproj: robocov[geo]."""
 

@@ -25,7 +25,7 @@ from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
 from robocov_app.formats.reports import ImportReport
 from robocov_app.render.layout import columns_for
-from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
+from robocov_app.render.theme import LIGHT, Color, Theme, theme_named
 
 # of the page, of the arenas on it, and the least for what is written, in pixels
 _WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
@@ -63,12 +63,12 @@ def plot_import(
         room = page.size[0] - left - page.margin
         page.text(environment.name, left, 24 * s, points=HEADING, bold=True, room=room)
         facts = f"{report.size[0]:.4g} x {report.size[1]:.4g} m, imported from {report.format}"
-        page.text(facts, left, 44 * s, colour=theme.faint, room=room)
+        page.text(facts, left, 44 * s, color=theme.faint, room=room)
         for (box, slot), (name, facts) in zip(panels, captions, strict=True):
             y = box[1] - 14 * s
             page.text(name, box[0], y, points=TITLE, bold=True)
             beside = _indent(page, name)
-            page.text(facts, box[0] + beside, y, colour=theme.faint, room=slot - beside)
+            page.text(facts, box[0] + beside, y, color=theme.faint, room=slot - beside)
         low_x, _, high_x, _ = compared.bounds
         first, second = (page.map_axes(box, *compared.bounds) for box, _ in panels)
         outside = shapely.difference(compared.region, compared.before)
@@ -91,7 +91,7 @@ def plot_import(
         page.footer(handles, [box for box, _ in panels], panels[0][0][2] / (high_x - low_x))
         for k, line in enumerate(reversed(said)):
             y = page.size[1] - (_LINE * k + 16) * s
-            page.text(line, left, y, points=SMALL, colour=theme.faint)
+            page.text(line, left, y, points=SMALL, color=theme.faint)
         return page.figure
 
 
@@ -124,11 +124,11 @@ def _indent(page: Page, name: str) -> float:
     return page.text_width(name, points=TITLE, bold=True) + 12 * page.scale
 
 
-def _style(fill: Colour, edge: Colour, opacity: float) -> dict[str, Any]:
+def _style(fill: Color, edge: Color, opacity: float) -> dict[str, Any]:
     return {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
 
 
-def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
+def _draw(axes: Axes, area: BaseGeometry, fill: Color, edge: Color, opacity: float = 1.0) -> None:
     for part in shapely.get_parts(area):
         if isinstance(part, Polygon):
             rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
@@ -139,13 +139,13 @@ def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: f
 def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
     if gap is None:
         return
-    colour, points = tone(theme.final), np.array(gap.between)
+    color, points = tone(theme.final), np.array(gap.between)
     halo = [withStroke(linewidth=4.2, foreground=tone(theme.background))]
     style: dict[str, Any] = {"zorder": 5, "clip_on": False, "path_effects": halo}
-    axes.plot(*points.T, color=colour, linewidth=2.0, **style)
+    axes.plot(*points.T, color=color, linewidth=2.0, **style)
     ends = axes.transData.transform(points) * (72 / axes.figure.dpi)
     if np.hypot(*(ends[1] - ends[0])) < _RING:
-        style |= {"markerfacecolor": "none", "markeredgecolor": colour, "markeredgewidth": 1.8}
+        style |= {"markerfacecolor": "none", "markeredgecolor": color, "markeredgewidth": 1.8}
         axes.plot(*points.mean(axis=0), "o", markersize=_RING, **style)
 
 
@@ -156,12 +156,12 @@ def _number(value: float) -> str:
 
 def _handles(environment: Environment, theme: Theme, compared: ImportComparison) -> list[Artist]:
     handles = map_handles(environment, theme)
-    for area, words, colour in (
+    for area, words, color in (
         (compared.lost, "left out: {} m² were free", theme.trajectory),
         (compared.opened, "opened: {} m² were solid", theme.start),
     ):
         if not area.is_empty:
-            handles.append(Patch(label=words.format(_number(area.area)), **_style(colour, colour, _MARK)))
+            handles.append(Patch(label=words.format(_number(area.area)), **_style(color, color, _MARK)))
     if compared.gap is not None:
         words = f"narrowest passage, {compared.gap.width:.3g} m"
         handles.append(Line2D([], [], color=tone(theme.final), linewidth=2.0, label=words))

@@ -34,7 +34,7 @@ from robocov_app.formats.unsupported import describe_head, describe_unsupported_
 _DRAWING_OPTIONS = frozenset(
     {"thickness", "pillar", "outlines", "boundary", "around", "snap", "only", "skip"}
 )
-_COLOUR_OPTIONS = frozenset({"free_colour", "solid_colour", "ignore_colour", "colour_tolerance"})
+_COLOR_OPTIONS = frozenset({"free_color", "solid_color", "ignore_color", "color_tolerance"})
 
 # A file has the format whose `sniff` accepts it first, so the most specific formats come first.
 _IMPORTERS = (
@@ -92,7 +92,7 @@ _IMPORTERS = (
         suffixes=(".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
         sniff=picture.sniff,
         reader=picture.read,
-        options=frozenset({"cell", "unknown", "threshold", "invert", "min_stroke"}) | _COLOUR_OPTIONS,
+        options=frozenset({"cell", "unknown", "threshold", "invert", "min_stroke"}) | _COLOR_OPTIONS,
     ),
     Importer(
         name="osm",
@@ -108,7 +108,7 @@ _IMPORTERS = (
         suffixes=(".svg", ".svgz"),
         sniff=lambda path, head: svg.ROOT.search(head) is not None or path.suffix.lower() == ".svgz",
         reader=svg.read,
-        options=frozenset({"scale", "min_stroke"}) | _COLOUR_OPTIONS | _DRAWING_OPTIONS - {"pillar"},
+        options=frozenset({"scale", "min_stroke"}) | _COLOR_OPTIONS | _DRAWING_OPTIONS - {"pillar"},
     ),
     Importer(
         name="dxf",
@@ -128,7 +128,7 @@ _IMPORTERS = (
     ),
     Importer(
         name="geojson",
-        title="GeoJSON and sequences of it, in degrees (with pyproj) or metres",
+        title="GeoJSON and sequences of it, in degrees (with pyproj) or meters",
         suffixes=(".geojson", ".geojsonl", ".geojsons", ".ndjson"),
         sniff=geojson.sniff,
         reader=geojson.read,
@@ -144,7 +144,7 @@ _IMPORTERS = (
     ),
     Importer(
         name="houseexpo",
-        title="HouseExpo floor plans (JSON with verts in metres)",
+        title="HouseExpo floor plans (JSON with verts in meters)",
         suffixes=(".json",),
         sniff=houseexpo.sniff,
         reader=houseexpo.read,
@@ -200,7 +200,7 @@ _EXPORTERS = (
     ),
     Exporter(
         name="geojson",
-        title="GeoJSON: boundary and obstacles as features, in metres or degrees",
+        title="GeoJSON: boundary and obstacles as features, in meters or degrees",
         suffixes=(".geojson",),
         write=geojson.write,
         options=frozenset({"digits", "origin"}),

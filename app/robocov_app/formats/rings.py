@@ -3,7 +3,7 @@
 A file contains a list of rings, each a list of points [x, y]: the first ring is the outline of the free
 space, and the others are obstacles. It may also contain one ring alone, a list of such lists, or, flat, an
 object with ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and
-``dimensions``. There are no units: the option ``scale`` is the size of a unit in metres, 1 by default.
+``dimensions``. There are no units: the option ``scale`` is the size of a unit in meters, 1 by default.
 """
 
 import re

@@ -4,7 +4,7 @@ How a pixel is read is as of http://wiki.ros.org/map_server and of ROS 2's nav2_
 darkness of the pixel from 0 to 1 (its brightness where `negate` is set), a cell of mode
 
 - trinary is occupied where p > occupied_thresh, free where p < free_thresh, else unknown; where the picture
-  has an alpha channel, that is averaged in like a colour;
+  has an alpha channel, that is averaged in like a color;
 - scale is unknown where it is not opaque; between the thresholds its occupancy rises from 0 to 100 %;
 - raw has the pixel's value as its occupancy in %, and is unknown where that exceeds 100; `negate` and the
   thresholds do not count.
@@ -205,9 +205,9 @@ def _classify_trinary(picture: Brightness, negate: bool, free: float, occupied: 
     level = picture.level
     full = picture.full
     if picture.alpha is not None:
-        # In a grey picture each of the three colours is the level.
-        colours = np.rint(np.arange(full + 1) * (765 / full)).astype(np.uint16)[level]
-        level = colours + picture.alpha.astype(np.uint16)
+        # In a gray picture each of the three colors is the level.
+        colors = np.rint(np.arange(full + 1) * (765 / full)).astype(np.uint16)[level]
+        level = colors + picture.alpha.astype(np.uint16)
         full = 4 * 255
     dark = _compute_darkness(full, negate)
     table = np.full(full + 1, UNKNOWN, np.uint8)
@@ -257,7 +257,7 @@ def _describe_transparency(picture: Brightness, mode: str) -> str:
     if mode == "raw":
         return description
     share, _, _ = description.partition(",")
-    return f"{share}, which map_server averages in as if it were a dark colour"
+    return f"{share}, which map_server averages in as if it were a dark color"
 
 
 def _describe_yaw(yaw: float, turn: float) -> list[str]:

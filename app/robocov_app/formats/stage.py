@@ -151,7 +151,7 @@ class _World:
         self._split(path, (path,))
         self.root = _Entity("world", shapes.where)
         self._fill(self.root, 0)
-        self.metre = _LENGTHS.get(self.root.text("unit_length", "m"), 1.0)
+        self.meter = _LENGTHS.get(self.root.text("unit_length", "m"), 1.0)
         self.turn = 1.0 if self.root.text("unit_angle") == "radians" else math.pi / 180
 
     def _named(self, name: str, what: str, at: str) -> Path:
@@ -229,7 +229,7 @@ class _World:
         return [value.text for value in values] or [""]
 
     def place(self, entities: list[_Entity], frame: Array, depth: int = 0) -> None:
-        """Place models in the frame of their parent, a (3, 3) matrix to metres, and what is in them."""
+        """Place models in the frame of their parent, a (3, 3) matrix to meters, and what is in them."""
         for given in entities:
             entity, labels = self._expanded(given)
             if depth > files.MAX_DEPTH:
@@ -272,15 +272,15 @@ class _World:
         """Return the matrix of a pose [x y z heading], or [x y heading] as Stage 2 has it."""
         x, y, *turns = entity.numbers(name, (0.0, 0.0, 0.0, 0.0)).tolist()
         turn = turns[0 if len(entity.properties.get(name, [])) == 3 else 1]
-        return build_frame(x * self.metre, y * self.metre, turn * self.turn)
+        return build_frame(x * self.meter, y * self.meter, turn * self.turn)
 
     def _shape(self, entity: _Entity, around: Array, labels: tuple[str, ...]) -> None:
-        size = entity.numbers("size", (0.4, 0.4)) * self.metre
+        size = entity.numbers("size", (0.4, 0.4)) * self.meter
         for length in size.tolist():
             files.require_length(length, f"{entity.at}: size")
 
         def placed(points: Array) -> Array:
-            """Return (n, 2) places in a box of side 1 about the origin, in metres in the world."""
+            """Return (n, 2) places in a box of side 1 about the origin, in meters in the world."""
             return np.round(transform_points(around, points * size), 9) + 0.0
 
         box = Polygon(placed(UNIT_SQUARE))

@@ -7,7 +7,7 @@ A tile is solid if a property or class (``collides``, ``solid``, ``wall`` and th
 say so. All tiles of a layer without any such tile are solid if the option ``only`` names the layer, or its
 name, class or a property says so. Objects are solid if they or their layer say so or are selected, and all of
 them if there are no layers of tiles. Hidden layers count, because layers of walls are usually hidden. The
-option ``cell`` is the width of a tile in metres, ``scale`` that of a pixel.
+option ``cell`` is the width of a tile in meters, ``scale`` that of a pixel.
 """
 
 import binascii
@@ -143,7 +143,7 @@ class _MapReader:
         self.shape = (0, 0)
 
     def _choose_pixel_size(self) -> float:
-        """Return the size of a pixel in metres."""
+        """Return the size of a pixel in meters."""
         cell = self.options.cell
         scale = self.options.scale
         if cell is not None and scale is not None:
@@ -322,8 +322,8 @@ class _MapReader:
             piece.refuse(f"expected at most {MAX_TILES_READ} tiles in all, got more")
         return width, height
 
-    def _to_metres(self, points: Array) -> Array:
-        """Return points in pixels of the map, y down, as metres, y up."""
+    def _to_meters(self, points: Array) -> Array:
+        """Return points in pixels of the map, y down, as meters, y up."""
         return np.asarray((points - self.corner) * [self.pixel, -self.pixel])
 
     def _find_solid_cells(self, layer: _Layer, ids: _IDs, tiles: dict[int, _Tile]) -> BoolArray:
@@ -413,7 +413,7 @@ class _MapReader:
         kind, points = _parse_object(element)
         points = points + layer.offset
         if kind and any(_ROBOT.fullmatch(_fold_name(name)) for name in names):
-            x, y = self._to_metres(points.mean(axis=0)).tolist()
+            x, y = self._to_meters(points.mean(axis=0)).tolist()
             shapes.robots.append((x, y))
             return
         if selection.only is None:
@@ -429,7 +429,7 @@ class _MapReader:
         """Add an obstacle of a kind as of `_parse_object`, in pixels on the map."""
         shapes = self.shapes
         at = f"line {element.line}"
-        points = self._to_metres(points)
+        points = self._to_meters(points)
         if kind == "line":
             shapes.add_line(WallLine(points, shapes.thickness, labels), at=at)
         elif kind == "circle" and (points[0] != points[1]).any():
@@ -488,7 +488,7 @@ def _decode_csv_ids(piece: Element, count: int) -> _IDs | None:
 def _parse_object(element: Element) -> tuple[str, Array]:
     """Return the kind of an object, empty for none, and its points, px.
 
-    Of a circle the points are its centre and one of its rim.
+    Of a circle the points are its center and one of its rim.
     """
     x, y = _parse_vector(element, "x", "y")
     width, height = _parse_vector(element, "width", "height").tolist()

@@ -6,7 +6,7 @@ Polygons are free space, all of them together, whether they overlap or lie in ea
 obstacles, also where another polygon overlaps them: JuPedSim unites accessible areas, and then takes out what
 is excluded (``build_geometry`` in the manual, https://www.jupedsim.org). Only a polygon that lies wholly in a
 hole is free there, as in a MULTIPOLYGON. Where there are only lines they are walls. The option ``outlines``
-says it otherwise; see `Shapes.build_foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names
+says it otherwise; see `Shapes.build_foreign_map`. Coordinates are meters, unless a prefix ``SRID=...;`` names
 another system.
 """
 
@@ -39,7 +39,7 @@ from robocov_app.formats.geometry.polygons import (
 )
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import convert_to_metres
+from robocov_app.formats.georeference import convert_to_meters
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.reports import ExportReport
 
@@ -238,7 +238,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
-    figures = convert_to_metres(parsed.parse(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
+    figures = convert_to_meters(parsed.parse(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
     if options.outlines is None and any(figure.kind == "polygon" for figure in figures):
         shapes.options = replace(options, outlines="free")
         figures = _exclude_holes(figures, shapes)
@@ -314,7 +314,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     text = f"POLYGON {parts[0]}" if len(parts) == 1 else f"MULTIPOLYGON ({', '.join(parts)})"
     with replace_file(path) as part:
         part.write_text(text + "\n", encoding="ascii")
-    notes = [f"in metres, {digits} decimals"]
+    notes = [f"in meters, {digits} decimals"]
     if len(parts) > 1:
         notes.append(f"the free space has {len(parts)} parts: some programs take one polygon only")
     dropped = (

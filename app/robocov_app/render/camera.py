@@ -1,4 +1,4 @@
-"""The camera: world metres, y up, to pixels, y down, and back."""
+"""The camera: world meters, y up, to pixels, y down, and back."""
 
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -35,7 +35,7 @@ class Camera:
         return left + width / 2, top + height / 2
 
     def to_pixels(self, points: Array) -> Array:
-        """Return the pixels of (..., 2) points in metres.
+        """Return the pixels of (..., 2) points in meters.
 
         Drafts of maps may hold any number: what is too far away for pygame is moved to `FARTHEST_PIXEL`.
         """
@@ -75,7 +75,7 @@ def round_length(at_most: float) -> float:
     return float(f"{step * power:.12g}")
 
 
-def length_label(metres: float) -> str:
-    if metres >= 1000:
-        return f"{metres / 1000:g} km"
-    return f"{metres * 100:g} cm" if metres < 0.1 else f"{metres:g} m"
+def length_label(meters: float) -> str:
+    if meters >= 1000:
+        return f"{meters / 1000:g} km"
+    return f"{meters * 100:g} cm" if meters < 0.1 else f"{meters:g} m"

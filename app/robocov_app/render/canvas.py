@@ -15,7 +15,7 @@ from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, text_width
 from robocov_app.render.sprites import Pixel
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Color, Theme
 
 FAR = 20000.0  # pixels. Products of twice this still fit 32 bits.
 
@@ -53,9 +53,9 @@ Placed: TypeAlias = list[tuple[pygame.Surface, tuple[int, int]]]  # pictures and
 Glyph: TypeAlias = Callable[["Canvas", float, float], None]  # around a pixel, in 22 x 14 px at scale 1
 
 
-def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
-    """Return a colour as ``BLEND_PREMULTIPLIED`` takes it; `alpha` is 0 to 1."""
-    red, green, blue = (round(c * alpha) for c in colour)
+def premultiplied(color: Color, alpha: float) -> tuple[int, int, int, int]:
+    """Return a color as ``BLEND_PREMULTIPLIED`` takes it; `alpha` is 0 to 1."""
+    red, green, blue = (round(c * alpha) for c in color)
     return red, green, blue, round(255 * alpha)
 
 
@@ -73,7 +73,7 @@ class LegendEntry:
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """Drawing target; `scale` multiplies the theme's sizes, `hues` (n,) index its colours of robots."""
+    """Drawing target; `scale` multiplies the theme's sizes, `hues` (n,) index its colors of robots."""
 
     surface: pygame.Surface
     camera: Camera
@@ -90,77 +90,77 @@ class Canvas:
     def text_size(self, pixels: float) -> int:
         return max(7, round(pixels * self.scale))
 
-    def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
+    def polygon(self, corners: Array, fill: Color | tuple[int, int, int, int]) -> None:
         for ring in clipped_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
     def polygons(
-        self, corners: Array, ends: Sequence[int], fills: Sequence[Colour | None], edge: Colour | None = None
+        self, corners: Array, ends: Sequence[int], fills: Sequence[Color | None], edge: Color | None = None
     ) -> None:
         """Fill polygons, one after the other in (k, 2) px corners up to each of the `ends`."""
         far = len(corners) > 0 and np.abs(corners).max() > FAR
         points, draw, begin = np.rint(corners).tolist(), pygame.draw.polygon, 0
         for end, fill in zip(ends, fills, strict=True):
-            for colour, width in ((fill, 0), (edge, self.width(1.0))):
-                if colour is None or end - begin < 3:
+            for color, width in ((fill, 0), (edge, self.width(1.0))):
+                if color is None or end - begin < 3:
                     continue
                 if not far:
-                    draw(self.surface, colour, points[begin:end], width)
+                    draw(self.surface, color, points[begin:end], width)
                 elif width:
-                    self.outline(corners[begin:end], colour, width)
+                    self.outline(corners[begin:end], color, width)
                 else:
-                    self.polygon(corners[begin:end], colour)
+                    self.polygon(corners[begin:end], color)
             begin = end
 
-    def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
+    def outline(self, corners: Array, color: Color, width: int = 1, closed: bool = True) -> None:
         points = corners.tolist()
         for start, end in pairwise([*points, *points[:1]] if closed else points):
-            self.line(start, end, colour, width)
+            self.line(start, end, color, width)
         if width > 2:  # lines have straight ends: fill the corners' notches
             for point in points:
-                self.stamp(partial(sprites.dot, width / 2 - 0.5, colour), point)
+                self.stamp(partial(sprites.dot, width / 2 - 0.5, color), point)
 
-    def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
+    def line(self, start: Pixel, end: Pixel, color: Color, width: int = 1) -> None:
         if ends := clipped_segment(start, end):
-            pygame.draw.aaline(self.surface, colour, ends[0], ends[1], width)
+            pygame.draw.aaline(self.surface, color, ends[0], ends[1], width)
 
-    def segments(self, ends: Array, colour: Colour, width: int = 1) -> None:
+    def segments(self, ends: Array, color: Color, width: int = 1) -> None:
         """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
         far = len(ends) > 0 and np.abs(ends).max() > FAR
         for x1, y1, x2, y2 in ends.tolist():
             if far:
-                self.line((x1, y1), (x2, y2), colour, width)
+                self.line((x1, y1), (x2, y2), color, width)
             else:
-                pygame.draw.aaline(self.surface, colour, (x1, y1), (x2, y2), width)
+                pygame.draw.aaline(self.surface, color, (x1, y1), (x2, y2), width)
 
-    def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
+    def dashes(self, start: Pixel, end: Pixel, color: Color, width: int = 1, dash: float = 5.0) -> None:
         if not (ends := clipped_segment(start, end)):
             return
         a, b = map(np.array, ends)
         count = max(1, round(float(np.hypot(*(b - a))) / (2 * dash * self.scale)))
         for k in range(count):
             first, last = a + (b - a) * (k / count), a + (b - a) * ((k + 0.55) / count)
-            pygame.draw.aaline(self.surface, colour, first.tolist(), last.tolist(), width)
+            pygame.draw.aaline(self.surface, color, first.tolist(), last.tolist(), width)
 
-    def circle(self, center: Pixel, radius: float, colour: Colour, dashed: bool = False) -> None:
+    def circle(self, center: Pixel, radius: float, color: Color, dashed: bool = False) -> None:
         sides = int(min(max(radius, 24), 720)) // 2 * 2
         angle = np.arange(sides + 1) * (2 * np.pi / sides)
         corners = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
         for start, end in list(pairwise(corners.tolist()))[:: 2 if dashed else 1]:
-            self.line(start, end, colour, self.width(1.0))
+            self.line(start, end, color, self.width(1.0))
 
     def level(self, x: float, y: float, half: float) -> tuple[Pixel, Pixel]:
         """Return the ends of a level stroke for the legend, around a pixel; `half` its length at scale 1."""
         return (x - half * self.scale, y), (x + half * self.scale, y)
 
-    def swatch(self, x: float, y: float, fill: Colour | None, edge: Colour) -> None:
+    def swatch(self, x: float, y: float, fill: Color | None, edge: Color) -> None:
         size = 11 * self.scale
         box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
         if fill is not None:
             pygame.draw.rect(self.surface, fill, box)
         pygame.draw.rect(self.surface, edge, box, self.width(1.0))
 
-    def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: float, head: str = "full") -> None:
+    def arrow(self, start: Pixel, end: Pixel, color: Color, width: float, head: str = "full") -> None:
         """Draw an arrow with a head that is ``full`` or ``open``, a ``dot`` or a ``bar``."""
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         length = float(np.hypot(*(b - a)))
@@ -177,13 +177,13 @@ class Canvas:
         sketch = sprites.Sketch.around([a.tolist(), *barbs], 2 * width)
         if sketch is None:
             return
-        sketch.path(np.array(shaft).tolist(), colour, width)
+        sketch.path(np.array(shaft).tolist(), color, width)
         if head == "full":
-            sketch.polygon(barbs, colour)
+            sketch.polygon(barbs, color)
         elif head == "dot":
-            sketch.dot(barbs[1], 1.5 * width, colour)
+            sketch.dot(barbs[1], 1.5 * width, color)
         else:
-            sketch.path(barbs, colour, width)
+            sketch.path(barbs, color, width)
         sketch.onto(self.surface)
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:
@@ -216,13 +216,13 @@ class Canvas:
         at: Pixel,
         *,
         size: float | None = None,
-        colour: Colour | None = None,
+        color: Color | None = None,
         bold: bool = False,
         anchor: str = "left",
     ) -> int:
         """Write one line with its left, middle or right (`anchor`) at a pixel; return its width in pixels."""
         pixels = self.text_size(self.theme.text if size is None else size)
-        picture = label(text, pixels, colour or self.theme.ink, bold)
+        picture = label(text, pixels, color or self.theme.ink, bold)
         width, height = picture.get_size()
         left = at[0] - {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
         self.surface.blit(picture, (round(left), round(at[1] - height / 2)))

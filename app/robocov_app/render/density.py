@@ -1,4 +1,4 @@
-"""The density in colours and in words, and the words for costs that it weighs."""
+"""The density in colors and in words, and the words for costs that it weighs."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -13,14 +13,14 @@ from robocov.environment import Environment
 from robocov_app.render.theme import Theme
 
 _SAMPLES = 96  # places along the longer side of a map at which the density is looked at for its range
-Bounds: TypeAlias = tuple[float, float, float, float]  # smallest x and y, largest x and y in metres
+Bounds: TypeAlias = tuple[float, float, float, float]  # smallest x and y, largest x and y in meters
 
 
 def shading(environment: Environment, most: int, theme: Theme) -> NDArray[np.uint8]:
     """Return RGBA of the region's box, (h, w, 4), lowest row first; `most` dots are along its longer side."""
     assert environment.density is not None
     x, y = dots(environment, most)
-    return colours(parts(environment.density, environment.region.bounds, x, y), theme)
+    return colors(parts(environment.density, environment.region.bounds, x, y), theme)
 
 
 def dots(environment: Environment, most: int) -> tuple[Array, Array]:
@@ -41,8 +41,8 @@ def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
     return np.clip((value - low) / (high - low), 0.0, 1.0) if high > low else np.zeros_like(value)
 
 
-def colours(way: Array, theme: Theme) -> NDArray[np.uint8]:
-    """Return the colours, RGBA (..., 4), of parts of the way from the least density to the most."""
+def colors(way: Array, theme: Theme) -> NDArray[np.uint8]:
+    """Return the colors, RGBA (..., 4), of parts of the way from the least density to the most."""
     picture = np.empty((*way.shape, 4), dtype=np.uint8)
     picture[..., :3] = theme.density
     picture[..., 3] = np.rint(255.0 * theme.density_strength * way)

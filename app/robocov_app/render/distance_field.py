@@ -1,4 +1,4 @@
-"""Distances to the nearest robot at every pixel of a picture, and their colours."""
+"""Distances to the nearest robot at every pixel of a picture, and their colors."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -83,7 +83,7 @@ class Field:
         mixed = (source[around[..., 1:]] != source[around[..., :1]]).any(axis=-1)
         self._inside = self._rivals(mixed, around[mixed])
         divided = (owner[around[..., 1:]] != owner[around[..., :1]]).any(axis=-1)
-        beside, others = _with_neighbours(lattice, divided)
+        beside, others = _with_neighbors(lattice, divided)
         self._around = self._rivals(beside, _first_different(others, source[others]))
 
     def _rivals(self, squares: BoolArray, site: IntArray) -> _Rivals:
@@ -188,7 +188,7 @@ class Field:
 
 
 class Fields:
-    """The fields of one map at any positions and time; their scale of colours ends at `limit`, m."""
+    """The fields of one map at any positions and time; their scale of colors ends at `limit`, m."""
 
     def __init__(self, cost: CoverageCost, limit: float) -> None:
         self.limit = limit
@@ -224,7 +224,7 @@ def _spread(row: IntArray, column: IntArray, height: int, width: int) -> tuple[I
     return rows[inside], columns[inside], inside // _BLOCK**2
 
 
-def _with_neighbours(lattice: FieldLattice, divided: BoolArray) -> tuple[BoolArray, IntArray]:
+def _with_neighbors(lattice: FieldLattice, divided: BoolArray) -> tuple[BoolArray, IntArray]:
     """Return divided squares, those across their open sides, and the (k, 20) sites of each, its own first.
 
     A border may cut a corner off a square whose own four sites are of one robot.
@@ -251,11 +251,11 @@ def _first_different(site: IntArray, source: IntArray) -> IntArray:
 
 
 _STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-FARTHEST = 253  # number of the colour at the limit of the scale and beyond
+FARTHEST = 253  # number of the color at the limit of the scale and beyond
 
 
 def round_limit(distance: float) -> float:
-    """Return a round length not below a distance, m, to which a scale of colours may reach."""
+    """Return a round length not below a distance, m, to which a scale of colors may reach."""
     if not np.isfinite(distance) or distance <= 0.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(distance))
@@ -263,7 +263,7 @@ def round_limit(distance: float) -> float:
 
 
 def ticks(limit: float) -> list[float]:
-    """Return round lengths from zero to a limit, m, for a scale of colours."""
+    """Return round lengths from zero to a limit, m, for a scale of colors."""
     power = 10.0 ** np.floor(np.log10(limit))
     for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         count = limit / (step * power)
@@ -273,7 +273,7 @@ def ticks(limit: float) -> list[float]:
 
 
 def palette(theme: Theme) -> NDArray[np.uint8]:
-    """Return the colours of `levels`, (256, 3): from near to far, then of where no robot can come."""
+    """Return the colors of `levels`, (256, 3): from near to far, then of where no robot can come."""
     closed = np.array([theme.unreached, theme.obstacle_edge], dtype=np.uint8)
     return np.concatenate([theme.heat_table(FARTHEST + 1), closed])
 

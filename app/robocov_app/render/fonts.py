@@ -8,7 +8,7 @@ import pygame
 
 from robocov.text import escape_controls
 from robocov_app.render.surface_cache import kept
-from robocov_app.render.theme import Colour
+from robocov_app.render.theme import Color
 
 
 @lru_cache(maxsize=2)
@@ -29,9 +29,9 @@ def _font(size: int, bold: bool) -> pygame.font.Font:
 
 
 @kept(8_000_000)
-def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
+def label(text: str, size: int, color: Color, bold: bool = False) -> pygame.Surface:
     """Return a line of text as a picture, `size` px high; kept, rendering costs more than blitting."""
-    return _living(size, bold).render(escape_controls(text, single_line=True), True, colour)
+    return _living(size, bold).render(escape_controls(text, single_line=True), True, color)
 
 
 def _living(size: int, bold: bool) -> pygame.font.Font:

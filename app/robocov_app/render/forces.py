@@ -1,4 +1,4 @@
-"""Layers that explain a decision: force terms, velocities, ranges, neighbours, what was sensed."""
+"""Layers that explain a decision: force terms, velocities, ranges, neighbors, what was sensed."""
 
 from collections.abc import Callable
 from functools import partial
@@ -12,7 +12,7 @@ from robocov_app.render.layers import Layer, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Pixel
-from robocov_app.render.theme import Colour, Theme, mix
+from robocov_app.render.theme import Color, Theme, mix
 
 FORCE_LENGTH = 46.0  # longest arrow of a force in pixels at scale 1
 VELOCITY_LENGTH = 34.0  # length of the arrow of a robot at its largest speed in pixels at scale 1
@@ -23,17 +23,17 @@ def _arrow_layer(
     title: str,
     words: str,
     vectors_of: Callable[[Scene, float], Array | None],
-    style: Callable[[Theme], tuple[Colour, float]],
+    style: Callable[[Theme], tuple[Color, float]],
     head: str,
 ) -> Layer:
     """Return arrows that begin at the edges of the discs; those below 3 px are left out.
 
-    `vectors_of`: (n, 2) px at a scale, y down; None for none. `style`: colour, and width at scale 1.
+    `vectors_of`: (n, 2) px at a scale, y down; None for none. `style`: color, and width at scale 1.
     """
 
     def arrow(canvas: Canvas, start: Pixel, end: Pixel) -> None:
-        colour, width = style(canvas.theme)
-        canvas.arrow(start, end, colour, canvas.scale * width, head)
+        color, width = style(canvas.theme)
+        canvas.arrow(start, end, color, canvas.scale * width, head)
 
     def draw(canvas: Canvas, scene: Scene) -> None:
         vectors = vectors_of(scene, canvas.scale)
@@ -72,7 +72,7 @@ def force_layer(term: str, title: str, head: str) -> Layer:
             direction = np.where(size[:, None] > 0.0, forces / np.maximum(size, 1e-300)[:, None], 0.0)
         return np.asarray(np.nan_to_num(direction * length[:, None]) * np.array([1.0, -1.0]))
 
-    def style(theme: Theme) -> tuple[Colour, float]:
+    def style(theme: Theme) -> tuple[Color, float]:
         return theme.forces[term], 3.0 if term == "resultant" else theme.arrow_line
 
     return _arrow_layer(f"force_{term}", title, title.lower(), vectors, style, head)
@@ -99,8 +99,8 @@ def range_layer(kind: str, title: str) -> Layer:
         centers = canvas.camera.to_pixels(scene.now.positions).tolist()
         for center, reach, hue in zip(centers, ranges(scene).tolist(), canvas.hues.tolist(), strict=True):
             if np.isfinite(reach):
-                colour = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
-                canvas.circle(center, reach * canvas.camera.zoom, colour, dashed)
+                color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
+                canvas.circle(center, reach * canvas.camera.zoom, color, dashed)
 
     legend = says(
         f"{kind} range",
@@ -111,7 +111,7 @@ def range_layer(kind: str, title: str) -> Layer:
 
 
 def draw_links(canvas: Canvas, scene: Scene) -> None:
-    """Draw lines between neighbours; of a complete graph those whose cells share an edge."""
+    """Draw lines between neighbors; of a complete graph those whose cells share an edge."""
     neighbors = scene.now.seen.neighbors
     if neighbors.is_complete:
         pairs = scene.adjacency
@@ -123,11 +123,11 @@ def draw_links(canvas: Canvas, scene: Scene) -> None:
 
 
 def _link(canvas: Canvas, start: Pixel, end: Pixel) -> None:
-    colour = mix(canvas.theme.background, canvas.theme.final, 0.7)
-    canvas.line(start, end, colour, canvas.width(canvas.theme.line))
+    color = mix(canvas.theme.background, canvas.theme.final, 0.7)
+    canvas.line(start, end, color, canvas.width(canvas.theme.line))
 
 
-links_legend = says("neighbours", lambda canvas, x, y: _link(canvas, *canvas.level(x, y, 9)))
+links_legend = says("neighbors", lambda canvas, x, y: _link(canvas, *canvas.level(x, y, 9)))
 
 
 def draw_points(canvas: Canvas, scene: Scene) -> None:

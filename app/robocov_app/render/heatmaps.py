@@ -1,4 +1,4 @@
-"""Heat maps: the density, distances to the nearest robot, geodesic cells and their colour bar."""
+"""Heat maps: the density, distances to the nearest robot, geodesic cells and their color bar."""
 
 import math
 from collections.abc import Callable
@@ -12,12 +12,12 @@ from robocov.density import Density
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import length_label
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.density import colours, density_label, parts
+from robocov_app.render.density import colors, density_label, parts
 from robocov_app.render.distance_field import Field, levels, middles, palette, strength, ticks
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Theme, border_colour
+from robocov_app.render.theme import Theme, border_color
 
 _DOTS = 60_000  # about so many places of a surface at most where the density is looked at, not interpolated
 
@@ -34,14 +34,14 @@ def density_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def density_entry(words: str) -> LegendEntry:
-    return _strip_entry(words, lambda theme, count: colours(np.linspace(0.0, 1.0, count), theme))
+    return _strip_entry(words, lambda theme, count: colors(np.linspace(0.0, 1.0, count), theme))
 
 
 def _strip_entry(words: str, row: Callable[[Theme, int], NDArray[np.uint8]]) -> LegendEntry:
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
         strip = row(canvas.theme, wide)
-        picture = _coloured(np.broadcast_to(strip, (high, *strip.shape)))
+        picture = _colored(np.broadcast_to(strip, (high, *strip.shape)))
         canvas.surface.blit(picture, (round(x - wide / 2), round(y - high / 2)))
 
     return LegendEntry(words, glyph)
@@ -61,9 +61,9 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
     rows, down = _dots(box.top, box.height, step)
     x, y = _to_world(canvas, columns, rows)
     coarse = 255.0 * parts(density, (low_x, low_y, high_x, high_y), x, y)
-    table = colours(np.arange(256) / 255.0, canvas.theme).astype(np.uint16)
+    table = colors(np.arange(256) / 255.0, canvas.theme).astype(np.uint16)
     table[:, :3] = table[:, :3] * table[:, 3:] // 255
-    page = _coloured(table.astype(np.uint8)[np.rint(down(across(coarse.T).T)).astype(np.uint8)])
+    page = _colored(table.astype(np.uint8)[np.rint(down(across(coarse.T).T)).astype(np.uint8)])
     corners = canvas.camera.to_pixels(ring) - np.array(box.topleft)
     mask = pygame.Surface(box.size, pygame.SRCALPHA, 32)
     pygame.draw.polygon(mask, (255, 255, 255, 255), np.rint(np.clip(corners, -3e4, 3e4)).tolist())
@@ -88,7 +88,7 @@ def _to_world(canvas: Canvas, columns: Array | IntArray, rows: Array | IntArray)
     return x, canvas.camera.to_world(np.column_stack([np.zeros(len(rows)), rows]))[:, 1]
 
 
-_BAR = 12.0  # width of the scale of colours in pixels at scale 1
+_BAR = 12.0  # width of the scale of colors in pixels at scale 1
 _BESIDE = 8.0  # pixels between it and what is beside it
 _BORDER = 1.6  # width of the borders of geodesic cells
 _HATCH = 5  # pixels of the coarse picture from one slanted line to the next
@@ -157,7 +157,7 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
     if "distances" in canvas.shown:
         borders = field.borders(x, y, within)
         lines = pygame.Surface((len(x), len(y)), pygame.SRCALPHA, 32)
-        lines.fill((*border_colour(theme), 0))
+        lines.fill((*border_color(theme), 0))
         alpha = np.rint(255.0 * strength(borders, zoom, width))
         pygame.surfarray.pixels_alpha(lines)[borders.column, borders.row] = alpha
         # what is empty is passed over
@@ -171,7 +171,7 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
     cells = _paletted(numbers.take(owners, mode="wrap"), fills).convert(canvas.surface)
     pixels = pygame.surfarray.pixels3d(cells)
     at, part = (borders.column, borders.row), strength(borders, zoom, width)[:, None]
-    pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(border_colour(theme)))
+    pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(border_color(theme)))
     del pixels  # which keeps the surface locked
     return cells
 
@@ -179,12 +179,12 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
 geodesic_legend = says(
     "geodesic cell border",
     lambda canvas, x, y: canvas.line(
-        *canvas.level(x, y, 8), border_colour(canvas.theme), canvas.width(_BORDER)
+        *canvas.level(x, y, 8), border_color(canvas.theme), canvas.width(_BORDER)
     ),
 )
 
 
-def draw_colour_bar(canvas: Canvas, scene: Scene) -> None:
+def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
     if "distances" not in canvas.shown:
         return
     scale, theme, width = canvas.scale, canvas.theme, canvas.width(1.0)
@@ -194,8 +194,8 @@ def draw_colour_bar(canvas: Canvas, scene: Scene) -> None:
     wide = round(_BAR * scale)
     left = round(canvas.surface.get_width() - bar_room(canvas, scene) + _BESIDE * scale)
     upper = round(top + (min(height, room) - high) / 2)
-    colours = np.broadcast_to(theme.heat_table(high)[::-1, None], (high, wide, 3))
-    canvas.surface.blit(_coloured(colours), (left, upper))
+    colors = np.broadcast_to(theme.heat_table(high)[::-1, None], (high, wide, 3))
+    canvas.surface.blit(_colored(colors), (left, upper))
     pygame.draw.rect(canvas.surface, theme.faint, (left, upper, wide, high), width)
     for mark, text in _marks(scene):
         y = upper + high * (1.0 - mark / scene.field_limit)
@@ -204,8 +204,8 @@ def draw_colour_bar(canvas: Canvas, scene: Scene) -> None:
 
 
 def bar_room(canvas: Canvas, scene: Scene) -> float:
-    """Return how many pixels the scale of colours takes at the right, 0 where it is not shown."""
-    if scene.field is None or not {"distances", "colour_bar"} <= canvas.shown:
+    """Return how many pixels the scale of colors takes at the right, 0 where it is not shown."""
+    if scene.field is None or not {"distances", "color_bar"} <= canvas.shown:
         return 0.0
     words = max(canvas.text_width(text, canvas.theme.small_text) for _, text in _marks(scene))
     return (_BAR + 3.0 * _BESIDE) * canvas.scale + words
@@ -220,14 +220,14 @@ def _marks(scene: Scene) -> list[tuple[float, str]]:
     return list(zip(marks, words, strict=True))
 
 
-def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:
+def _paletted(numbers: NDArray[np.uint8], colors: NDArray[np.uint8]) -> pygame.Surface:
     height, width = numbers.shape
     surface = pygame.image.frombytes(numbers.tobytes(), (width, height), "P")
-    surface.set_palette([tuple(colour) for colour in colours.tolist()])
+    surface.set_palette([tuple(color) for color in colors.tolist()])
     return surface
 
 
-def _coloured(picture: NDArray[np.uint8]) -> pygame.Surface:
+def _colored(picture: NDArray[np.uint8]) -> pygame.Surface:
     """Return (h, w, 3) RGB, or (h, w, 4) RGBA, as a surface."""
     height, width, depth = picture.shape
     return pygame.image.frombytes(picture.tobytes(), (width, height), "RGBA"[:depth])  # type: ignore[arg-type]

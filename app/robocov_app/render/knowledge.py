@@ -14,9 +14,9 @@ from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_
 from robocov_app.render.layers import draw_blocked, draw_boundary, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import Colour, mix
+from robocov_app.render.theme import Color, mix
 
-_OPACITY = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}  # of the colours of cells; free ones are clear
+_OPACITY = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}  # of the colors of cells; free ones are clear
 
 
 def discovered_map(scene: Scene) -> DiscoveredMap | None:
@@ -36,8 +36,8 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     state, outside = np.minimum(known.state[seen], WALL), raster.is_outside[seen]
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
     for value, opacity in _OPACITY.items():
-        colour = canvas.theme.obstacle if value == UNKNOWN else canvas.theme.forces["repulsion_obstacle"]
-        pixels[(state == value) & ~outside] = premultiplied(colour, opacity)
+        color = canvas.theme.obstacle if value == UNKNOWN else canvas.theme.forces["repulsion_obstacle"]
+        pixels[(state == value) & ~outside] = premultiplied(color, opacity)
     ends = np.array([[column.min(), row.min()], [column.max() + 1, row.max() + 1]])
     ends = canvas.camera.to_pixels(np.array(raster.origin) + ends * raster.cell_size)
     (left, bottom), (right, top) = ends.round().astype(int).tolist()
@@ -52,20 +52,20 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
 
 _FINE = 2  # scans are drawn so many times larger and shrunk: hundreds of smooth lines would take far longer
 _RAY_GAP = 5.0  # least pixels between rays at scale 1: nearer to the robot every second one is left out
-_PALE = 0.3  # how much of its colour is left of an obstacle that nobody has sensed
+_PALE = 0.3  # how much of its color is left of an obstacle that nobody has sensed
 _DOT = 2.1  # radius of a sensed point in pixels at scale 1
 _HIT = 1.5  # radius of the end of a ray in pixels at scale 1
 
 
-def _dots(canvas: Canvas, centers: Array, radius: float, colour: Colour) -> None:
+def _dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> None:
     """Draw a dot at each of (n, 2) px; thousands at once, and one only where several are the same."""
     different = np.unique(np.rint((centers + 0.5) * sprites.FINE), axis=0) / sprites.FINE - 0.5
-    canvas.stamps([partial(sprites.dot, radius, colour)], different)
+    canvas.stamps([partial(sprites.dot, radius, color)], different)
 
 
 def draw_scans(canvas: Canvas, scene: Scene) -> None:
     """Draw what a range sensor measures all around: what it looks over, its rays, and dots where they hit."""
-    camera, colour = canvas.camera, canvas.theme.final
+    camera, color = canvas.camera, canvas.theme.final
     scans = [(camera.to_pixels(place), camera.to_pixels(ends)) for place, ends in scene.scans]
     box = sprites.visible_box(bounded(np.concatenate([ends for _, ends in scans])), 3.0, canvas.surface)
     if box is None:
@@ -76,15 +76,15 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
     fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
     outlines = [ring for _, ends in fine for ring in clipped_polygon(ends)]
     for ring in outlines:
-        pygame.draw.polygon(sketch.large, premultiplied(colour, 0.11), np.rint(ring).tolist())
+        pygame.draw.polygon(sketch.large, premultiplied(color, 0.11), np.rint(ring).tolist())
     for place, ends in fine:
         _draw_rays(sketch.large, place, ends, canvas)
     for ring in outlines:
-        pygame.draw.lines(sketch.large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
+        pygame.draw.lines(sketch.large, premultiplied(color, 0.4), True, ring.tolist(), _FINE)
     sketch.onto(canvas.surface)
     far = [np.hypot(*(ends - place).T) for place, ends in scans]
     hits = [ends[length < length.max() * (1.0 - 1e-6)] for (_, ends), length in zip(scans, far, strict=True)]
-    _dots(canvas, np.concatenate(hits), _HIT * canvas.scale, colour)
+    _dots(canvas, np.concatenate(hits), _HIT * canvas.scale, color)
 
 
 def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas) -> None:
@@ -97,20 +97,20 @@ def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas)
     begin = np.maximum(begin, 12.0) * canvas.scale * _FINE
     shown = length > begin + _FINE
     first = place + along[shown] * (begin[shown] / length[shown])[:, None]
-    colour = premultiplied(canvas.theme.final, 0.3)
+    color = premultiplied(canvas.theme.final, 0.3)
     width = max(1, round(0.5 * canvas.scale * _FINE))
     for line in zip(first.tolist(), ends[shown].tolist(), strict=True):
         if seen := clipped_segment(*line):
-            pygame.draw.line(large, colour, seen[0], seen[1], width)
+            pygame.draw.line(large, color, seen[0], seen[1], width)
 
 
 def _scan_glyph(canvas: Canvas, x: float, y: float) -> None:
-    colour, size = canvas.theme.final, 8 * canvas.scale
+    color, size = canvas.theme.final, 8 * canvas.scale
     angle = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
     ends = np.column_stack([x - size + 2 * size * np.cos(angle), y + 1.15 * size * np.sin(angle)])
     for end in ends.tolist():
-        canvas.line((x - size, y), end, mix(canvas.theme.background, colour, 0.55))
-    _dots(canvas, ends, _HIT * canvas.scale, colour)
+        canvas.line((x - size, y), end, mix(canvas.theme.background, color, 0.55))
+    _dots(canvas, ends, _HIT * canvas.scale, color)
 
 
 scans_legend = says("ray scan", _scan_glyph)
@@ -138,21 +138,21 @@ class SensedObstacles:
             self._page, begin = pygame.Surface(size, pygame.SRCALPHA, 32), 0
             self._page.set_clip(clip)
             if "obstacles" in canvas.shown:
-                fill, edge = _pale_colours(canvas)
+                fill, edge = _pale_colors(canvas)
                 draw_blocked(replace(canvas, surface=self._page), scene, fill, fill, edge)
                 if "boundary" in canvas.shown:  # what of it was covered
                     draw_boundary(replace(canvas, surface=self._page), scene)
         if begin < len(points):
             fresh = points[begin:] if asked is None else points[begin:][robots[begin:] == asked]
-            page, colour = replace(canvas, surface=self._page), canvas.theme.forces["repulsion_obstacle"]
-            _dots(page, canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
+            page, color = replace(canvas, surface=self._page), canvas.theme.forces["repulsion_obstacle"]
+            _dots(page, canvas.camera.to_pixels(fresh), _DOT * canvas.scale, color)
         self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), points
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         if (discovered := discovered_map(scene)) is not None:
             draw_discovered(canvas, discovered)
 
 
-def _pale_colours(canvas: Canvas) -> tuple[Colour, Colour]:
+def _pale_colors(canvas: Canvas) -> tuple[Color, Color]:
     """Return fill and edge of obstacles that are there, but not known."""
     theme = canvas.theme
     return mix(theme.background, theme.obstacle, _PALE), mix(theme.background, theme.obstacle_edge, 0.6)
@@ -160,7 +160,7 @@ def _pale_colours(canvas: Canvas) -> tuple[Colour, Colour]:
 
 def _sensed_glyph(canvas: Canvas, x: float, y: float) -> None:
     half, top = 8 * canvas.scale, y - 2 * canvas.scale
-    fill, edge = _pale_colours(canvas)
+    fill, edge = _pale_colors(canvas)
     box = pygame.Rect(round(x - half), round(top), round(2 * half), round(6 * canvas.scale))
     pygame.draw.rect(canvas.surface, fill, box)
     pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
@@ -187,7 +187,7 @@ def draw_path(canvas: Canvas, scene: Scene) -> None:
     pygame.draw.rect(canvas.surface, theme.background, box, border_radius=radius)
     edge = mix(theme.background, theme.final, 0.5)
     pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0), border_radius=radius)
-    canvas.text(words, box.center, colour=theme.final, bold=True, anchor="middle")
+    canvas.text(words, box.center, color=theme.final, bold=True, anchor="middle")
 
 
 def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.Rect:

@@ -12,7 +12,7 @@ import shapely
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.scene import MovingObstacle, Scene
-from robocov_app.render.theme import Colour
+from robocov_app.render.theme import Color
 
 GRID_GAP = 34.0  # least distance between the lines of the grid in pixels at scale 1
 NARROW = 20.0  # width of cells in pixels at scale 1 below which their edges are not smooth: they hardly show
@@ -46,7 +46,7 @@ class Layer:
         return not any(each is None or (isinstance(each, Sequence | Mapping) and not each) for each in values)
 
 
-def _colours_mean_distance(canvas: Canvas, scene: Scene) -> bool:
+def _colors_mean_distance(canvas: Canvas, scene: Scene) -> bool:
     return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.shown)
 
 
@@ -55,8 +55,8 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
     sizes = np.array([len(cell) for cell in scene.cells])
     corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
     ends = np.cumsum(sizes)
-    fills: list[Colour | None] = [None] * len(sizes)
-    if not _colours_mean_distance(canvas, scene):
+    fills: list[Color | None] = [None] * len(sizes)
+    if not _colors_mean_distance(canvas, scene):
         tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
         hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
         fills = [tints[hue] for hue in hues.tolist()]
@@ -81,7 +81,7 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
 
 def cells_legend(scene: Scene) -> list[LegendEntry]:
     def glyph(canvas: Canvas, x: float, y: float) -> None:
-        fill = None if _colours_mean_distance(canvas, scene) else canvas.theme.cell(0)
+        fill = None if _colors_mean_distance(canvas, scene) else canvas.theme.cell(0)
         canvas.swatch(x, y, fill, canvas.theme.cell_edge)
 
     return [LegendEntry("Voronoi cell", glyph)]
@@ -93,7 +93,7 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
     step = round_length(least)
     step = step if step >= least else round_length(2.5001 * step)
     region, seen = scene.environment.region, canvas.camera.visible()
-    colour, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
+    color, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
     for axis in (0, 1):
         low, high = max(region.bounds[axis], seen[axis]), min(region.bounds[axis + 2], seen[axis + 2])
         for place in np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step:
@@ -106,18 +106,18 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
                 sides = (np.rint(end) - np.rint(begin)).astype(int)
                 begin[axis], sides[axis] = begin[axis] - width / 2, width
                 box = pygame.Rect(np.rint(begin).astype(int).tolist(), sides.tolist())
-                canvas.surface.fill(colour, box.clip(canvas.surface.get_clip()))
+                canvas.surface.fill(color, box.clip(canvas.surface.get_clip()))
 
 
-def draw_blocked(canvas: Canvas, scene: Scene, fill: Colour, moving: Colour, edge: Colour) -> None:
+def draw_blocked(canvas: Canvas, scene: Scene, fill: Color, moving: Color, edge: Color) -> None:
     """Draw obstacles on a transparent page: what lies below it shows in their courtyards."""
     rings, parts = [], scene.environment.blocked.geoms
     # courtyards before what stands in them
     for part in sorted(parts, key=lambda part: -shapely.Polygon(part.exterior).area):
-        colours = [(*fill, 255), *[(0, 0, 0, 0)] * len(part.interiors)]
-        for ring, colour in zip((part.exterior, *part.interiors), colours, strict=True):
+        colors = [(*fill, 255), *[(0, 0, 0, 0)] * len(part.interiors)]
+        for ring, color in zip((part.exterior, *part.interiors), colors, strict=True):
             rings.append(canvas.camera.to_pixels(np.asarray(ring.coords)[:-1]))
-            canvas.polygon(rings[-1], colour)
+            canvas.polygon(rings[-1], color)
     for corners in rings:
         canvas.outline(corners, edge, canvas.width(canvas.theme.line))
     for obstacle in scene.moving:
@@ -133,7 +133,7 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
     canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Colour, edge: Colour) -> None:
+def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Color, edge: Color) -> None:
     theme, camera, width = canvas.theme, canvas.camera, canvas.width(canvas.theme.line)
     for part in shapely.get_parts(shapely.intersection(obstacle.polygon, scene.environment.region.polygon)):
         if not isinstance(part, shapely.Polygon):

@@ -24,7 +24,7 @@ def nearest_distance(points: Array, step: int = 1) -> Array:
 
 
 def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:
-    """Return radii, (n,), for discs: `most`, but in a crowd half of the way to the nearest neighbour.
+    """Return radii, (n,), for discs: `most`, but in a crowd half of the way to the nearest neighbor.
 
     They are not below the `true` radii, (n,), nor below `least`.
     """

@@ -143,9 +143,9 @@ def _aims(scene: Scene) -> tuple[str, Array]:
 
 def _cross(canvas: Canvas, kind: str, arm: float | None = None) -> Sprite:
     arm, theme = 5.5 * canvas.scale if arm is None else arm, canvas.theme
-    colour, width, part = (theme.final, 1.8, 0.4) if kind == GOAL else (theme.ink, 1.3, 0.3)
+    color, width, part = (theme.final, 1.8, 0.4) if kind == GOAL else (theme.ink, 1.3, 0.3)
     width = min(width * canvas.scale, part * arm)
-    return partial(sprites.cross, arm, colour, theme.background, width, kind == GOAL)
+    return partial(sprites.cross, arm, color, theme.background, width, kind == GOAL)
 
 
 def _aim_glyph(kind: str) -> Glyph:
@@ -223,5 +223,5 @@ def belief_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def _stamp_belief(canvas: Canvas, hue: int, place: list[float]) -> None:
-    colour = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
-    canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, colour, 1.6 * canvas.scale), place)
+    color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
+    canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, color, 1.6 * canvas.scale), place)

@@ -27,7 +27,7 @@ _strip = partial(Layer, in_world=False)
 
 
 def standard_layers(trails: str = "robots") -> list[Layer]:
-    """Return one of each layer, from the lowest to the topmost; `trails` are colours of `Trajectories`."""
+    """Return one of each layer, from the lowest to the topmost; `trails` are colors of `Trajectories`."""
     distances = heatmaps.field_drawing(heatmaps.draw_distances)
     geodesic = heatmaps.field_drawing(heatmaps.draw_geodesic_cells)
     sensed = knowledge.SensedObstacles()
@@ -64,7 +64,7 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         Layer("failed", "Failed robots", marks.draw_failed, ("failed",), marks.failed_legend),
         Layer("selection", "Selection", marks.draw_selection, ("snapshot", "selected"), marks.belief_legend),
         Layer("robots", "Robots", marks.draw_robots, snapshot, marks.robots_legend),
-        _strip("colour_bar", "Colour scale", heatmaps.draw_colour_bar, ("field",)),
+        _strip("color_bar", "Color scale", heatmaps.draw_color_bar, ("field",)),
         _strip("legend", "Legend", annotations.LegendStrip().draw),
         _strip("scale_bar", "Scale bar", annotations.draw_scale_bar),
         _strip("status", "Status line", annotations.draw_status),
@@ -137,7 +137,7 @@ class Painter:
 
     @property
     def camera(self) -> Camera:
-        """The camera, with the view that strips and scale of colours leave; set it to zoom and pan."""
+        """The camera, with the view that strips and scale of colors leave; set it to zoom and pan."""
         (width, height), scale, (_, rows, beside) = self.size, self.scale, self._room
         top = (6 + LEGEND_ROW * rows + 6 if rows else MARGIN) * scale
         small = annotations.is_small(height, scale, self.visible)
@@ -168,7 +168,7 @@ class Painter:
         """Draw a scene on all of a surface; what was zoomed or panned stays so in another size."""
         self.size = surface.get_size()
         numbers = scene.numbers
-        if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:  # a colour stays with its robot
+        if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:  # a color stays with its robot
             self._hues = np.array(numbers, dtype=np.intp) - 1
         else:
             self._hues = robot_hues(len(scene.team), scene.adjacency, self._hues)
@@ -208,11 +208,11 @@ class Painter:
         return [layer for layer in self.layers if layer.name in self.visible]
 
     def _page(self, canvas: Canvas, scene: Scene, layers: list[Layer], clip: pygame.Rect) -> pygame.Surface:
-        """Return the page of neighbouring static layers, drawn anew only when something changed."""
-        # distances, in colours too, hide the density
-        coloured = scene.field is not None and "distances" in canvas.shown
+        """Return the page of neighboring static layers, drawn anew only when something changed."""
+        # distances, in colors too, hide the density
+        colored = scene.field is not None and "distances" in canvas.shown
         names = [layer.name for layer in layers]
-        key = names, canvas.camera, self.theme.name, self.scale, self.size, coloured
+        key = names, canvas.camera, self.theme.name, self.scale, self.size, colored
 
         def drawn() -> pygame.Surface:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)

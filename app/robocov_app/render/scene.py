@@ -19,7 +19,7 @@ from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 from robocov_app.render.distance_field import Field, Fields
 
-SAME = 0.05  # metres within which a goal is the centroid: a record's are those of a moment before its end
+SAME = 0.05  # meters within which a goal is the centroid: a record's are those of a moment before its end
 CENTROID, GOAL = "cell centroid", "goal"
 
 
@@ -29,7 +29,7 @@ def are_centroids(goals: Array, centroids: Array) -> bool:
     return bool((np.hypot(*(goals - centroids)[known].T) <= SAME).all())
 
 
-CELL = 0.05  # points that a robot senses within the same square of so many metres count once
+CELL = 0.05  # points that a robot senses within the same square of so many meters count once
 MOST = 20_000  # more are not remembered
 
 
@@ -115,7 +115,7 @@ class Scene:
     label: str = ""  # the controller as people name it
     cost: str = ""  # "mean distance 1.23 m"
     field: Field | None = None  # the distances to the nearest robot
-    field_limit: float = 1.0  # m, where the scale of their colours ends
+    field_limit: float = 1.0  # m, where the scale of their colors ends
     numbers: Sequence[int] | None = None  # what people call the robots; by default 1, 2, 3, ...
     failed: Mapping[int, tuple[float, float]] = dataclass_field(default_factory=dict)  # m, by number
     selected: int | None = None  # row of the robot that is asked about

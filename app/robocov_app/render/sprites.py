@@ -14,7 +14,7 @@ import pygame
 from robocov.arrays import Array
 from robocov_app.render.fonts import label
 from robocov_app.render.surface_cache import kept
-from robocov_app.render.theme import Colour, readable_on
+from robocov_app.render.theme import Color, readable_on
 
 FINE = 4  # each sprite is drawn so many times larger; also the number of shifts within a pixel
 LARGE = 60.0  # radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes
@@ -54,18 +54,18 @@ class Sketch:
         x, y = self.box.x - 0.5, self.box.y - 0.5
         return [((point[0] - x) * STROKE_FINE, (point[1] - y) * STROKE_FINE) for point in points]
 
-    def path(self, points: Sequence[Pixel], colour: Colour, width: float) -> None:
+    def path(self, points: Sequence[Pixel], color: Color, width: float) -> None:
         wide = max(width * STROKE_FINE, 1.0)
         large = self._large_points(points)
-        pygame.draw.lines(self.large, colour, False, large, round(wide))
+        pygame.draw.lines(self.large, color, False, large, round(wide))
         for point in large:
-            pygame.draw.circle(self.large, colour, point, wide / 2)
+            pygame.draw.circle(self.large, color, point, wide / 2)
 
-    def polygon(self, corners: Sequence[Pixel], colour: Colour) -> None:
-        pygame.draw.polygon(self.large, colour, self._large_points(corners))
+    def polygon(self, corners: Sequence[Pixel], color: Color) -> None:
+        pygame.draw.polygon(self.large, color, self._large_points(corners))
 
-    def dot(self, center: Pixel, radius: float, colour: Colour) -> None:
-        pygame.draw.circle(self.large, colour, self._large_points([center])[0], radius * STROKE_FINE)
+    def dot(self, center: Pixel, radius: float, color: Color) -> None:
+        pygame.draw.circle(self.large, color, self._large_points([center])[0], radius * STROKE_FINE)
 
     def onto(self, surface: pygame.Surface) -> None:
         picture = pygame.transform.smoothscale(self.large, self.box.size)
@@ -89,7 +89,7 @@ def number_size(inside: Any, digits: Any) -> Any:
 
 
 def disc(
-    radius: float, fill: Colour, ring: Colour, ring_width: float, edge: Colour, text: str, shift: Shift
+    radius: float, fill: Color, ring: Color, ring_width: float, edge: Color, text: str, shift: Shift
 ) -> pygame.Surface:
     """Return a disc of `radius` px with a ring in it, a hair line around, and a number."""
     return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
@@ -97,7 +97,7 @@ def disc(
 
 @kept(24_000_000)
 def _disc(
-    radius: float, fill: Colour, ring: Colour, ring_width: float, edge: Colour, text: str, shift: Shift
+    radius: float, fill: Color, ring: Color, ring_width: float, edge: Color, text: str, shift: Shift
 ) -> pygame.Surface:
     fine = _fineness(radius)
     large, center = _blank(radius + 1, shift, fine)
@@ -118,27 +118,27 @@ NOSE_TURNS = 96  # so many directions of noses are told apart
 
 
 @kept(12_000_000)
-def nose(radius: float, fill: Colour, edge: Colour, turn: int, shift: Shift) -> pygame.Surface:
+def nose(radius: float, fill: Color, edge: Color, turn: int, shift: Shift) -> pygame.Surface:
     """Return what points where a disc faces, to be put under it; `turn` is of `NOSE_TURNS`, 0 right."""
     fine = _fineness(radius)
     large, (x, y) = _blank(NOSE * radius + 1, shift, fine)
     angle, apart = 2 * math.pi * turn / NOSE_TURNS, 0.5
-    for colour, more in ((edge, 0.6), (fill, 0.0)):
+    for color, more in ((edge, 0.6), (fill, 0.0)):
         reach = [(NOSE * radius + 1.5 * more, 0.0), (radius + more, apart), (radius + more, -apart)]
         corners = [(far * math.cos(angle + side), far * math.sin(angle + side)) for far, side in reach]
-        pygame.draw.polygon(large, colour, [(x + fine * dx, y - fine * dy) for dx, dy in corners])
+        pygame.draw.polygon(large, color, [(x + fine * dx, y - fine * dy) for dx, dy in corners])
     return _shrunk(large, fine)
 
 
-def ring(radius: float, colour: Colour, width: float, shift: Shift) -> pygame.Surface:
-    return _ring(radius, colour, width, shift if radius <= LARGE else (0, 0))
+def ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
+    return _ring(radius, color, width, shift if radius <= LARGE else (0, 0))
 
 
 @kept(6_000_000)
-def _ring(radius: float, colour: Colour, width: float, shift: Shift) -> pygame.Surface:
+def _ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
     fine = _fineness(radius)
     large, center = _blank(radius + width / 2, shift, fine)
-    pygame.draw.circle(large, colour, center, (radius + width / 2) * fine)
+    pygame.draw.circle(large, color, center, (radius + width / 2) * fine)
     pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fine)
     return _shrunk(large, fine)
 
@@ -148,21 +148,21 @@ def _fineness(radius: float) -> int:
 
 
 @kept(4_000_000)
-def dot(radius: float, colour: Colour, shift: Shift) -> pygame.Surface:
+def dot(radius: float, color: Color, shift: Shift) -> pygame.Surface:
     large, center = _blank(radius, shift)
-    pygame.draw.circle(large, colour, center, radius * FINE)
+    pygame.draw.circle(large, color, center, radius * FINE)
     return _shrunk(large)
 
 
 @kept(4_000_000)
 def cross(
-    arm: float, colour: Colour, halo: Colour, width: float, diagonal: bool, shift: Shift
+    arm: float, color: Color, halo: Color, width: float, diagonal: bool, shift: Shift
 ) -> pygame.Surface:
     """Return a plus, or a times sign, with a thin halo that keeps it readable on any fill."""
     large, (x, y) = _blank(arm + width, shift)
     reach = arm * FINE * (0.75 if diagonal else 1.0)
     turned = ((-1, -1), (1, -1)) if diagonal else ((1, 0), (0, 1))
-    for shade, thick in ((halo, width * FINE + FINE * 1.6), (colour, width * FINE)):
+    for shade, thick in ((halo, width * FINE + FINE * 1.6), (color, width * FINE)):
         more = reach + (FINE * 0.8 if shade is halo else 0.0)
         for dx, dy in turned:
             half_thick = thick / 2 / (2**0.5 if diagonal else 1.0)

@@ -1,4 +1,4 @@
-"""Colours, line widths and text sizes, shared by the window, the films and the plots."""
+"""Colors, line widths and text sizes, shared by the window, the films and the plots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,46 +12,46 @@ from numpy.typing import NDArray
 from robocov.arrays import IntArray
 from robocov.errors import ParameterError, describe_unknown_name
 
-Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
+Color: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
 ONE_HUE_EACH = 9  # up to so many robots each have a hue of their own; no eye tells more hues apart
-MAP_COLOURS = 6  # hues for larger teams, where only cells that share an edge must differ
+MAP_COLORS = 6  # hues for larger teams, where only cells that share an edge must differ
 
 
-def rgb(code: str) -> Colour:
+def rgb(code: str) -> Color:
     return int(code[0:2], 16), int(code[2:4], 16), int(code[4:6], 16)
 
 
 @lru_cache(maxsize=1000)  # for each of many robots in each frame
-def mix(first: Colour, second: Colour, part: float) -> Colour:
+def mix(first: Color, second: Color, part: float) -> Color:
     """Return `first` with `part` (0 to 1) of `second` mixed in."""
     red, green, blue = (round(a + (b - a) * part) for a, b in zip(first, second, strict=True))
     return red, green, blue
 
 
-def luminance(colour: Colour) -> float:
+def luminance(color: Color) -> float:
     """Return the relative luminance of WCAG 2, 0 for black to 1 for white."""
-    channels = [c / 255 for c in colour]
+    channels = [c / 255 for c in color]
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def contrast(first: Colour, second: Colour) -> float:
+def contrast(first: Color, second: Color) -> float:
     """Return the contrast ratio of WCAG 2, 1 (none) to 21 (black on white)."""
     low, high = sorted([luminance(first), luminance(second)])
     return (high + 0.05) / (low + 0.05)
 
 
-def readable_on(colour: Colour) -> Colour:
-    """Return near-black or white, whichever is read better on `colour`."""
+def readable_on(color: Color) -> Color:
+    """Return near-black or white, whichever is read better on `color`."""
     dark, light = (22, 27, 34), (255, 255, 255)
-    return light if contrast(colour, light) >= contrast(colour, dark) else dark
+    return light if contrast(color, light) >= contrast(color, dark) else dark
 
 
-# Paul Tol's "muted" scheme: nine hues that colour-blind readers tell apart. The first six are also
-# far apart as tints of cells, where sand and olive would be one, and serve as map colours.
+# Paul Tol's "muted" scheme: nine hues that color-blind readers tell apart. The first six are also
+# far apart as tints of cells, where sand and olive would be one, and serve as map colors.
 _MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "332288", "AA4499", "117733", "882255", "999933")
 
-HEAT_LEVELS = 12  # steps of the scale of colours of a grid of numbers
+HEAT_LEVELS = 12  # steps of the scale of colors of a grid of numbers
 _QUIET_PART = 0.55  # of the scale of heat, so much is used for them: on all of it the ink can be read
 TRAIL_CONTRAST = 2.4  # least contrast of a robot's trajectory with its own cell
 
@@ -61,31 +61,31 @@ class Theme:
     """One look. Widths and text sizes are pixels at scale 1.
 
     `start`, `final`, `trajectory`: the paper's green, blue and red. `robots`: one for each of a small team;
-    the first `MAP_COLOURS` for cells of a large one. `heat`: from near to far. `tint`: of cells.
+    the first `MAP_COLORS` for cells of a large one. `heat`: from near to far. `tint`: of cells.
     """
 
     name: str
-    background: Colour
-    panel: Colour
-    ink: Colour
-    faint: Colour
-    grid: Colour
-    boundary: Colour
-    obstacle: Colour
-    obstacle_edge: Colour
-    cell_edge: Colour
-    robot_ring: Colour
-    start: Colour
-    final: Colour
-    trajectory: Colour
-    velocity: Colour
-    controllers: dict[str, Colour]
-    others: tuple[Colour, ...]
-    forces: dict[str, Colour]
-    robots: tuple[Colour, ...]
-    heat: tuple[Colour, ...]
-    unreached: Colour
-    density: Colour
+    background: Color
+    panel: Color
+    ink: Color
+    faint: Color
+    grid: Color
+    boundary: Color
+    obstacle: Color
+    obstacle_edge: Color
+    cell_edge: Color
+    robot_ring: Color
+    start: Color
+    final: Color
+    trajectory: Color
+    velocity: Color
+    controllers: dict[str, Color]
+    others: tuple[Color, ...]
+    forces: dict[str, Color]
+    robots: tuple[Color, ...]
+    heat: tuple[Color, ...]
+    unreached: Color
+    density: Color
     density_strength: float
     tint: float
     paper_tint: float
@@ -97,42 +97,42 @@ class Theme:
     arrow_line: float = 2.0
 
     @property
-    def moving_obstacle(self) -> Colour:
+    def moving_obstacle(self) -> Color:
         return mix(self.obstacle, self.background, 0.5)
 
-    def cell(self, hue: int) -> Colour:
+    def cell(self, hue: int) -> Color:
         return mix(self.background, self.robots[hue], self.tint)
 
     def heat_table(self, count: int) -> NDArray[np.uint8]:
-        """Return colours from near to far, (count, 3)."""
+        """Return colors from near to far, (count, 3)."""
         anchors = np.array(self.heat, dtype=float)
         place = np.linspace(0.0, len(anchors) - 1.0, count)
         channels = [np.interp(place, np.arange(len(anchors)), channel) for channel in anchors.T]
         return np.asarray(np.rint(np.column_stack(channels)), dtype=np.uint8)
 
     @property
-    def quiet_heat(self) -> list[Colour]:
-        """The `HEAT_LEVELS` colours of a grid from low to high, all quiet enough for text in ink."""
+    def quiet_heat(self) -> list[Color]:
+        """The `HEAT_LEVELS` colors of a grid from low to high, all quiet enough for text in ink."""
         rows = [round(_QUIET_PART * 199 * k / (HEAT_LEVELS - 1)) for k in range(HEAT_LEVELS)]
         return [(int(r), int(g), int(b)) for r, g, b in self.heat_table(200)[rows]]
 
-    def controller(self, name: str) -> Colour:
+    def controller(self, name: str) -> Color:
         return self.controllers.get(name, self.others[0])
 
-    def trails(self, hues: list[int], paper: bool) -> list[Colour]:
+    def trails(self, hues: list[int], paper: bool) -> list[Color]:
         if paper or len(hues) > ONE_HUE_EACH:
             return [self.trajectory if paper else mix(self.trajectory, self.background, 0.25)] * len(hues)
         return [self.trail(hue) for hue in hues]
 
-    def trail(self, hue: int) -> Colour:
-        """Return the colour of a robot's trajectory: its hue, but never too pale to be followed."""
+    def trail(self, hue: int) -> Color:
+        """Return the color of a robot's trajectory: its hue, but never too pale to be followed."""
         part = 0.12
-        while contrast(colour := mix(self.robots[hue], self.ink, part), self.cell(hue)) < TRAIL_CONTRAST:
+        while contrast(color := mix(self.robots[hue], self.ink, part), self.cell(hue)) < TRAIL_CONTRAST:
             part += 0.04
-        return colour
+        return color
 
 
-_COLOURS = {  # codes of the light look and of the dark one
+_COLORS = {  # codes of the light look and of the dark one
     "background": ("FFFFFF", "13181F"),
     "panel": ("F4F6FA", "1B212B"),
     "ink": ("1B2330", "E8ECF2"),
@@ -162,13 +162,13 @@ _OTHERS = "8A3FA8 7A5C00 28303C 007A8A D4127E", "CF8BE8 F0A94A E8ECF2 2DD4BF FF5
 _HEAT = "FBFCFE DCE6F2 B4CBE4 86A9D3 5D84BF 3F60A2 2A3F78", "141B26 1B2F4B 23486F 31668F 4B88A6 78ADB8 B8D3C8"
 
 
-def _theme(look: int, name: str, robots: Iterable[Colour], **numbers: Any) -> Theme:
+def _theme(look: int, name: str, robots: Iterable[Color], **numbers: Any) -> Theme:
     def named(codes: dict[str, tuple[str, str]]) -> dict[str, Any]:
         return {key: rgb(code[look]) for key, code in codes.items()}
 
     others, heat = (tuple(map(rgb, codes[look].split())) for codes in (_OTHERS, _HEAT))
     looks: Any = {"controllers": named(_CONTROLLERS), "forces": named(_FORCES), "others": others}
-    return Theme(name, robots=tuple(robots), heat=heat, **named(_COLOURS), **looks, **numbers)
+    return Theme(name, robots=tuple(robots), heat=heat, **named(_COLORS), **looks, **numbers)
 
 
 _HUES = [rgb(code) for code in _MUTED]
@@ -188,7 +188,7 @@ def theme_named(name: str | Theme) -> Theme:
 
 
 def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | None = None) -> IntArray:
-    """Return for each robot the row of its colour: its own up to `ONE_HUE_EACH`, else shared.
+    """Return for each robot the row of its color: its own up to `ONE_HUE_EACH`, else shared.
 
     Cells that share an edge, (m, 2) `adjacency`, differ; hues of the frame before stay where they can.
     """
@@ -196,57 +196,57 @@ def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | N
         return np.arange(n, dtype=np.intp)
     known = previous if previous is not None and len(previous) == n else None
     if adjacency is None:
-        return np.arange(n, dtype=np.intp) % MAP_COLOURS if known is None else known
+        return np.arange(n, dtype=np.intp) % MAP_COLORS if known is None else known
     hues = None if known is None else _repaired(known.copy(), adjacency)
     return _dsatur(n, adjacency) if hues is None else hues
 
 
 def _repaired(hues: IntArray, adjacency: IntArray) -> IntArray | None:
-    """Recolour the vertices that conflict, and few others; None when that goes round in circles."""
+    """Recolor the vertices that conflict, and few others; None when that goes round in circles."""
     visits = np.zeros(len(hues), dtype=int)
     pairs, flat = hues[adjacency], adjacency.ravel()
     waiting = np.unique(adjacency[pairs[:, 0] == pairs[:, 1]]).tolist()
     while waiting:
         vertex = waiting.pop()
-        neighbours = flat[np.flatnonzero(flat == vertex) ^ 1]
-        around = hues[neighbours].tolist()
+        neighbors = flat[np.flatnonzero(flat == vertex) ^ 1]
+        around = hues[neighbors].tolist()
         if hues[vertex] not in around:
             continue
         visits[vertex] += 1
-        if visits[vertex] > MAP_COLOURS:
+        if visits[vertex] > MAP_COLORS:
             return None
         turn = vertex + int(visits[vertex])
-        hues[vertex] = min(range(MAP_COLOURS), key=lambda h: (around.count(h), (h + turn) % MAP_COLOURS))
-        waiting += neighbours[hues[neighbours] == hues[vertex]].tolist()
+        hues[vertex] = min(range(MAP_COLORS), key=lambda h: (around.count(h), (h + turn) % MAP_COLORS))
+        waiting += neighbors[hues[neighbors] == hues[vertex]].tolist()
     return hues
 
 
 def _dsatur(n: int, adjacency: IntArray) -> IntArray:
-    """Colour a graph by DSATUR, all colours used alike; where neighbours show all, the rarest of them."""
-    neighbours: list[list[int]] = [[] for _ in range(n)]
+    """Color a graph by DSATUR, all colors used alike; where neighbors show all, the rarest of them."""
+    neighbors: list[list[int]] = [[] for _ in range(n)]
     for first, second in adjacency.tolist():
-        neighbours[first].append(second)
-        neighbours[second].append(first)
+        neighbors[first].append(second)
+        neighbors[second].append(first)
     hues = [-1] * n
-    uses = [0] * MAP_COLOURS
+    uses = [0] * MAP_COLORS
     seen: list[set[int]] = [set() for _ in range(n)]
-    # what is in it of a vertex that is coloured, or of whose neighbours more are by now, is passed over
-    waiting = [(0, -len(neighbours[v]), v) for v in range(n)]
+    # what is in it of a vertex that is colored, or of whose neighbors more are by now, is passed over
+    waiting = [(0, -len(neighbors[v]), v) for v in range(n)]
     heapify(waiting)
     while waiting:
-        colours, _, vertex = heappop(waiting)
-        if hues[vertex] >= 0 or -colours < len(seen[vertex]):
+        colors, _, vertex = heappop(waiting)
+        if hues[vertex] >= 0 or -colors < len(seen[vertex]):
             continue
-        around = [hues[other] for other in neighbours[vertex]]
-        hue = min(range(MAP_COLOURS), key=lambda h: (around.count(h), uses[h], h))
+        around = [hues[other] for other in neighbors[vertex]]
+        hue = min(range(MAP_COLORS), key=lambda h: (around.count(h), uses[h], h))
         hues[vertex] = hue
         uses[hue] += 1
-        for other in neighbours[vertex]:
+        for other in neighbors[vertex]:
             if hues[other] < 0 and hue not in seen[other]:
                 seen[other].add(hue)
-                heappush(waiting, (-len(seen[other]), -len(neighbours[other]), other))
+                heappush(waiting, (-len(seen[other]), -len(neighbors[other]), other))
     return np.array(hues, dtype=np.intp)
 
 
-def border_colour(theme: Theme) -> Colour:
+def border_color(theme: Theme) -> Color:
     return mix(theme.ink, theme.background, 0.1)

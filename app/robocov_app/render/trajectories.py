@@ -12,7 +12,7 @@ from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Sketch, visible_box
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Colour
+from robocov_app.render.theme import Color
 
 PIECE = 2.0  # pixels between the corners of a drawn trajectory
 SECTION = 16.0  # pixels of path that are added to the page at once; what is newer is drawn anew each time
@@ -21,45 +21,45 @@ FADE_STEPS = 24  # shades of a trajectory that fades; its page is drawn anew as 
 FADE_PIECE = 4.0  # pixels at scale 1 that the fastest robot goes between the corners of those that fade
 _FADE_FINE = 2  # they are drawn so many times larger, and shrunk
 
-Pen: TypeAlias = tuple[list[Colour], float]  # colours of robots, width in pixels
+Pen: TypeAlias = tuple[list[Color], float]  # colors of robots, width in pixels
 
 
 class Trajectories:
-    """Trajectories, nan where there is none; each in its robot's colour, or all red (`colours` "paper")."""
+    """Trajectories, nan where there is none; each in its robot's color, or all red (`colors` "paper")."""
 
-    def __init__(self, colours: str = "robots") -> None:
-        self.colours = colours
+    def __init__(self, colors: str = "robots") -> None:
+        self.colors = colors
         self._page = pygame.Surface((0, 0))
         self._key: object = None
         self._drawn = 0
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
         self._ended: list[tuple[int, list[list[float]]]] = []
-        self._trail_colours = Latest[list[Colour]]()
+        self._trail_colors = Latest[list[Color]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return
-        colours = self._of_robots(canvas)
+        colors = self._of_robots(canvas)
         width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
-        continues = self._continued(canvas, scene, trail, (colours, width))
+        continues = self._continued(canvas, scene, trail, (colors, width))
         self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
         self._drawn, self._last_row = len(trail), trail[-1].copy()
-        self._finish_sections((colours, width), together=not continues)
+        self._finish_sections((colors, width), together=not continues)
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         whole = canvas.width(width / canvas.scale)
         # mostly below the robot's disc, where seams do not show, nor steps in a crowd
         lines = pygame.draw.aalines if len(ends) < CROWD else pygame.draw.lines
-        for path, end, colour in zip(self._open, ends, colours, strict=True):
+        for path, end, color in zip(self._open, ends, colors, strict=True):
             still = len(path) == 1 and max(abs(path[0][0] - end[0]), abs(path[0][1] - end[1])) < 1.0
             if still or path[-1][0] != path[-1][0]:  # nan: not there yet
                 continue
             if whole == 1:
-                lines(canvas.surface, colour, False, [*path, end])
+                lines(canvas.surface, color, False, [*path, end])
             else:
-                canvas.outline(np.array([*path, end]), colour, whole, closed=False)
+                canvas.outline(np.array([*path, end]), color, whole, closed=False)
 
     def _lengthen(self, rows: Array) -> None:
         last = np.array([path[-1] for path in self._open])
@@ -80,7 +80,7 @@ class Trajectories:
 
     def _finish_sections(self, pen: Pen, together: bool) -> None:
         """Draw what is long enough on the page, and begin anew at its end."""
-        colours, width = pen
+        colors, width = pen
         corners = 2 if together else 1 + SECTION / PIECE
         done = [(robot, path) for robot, path in self._ended if len(path) > 1]
         self._ended.clear()
@@ -96,7 +96,7 @@ class Trajectories:
             if box is not None:
                 sketch = Sketch(box)
                 for robot, path in group:
-                    sketch.path(path, colours[robot], width)
+                    sketch.path(path, colors[robot], width)
                 sketch.onto(self._page)
 
     def _box(self, group: list[tuple[int, list[list[float]]]], width: float) -> pygame.Rect | None:
@@ -133,10 +133,10 @@ class Trajectories:
             self._drawn = int(rows[-1]) + 1
         return len(rows) > 0
 
-    def _of_robots(self, canvas: Canvas) -> list[Colour]:
-        hues, paper = canvas.hues.tolist(), self.colours == "paper"
+    def _of_robots(self, canvas: Canvas) -> list[Color]:
+        hues, paper = canvas.hues.tolist(), self.colors == "paper"
         look = canvas.theme.name, hues, paper
-        return self._trail_colours.of(None, look, lambda: canvas.theme.trails(hues, paper))
+        return self._trail_colors.of(None, look, lambda: canvas.theme.trails(hues, paper))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -148,11 +148,11 @@ class Trajectories:
                 sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
                 sketch.onto(canvas.surface)
 
-        return [LegendEntry("trajectory", glyph, self.colours)]
+        return [LegendEntry("trajectory", glyph, self.colors)]
 
 
 def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fade: float, pen: Pen) -> None:
-    begin, (colours, width) = int(np.searchsorted(time, time[-1] - fade)), pen
+    begin, (colors, width) = int(np.searchsorted(time, time[-1] - fade)), pen
     points = bounded(canvas.camera.to_pixels(trail[begin:]))
     box = visible_box(points, 5.0 + width, page)
     if box is None:
@@ -164,26 +164,26 @@ def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fa
     shade = shade[rows]
     sketch = Sketch(box, _FADE_FINE)
     wide = max(1, round(width * _FADE_FINE))
-    tips = np.full((len(colours), 2), np.nan)
+    tips = np.full((len(colors), 2), np.nan)
     # the older ones first: where paths cross, the newer ones are on top
     for first, last in pairwise([0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]):
         # slowly at first: what is half forgotten can still be followed
         part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
-        shades = {colour: premultiplied(colour, part) for colour in set(colours)}
+        shades = {color: premultiplied(color, part) for color in set(colors)}
         paths = points[first : last + 1]
         moves = ~(np.abs(paths - tips).max(axis=(0, 2)) < _FADE_FINE)
         gone = np.isnan(paths).any(axis=(0, 2)).tolist()
         tip, lines = tips.tolist(), paths.swapaxes(0, 1).tolist()
         for robot in np.flatnonzero(moves).tolist():
-            colour = shades[colours[robot]]
+            color = shades[colors[robot]]
             if tip[robot][0] == tip[robot][0]:  # not nan
                 lines[robot][0] = tip[robot]
             for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
                 if len(run) > 1:
-                    pygame.draw.lines(sketch.large, colour, False, run, wide)
+                    pygame.draw.lines(sketch.large, color, False, run, wide)
                 # lines have straight ends: fill the corners' notches
                 for point in run if len(run) > 1 and wide > 2.5 * _FADE_FINE else ():
-                    pygame.draw.circle(sketch.large, colour, point, wide / 2)
+                    pygame.draw.circle(sketch.large, color, point, wide / 2)
         tips[moves] = paths[-1, moves]
     sketch.onto(page)
 

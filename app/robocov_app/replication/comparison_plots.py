@@ -110,7 +110,7 @@ def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme
     with_samples = [group for group in groups if group[1]]
     if not with_samples:
         return None
-    label = "J/J_ref at the end (1: the centralised reference)"
+    label = "J/J_ref at the end (1: the centralized reference)"
     return partial(plot_final_costs, with_samples, label, WIDE_PX, PAGE_SCALE, theme, origin=1.0)
 
 

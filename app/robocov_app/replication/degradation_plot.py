@@ -47,7 +47,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     page = Page(_SIZE_PX, theme, scale=1.0)
     page.title("Coverage when things go wrong", 26)
     subtitle = "final mean distance, as a multiple of the same run's in which that does not go wrong"
-    page.text(subtitle, page.margin, 50, colour=quiet, room=page.room)
+    page.text(subtitle, page.margin, 50, color=quiet, room=page.room)
     for number, name in enumerate(names):
         row, column = divmod(number, columns)
         x = 64 + column * panel_width
@@ -68,7 +68,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     )
     pairs = format_count(max(degradation.runs for degradation in degradations), "pair")
     note = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
-    page.text(note, page.margin, height - 18, points=SMALL, colour=quiet)
+    page.text(note, page.margin, height - 18, points=SMALL, color=quiet)
     return page.figure
 
 
@@ -105,7 +105,7 @@ def _draw_curve(
     axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
 ) -> None:
     """Draw the median ratios of a controller, with their intervals."""
-    color = tone(style.colour(theme))
+    color = tone(style.color(theme))
     y = np.array([degradation.ratio.estimate for degradation in degradations])
     ends = np.array([[degradation.ratio.low, degradation.ratio.high] for degradation in degradations])
     errors = np.nan_to_num(np.abs(ends - y[:, None]).T)

@@ -131,7 +131,7 @@ def _describe_partition(run: Record) -> str:
     mean_distance = float(np.hypot(*(centroids - positions).T).mean())
     return (
         f"The robots stand anywhere in “{run.environment.name}”, on average "
-        f"{format_amount(mean_distance, 'm')} from the centres of mass of their cells."
+        f"{format_amount(mean_distance, 'm')} from the centers of mass of their cells."
     )
 
 
@@ -251,7 +251,7 @@ def draw_side_by_side(
         right = box.x1 * page.size[0]
         top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
         page.text(f"({letter})  {title}", left, top, points=TITLE, bold=True)
-        page.text(cost, right, top, points=SMALL, colour=theme.faint, align="right")
+        page.text(cost, right, top, points=SMALL, color=theme.faint, align="right")
     return page.figure
 
 

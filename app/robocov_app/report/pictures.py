@@ -30,7 +30,7 @@ MOST_ROBOTS = 400
 
 
 class Frame:
-    """Transform from metres to the pixels of a picture of at most `width` by `height`."""
+    """Transform from meters to the pixels of a picture of at most `width` by `height`."""
 
     def __init__(self, environment: Environment, width: float, height: float) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds
@@ -50,7 +50,7 @@ def density_picture(environment: Environment) -> str:
     if environment.density is None or environment.density.is_uniform:
         return ""
     picture = shading(environment, _DOTS, LIGHT)
-    # one colour for light and dark: it is between the two
+    # one color for light and dark: it is between the two
     picture[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
     x, y = np.meshgrid(*dots(environment, _DOTS))
     inside = environment.region.contains(np.column_stack([x.ravel(), y.ravel()]))

@@ -28,7 +28,7 @@ from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
 Looks: TypeAlias = Mapping[str, CurveStyle]  # the styles of a result's groups by label (`groups.styles`)
 
 TOGETHER = "All maps and teams together"
-METRES, RELATIVE = "final mean distance (m)", "final distance / median of map and team"
+METERS, RELATIVE = "final mean distance (m)", "final distance / median of map and team"
 MOST_PANELS = 24  # settings up to which each has panels of its own
 PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
 WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
@@ -89,13 +89,13 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
 
 def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the distributions of final costs: over all settings, by their medians, then of each setting."""
-    scales, metres = grouped.medians(result), dict.fromkeys(result.fine, 1.0)
+    scales, meters = grouped.medians(result), dict.fromkeys(result.fine, 1.0)
     for title, own, groups, several in _parts(result, key):
-        what, unit = (RELATIVE, "") if several else (METRES, " m")
+        what, unit = (RELATIVE, "") if several else (METERS, " m")
         samples = [
             Sample(group.label, looks[group.label], values)
             for group in groups
-            if len(values := grouped.relative(group.entries, scales if several else metres))
+            if len(values := grouped.relative(group.entries, scales if several else meters))
         ]
         if not samples or max(len(sample.values) for sample in samples) < 2:
             continue
@@ -169,9 +169,9 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     styles = curve_styles(group.controller for group in groups)
 
     def scale(label: str, part_of: Callable[[Entry], object]) -> tuple[str, Scales]:
-        # by the medians of parts; of one part in metres
+        # by the medians of parts; of one part in meters
         if len({part_of(entry) for entry in result.fine}) == 1:
-            return METRES, dict.fromkeys(result.fine, 1.0)
+            return METERS, dict.fromkeys(result.fine, 1.0)
         return label, grouped.medians(result, part_of)
 
     def plotted(over: _Parameter, some: list[Group], by: tuple[str, Scales], key: str) -> Iterator[Plot]:
@@ -250,14 +250,14 @@ def _grid_plot(
     figure = drawing.plot_gain_grid(PANEL, levels[0], levels[1], values, titles)
     row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
     title = f"{group.label} over {' and '.join(over)}"
-    what = "final distance in m" if label == METRES else RELATIVE
+    what = "final distance in m" if label == METERS else RELATIVE
     best = f"{titles[0]} {gains[0].text(columns[column])} and {titles[1]} {gains[1].text(rows[row])}"
     span = f"from {np.nanmin(values):.3g} at {best} to {np.nanmax(values):.3g}"
     return Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
 
 
 def _in_contact(gaps: Array) -> Array:
-    """Return gaps in whole millimetres: what is below is the solver's slop, which has no sign."""
+    """Return gaps in whole millimeters: what is below is the solver's slop, which has no sign."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 

@@ -1,6 +1,6 @@
 """The interactive replay of runs, as HTML that needs nothing else: in reports and in notebooks.
 
-Runs and maps are in it as small JSON: quantised positions and costs at even times, maps rounded.
+Runs and maps are in it as small JSON: quantized positions and costs at even times, maps rounded.
 """
 
 import base64
@@ -54,7 +54,7 @@ def even_times(end: float, rate: float) -> Array:
     return np.append(times, end) if end - times[-1] > 1e-9 else times
 
 
-def quantised(values: Array, low: float, high: float) -> str:
+def quantized(values: Array, low: float, high: float) -> str:
     """Return numbers as base64 of 16 bits, 0 at `low`, 65534 at `high`, `NONE` if not finite."""
     span = high - low if high > low else 1.0
     with np.errstate(invalid="ignore"):
@@ -68,7 +68,7 @@ def embedded_map(environment: Environment) -> dict[str, Any]:
 
     Where not every place counts the same there is also the address of a picture of the ``density``. Obstacles
     that move are apart, in ``movers``: each with its rings, the line of one turn and its speed in m/s.
-    Coordinates are whole numbers of ``unit`` metres, a millimetre or, for tiny maps, less.
+    Coordinates are whole numbers of ``unit`` meters, a millimeter or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
     extent = max(high_x - low_x, high_y - low_y)
@@ -109,7 +109,7 @@ def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goa
     if record.steering is not None:
         angles = np.where(record.team.is_unicycle, record.steering[:, :, 0], np.nan)
         vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
-        headings = {"headings": quantised(_between(record.time, vectors, times + begin), -1.0, 1.0)}
+        headings = {"headings": quantized(_between(record.time, vectors, times + begin), -1.0, 1.0)}
     return {
         "title": run.title,
         "facts": run.facts,
@@ -183,14 +183,14 @@ def _affordable(runs: Sequence[ReplayRun], budget: int) -> tuple[float, bool]:
 
 
 def _places(record: Record, values: Array, times: Array) -> str:
-    """Return places (T, n, 2) m at other times, quantised between the corners of the region."""
+    """Return places (T, n, 2) m at other times, quantized between the corners of the region."""
     low, high = np.array(record.environment.region.bounds).reshape(2, 2)
     flat = _between(record.time, values.reshape(len(record), -1), times).reshape(len(times), -1, 2)
-    return quantised((flat - low) / (high - low), 0.0, 1.0)
+    return quantized((flat - low) / (high - low), 0.0, 1.0)
 
 
 def _between(time: Array, rows: Array, times: Array) -> Array:
-    """Return (T, m) rows at other times, linear in between; nan where either neighbour is."""
+    """Return (T, m) rows at other times, linear in between; nan where either neighbor is."""
     after = np.clip(np.searchsorted(time, times), 1, max(len(time) - 1, 1))
     if len(time) == 1:
         return np.asarray(np.repeat(rows, len(times), axis=0))
@@ -209,7 +209,7 @@ def _cost(history: CostHistory | None, begin: float, times: Array, step: float) 
     if not len(finite):
         return None
     low, high, last = float(finite.min()), float(finite.max()), float(history.mean_distance[-1])
-    known = {"low": low, "high": high, "values": quantised(values, low, high)}
+    known = {"low": low, "high": high, "values": quantized(values, low, high)}
     return {"step": step, "count": len(times), **known, "last": last if np.isfinite(last) else None}
 
 

@@ -162,7 +162,7 @@ class Result:
 
 
 def with_references(result: Result, *, search: bool, tell: Callable[[int], None]) -> Result:
-    """Return the result with centralised references, cached or by `search`; none where things change."""
+    """Return the result with centralized references, cached or by `search`; none where things change."""
     lattice = result.facts.get("lattice")
     first = {entry.setting: entry for entry in reversed(result.fine)}
     found = {}
@@ -268,7 +268,7 @@ def _of_runs(folder: Path) -> Result:
         )
     loaded = {each.folder: each for each in saved}
     known = _known_gains(entries, {})
-    return Result(kind, folder, _labelled(entries), maps, len(parts), *known, facts, loaded, tuple(damaged))
+    return Result(kind, folder, _labeled(entries), maps, len(parts), *known, facts, loaded, tuple(damaged))
 
 
 def _of_sweep(folder: Path) -> Result:
@@ -320,10 +320,10 @@ def _of_sweep(folder: Path) -> Result:
     text = {name: columns.get(gain_column(name), ("", "")) for own in gains.values() for name in own}
     maps = {printable(name): environment for name, environment in maps.items()}
     known = _known_gains(entries, text)
-    return Result("sweep", folder, _labelled(entries), maps, wanted, *known, facts, {})
+    return Result("sweep", folder, _labeled(entries), maps, wanted, *known, facts, {})
 
 
-def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
+def _labeled(entries: list[Entry]) -> tuple[Entry, ...]:
     labels: dict[str, str] = {}
     for entry in entries:
         if entry.controller not in labels:

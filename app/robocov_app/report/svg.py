@@ -1,4 +1,4 @@
-"""matplotlib's figures as small SVG in a page, text as text: colours of the light theme become variables."""
+"""matplotlib's figures as small SVG in a page, text as text: colors of the light theme become variables."""
 
 import io
 import re
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from robocov_app.figures.files import plain_style
 from robocov_app.render.theme import LIGHT
-from robocov_app.report.theme_css import hex_code, named_colours
+from robocov_app.report.theme_css import hex_code, named_colors
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
 _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": None, "Type": None}
@@ -24,7 +24,7 @@ _PLOTTED = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd")
 
 
 def inline_svg(figure: Figure, key: str, sentence: str) -> str:
-    """Return a figure in light colours as SVG; ids begin with `key`, `sentence` tells what it shows."""
+    """Return a figure in light colors as SVG; ids begin with `key`, `sentence` tells what it shows."""
     for patch in (figure.patch, *(axes.patch for axes in figure.axes)):
         patch.set_visible(False)
     text = io.StringIO()
@@ -75,7 +75,7 @@ class _Copy:
         return f"url(#{self._name(reference.removeprefix('url(#').removesuffix(')'))})"
 
     def _element(self, source: Element) -> Element:
-        """Return an element with short numbers and the page's colours, without children."""
+        """Return an element with short numbers and the page's colors, without children."""
         element = Element(source.tag.removeprefix(_SPACE))
         element.text = source.text if element.tag == "text" else None
         for name, value in source.attrib.items():
@@ -85,7 +85,7 @@ class _Copy:
             elif name == _LINK:
                 element.set("href", f"#{self._names[value.removeprefix('#')]}")
             elif name == "style":
-                element.set("style", _coloured(value))
+                element.set("style", _colored(value))
             elif name in ("x", "y", "width", "height"):
                 element.set(name, _short(value, 1))
             elif name == "transform" and not value.startswith("rotate(-0 "):
@@ -111,14 +111,14 @@ class _Copy:
             f"fill: none; stroke: {look['fill']}; stroke-linecap: round; "
             f"stroke-width: {2 * float(begin[1]):g}; opacity: {opacity}"
         )
-        return Element("path", {"d": places, "style": _coloured(style)})
+        return Element("path", {"d": places, "style": _colored(style)})
 
 
 def _short(number: str, decimals: int) -> str:
     return f"{float(number):.{decimals}f}".rstrip("0").rstrip(".") if "." in number else number
 
 
-def _coloured(style: str) -> str:
+def _colored(style: str) -> str:
     parts = [part for part in style.split("; ") if not part.startswith("font-family:")]
     text = ";".join(part.replace(": ", ":") for part in parts)
     return re.sub(r"#[0-9a-f]{6}", lambda match: _variables()[match[0]], text)
@@ -126,7 +126,7 @@ def _coloured(style: str) -> str:
 
 @cache
 def _variables() -> dict[str, str]:
-    """Return what stands for each colour of the light theme that plots use, its first name."""
-    colours = named_colours(LIGHT)
-    names = [*_PLOTTED, *(name for name in colours if name.startswith(("other-", "heat-")))]
-    return {hex_code(colours[name]): f"var(--rc-{name})" for name in reversed(names)}
+    """Return what stands for each color of the light theme that plots use, its first name."""
+    colors = named_colors(LIGHT)
+    names = [*_PLOTTED, *(name for name in colors if name.startswith(("other-", "heat-")))]
+    return {hex_code(colors[name]): f"var(--rc-{name})" for name in reversed(names)}

@@ -80,7 +80,7 @@ def summary_tables(result: Result) -> list[Table]:
     tables = []
     if len(every) > 1:
         scales = grouped.medians(result)
-        name = "Mean distance / median"  # metres of different maps have no common median
+        name = "Mean distance / median"  # meters of different maps have no common median
         parted: Column = name, lambda own: _quartiles(grouped.relative(own, scales).tolist(), 3)
         note = f"{name}: divided by the median over all runs on the same map with the same team."
         tables.append(table("All maps and teams together", [parted, *gap, settled, *others], groups, note))

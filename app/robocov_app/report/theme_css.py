@@ -1,17 +1,17 @@
-"""The project's colours as CSS variables, for pages that follow the reader's preference.
+"""The project's colors as CSS variables, for pages that follow the reader's preference.
 
-Every colour has one name in both themes: what is drawn with names is right in light and dark.
+Every color has one name in both themes: what is drawn with names is right in light and dark.
 """
 
-from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_on, theme_named
+from robocov_app.render.theme import DARK, LIGHT, Color, Theme, mix, readable_on, theme_named
 
 
-def hex_code(colour: Colour) -> str:
-    return f"#{bytes(colour).hex()}"
+def hex_code(color: Color) -> str:
+    return f"#{bytes(color).hex()}"
 
 
-def named_colours(theme: Theme) -> dict[str, Colour]:
-    def own(*names: str) -> dict[str, Colour]:
+def named_colors(theme: Theme) -> dict[str, Color]:
+    def own(*names: str) -> dict[str, Color]:
         return {name: getattr(theme, name.replace("-", "_")) for name in names}
 
     return {
@@ -25,19 +25,19 @@ def named_colours(theme: Theme) -> dict[str, Colour]:
         "trajectory": theme.trajectory,
         "ring": theme.robot_ring,
         **{name: theme.controller(name) for name in theme.controllers},
-        **{f"other-{k}": colour for k, colour in enumerate(theme.others)},
+        **{f"other-{k}": color for k, color in enumerate(theme.others)},
         **{f"cell-{k}": mix(theme.background, hue, theme.paper_tint) for k, hue in enumerate(theme.robots)},
-        **{f"heat-{k}": colour for k, colour in enumerate(theme.quiet_heat)},
+        **{f"heat-{k}": color for k, color in enumerate(theme.quiet_heat)},
     }
 
 
 def variables(theme: Theme) -> str:
-    colours = "".join(f"--rc-{name}:{hex_code(colour)};" for name, colour in named_colours(theme).items())
-    return f"color-scheme:{theme.name};{colours}"
+    colors = "".join(f"--rc-{name}:{hex_code(color)};" for name, color in named_colors(theme).items())
+    return f"color-scheme:{theme.name};{colors}"
 
 
 def theme_rules(scope: str, theme: str = "auto") -> str:
-    """Return CSS that gives a selector its colours; "auto" follows notebook or browser, paper is white."""
+    """Return CSS that gives a selector its colors; "auto" follows notebook or browser, paper is white."""
     light, dark = variables(LIGHT), variables(DARK)
     if theme != "auto":
         return f"{scope}{{{variables(theme_named(theme))}}}@media print{{{scope}{{{light}}}}}\n"

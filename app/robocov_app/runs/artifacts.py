@@ -251,8 +251,8 @@ def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comp
     if is_comparison:
         return plot_comparison(
             [run.record for run in runs],
-            video.colour_theme,
-            video.colours,
+            video.color_theme,
+            video.colors,
             video.size,
             mean_distances,
             [run.final_time for run in runs],
@@ -260,8 +260,8 @@ def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comp
     return plot_trajectories(
         runs[0].record,
         None,
-        video.colour_theme,
-        video.colours,
+        video.color_theme,
+        video.colors,
         video.size,
         mean_distances[0],
         runs[0].final_time,
@@ -276,7 +276,7 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
     return plot_coverage(
         _build_curves(runs, "mean_distance"),
         build_final_moments(runs, cost),
-        settings.video.colour_theme,
+        settings.video.color_theme,
         settings.video.size,
         f"Coverage cost  ·  {record.environment.name}  ·  {robots}",
         _build_curves(runs, "mean_time"),

@@ -20,7 +20,7 @@ from robocov.files.writing import replace_file
 Frame: TypeAlias = NDArray[np.uint8]
 """An RGB image, (height, width, 3), from 0 to 255."""
 _PNG_COMPRESSION_LEVEL = 2
-"""Low levels are several times as fast, and drawings of flat colours stay small."""
+"""Low levels are several times as fast, and drawings of flat colors stay small."""
 _SECONDS_PER_KEYFRAME = 2
 
 

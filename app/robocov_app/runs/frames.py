@@ -81,7 +81,7 @@ def draw_frames(
     ------
     Frame
     """
-    painter = build_painter(record, settings, size, layers or standard_layers(settings.colours), scale)
+    painter = build_painter(record, settings, size, layers or standard_layers(settings.colors), scale)
     if rows is None:
         rows = select_frame_rows(record.time, settings.fps, settings.speed)
     for row, repetitions in groupby(rows.tolist()):
@@ -118,7 +118,7 @@ def build_painter(
     -------
     Painter
     """
-    painter = Painter(record.environment, size, settings.colour_theme, layers, scale)
+    painter = Painter(record.environment, size, settings.color_theme, layers, scale)
     painter.change(settings.shown_layers, settings.hidden_layers)
     return painter
 

@@ -14,7 +14,7 @@ from robocov_app.render.distance_field import Fields
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.picture import Painter, pane_layers, scale_for
 from robocov_app.render.scene import Scene, record_scene
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Color, Theme
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.frames import build_painter
 from robocov_app.runs.settings import VideoSettings
@@ -169,7 +169,7 @@ def _draw_legend(
     scenes: Sequence[Scene] | None,
 ) -> Frame:
     """Draw the legend of everything that the panes show."""
-    painter = build_painter(records[0], settings, (64, 64), pane_layers(settings.colours), scale)
+    painter = build_painter(records[0], settings, (64, 64), pane_layers(settings.colors), scale)
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
     entries = [painter.legend_entries(scene) for scene in scenes]
@@ -177,7 +177,7 @@ def _draw_legend(
     entries.sort(key=len)
     entries.reverse()
     merged = united(entries, LegendEntry.key)
-    return legend_picture(merged, width, settings.colour_theme, scale, settings.shown_layers)
+    return legend_picture(merged, width, settings.color_theme, scale, settings.shown_layers)
 
 
 def _select_legend_scenes(records: Sequence[Record], fields: Fields | None, painter: Painter) -> list[Scene]:
@@ -190,7 +190,7 @@ def _select_legend_scenes(records: Sequence[Record], fields: Fields | None, pain
     return scenes
 
 
-def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Colour, background: Colour) -> Frame:
+def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, background: Color) -> Frame:
     """Join frames of one size in rows.
 
     Parameters
@@ -200,8 +200,8 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Colour, b
         Number of frames in a row.
     gap : int, px
         Width of the lines between frames.
-    line, background : Colour
-        Colours of these lines, and of places without a frame.
+    line, background : Color
+        Colors of these lines, and of places without a frame.
 
     Returns
     -------

@@ -10,7 +10,7 @@ from robocov.defaults import DEFAULT_LATTICE
 if TYPE_CHECKING:
     from robocov_app.render.theme import Theme
 
-TrajectoryColours: TypeAlias = Literal["paper", "robots"]
+TrajectoryColors: TypeAlias = Literal["paper", "robots"]
 DEFAULT_VIDEO_SIZE_PX = (1280, 720)
 
 
@@ -27,9 +27,9 @@ class VideoSettings:
     speed : float
         Simulated seconds per second of the video.
     theme : str
-        Name of the colour theme, ``light`` or ``dark``.
-    colours : {"paper", "robots"}
-        Trajectories in the paper's red, or in a colour for each robot.
+        Name of the color theme, ``light`` or ``dark``.
+    colors : {"paper", "robots"}
+        Trajectories in the paper's red, or in a color for each robot.
     size : (width, height) or None, px
         By default, a size that suits the content.
     shown_layers, hidden_layers : frozenset of str
@@ -41,7 +41,7 @@ class VideoSettings:
     fps: float = 30
     speed: float = 4.0
     theme: str = "light"
-    colours: TrajectoryColours = "paper"
+    colors: TrajectoryColors = "paper"
     size: tuple[int, int] | None = None
     shown_layers: frozenset[str] = frozenset()
     hidden_layers: frozenset[str] = frozenset()
@@ -57,8 +57,8 @@ class VideoSettings:
         return self.size or DEFAULT_VIDEO_SIZE_PX
 
     @property
-    def colour_theme(self) -> Theme:
-        """The colour theme.
+    def color_theme(self) -> Theme:
+        """The color theme.
 
         Raises
         ------

@@ -26,8 +26,8 @@ RUN_VIDEO = "run.mp4"
 COMPARISON_VIDEO = "comparison.mp4"
 VIDEO_HOLD_S = 1.0
 """Duration for which a video shows its last moment."""
-_COLOUR_SCALE_FACTOR = 1.3
-"""Upper end of the colour scale of a video divided by the largest distance at its end."""
+_COLOR_SCALE_FACTOR = 1.3
+"""Upper end of the color scale of a video divided by the largest distance at its end."""
 
 
 def get_video_name(runs: int) -> str:
@@ -68,7 +68,7 @@ def draw_comparison_frames(
             record,
             settings,
             # Layers keep what they have drawn, so each pane needs its own.
-            layers=pane_layers(settings.colours),
+            layers=pane_layers(settings.colors),
             cost=cost,
             rows=select_frame_rows(record.time, settings.fps, settings.speed, hold),
             size=layout.pane,
@@ -80,7 +80,7 @@ def draw_comparison_frames(
     panes: list[Frame] = []
     for new_panes in zip_longest(*pane_videos):
         panes = [old if new is None else new for new, old in zip_longest(new_panes, panes)]
-        yield layout.compose_page(panes, settings.colour_theme)
+        yield layout.compose_page(panes, settings.color_theme)
 
 
 def save_videos(
@@ -135,7 +135,7 @@ def save_videos(
 def _build_fields(
     runs: Sequence[Run], cost: CoverageCost | None, settings: VideoSettings, *, quiet: bool
 ) -> Fields | None:
-    """Return the distances that videos show, on one scale of colours; None if no layer shows any."""
+    """Return the distances that videos show, on one scale of colors; None if no layer shows any."""
     if not settings.shown_layers & {"distances", "geodesic_cells"}:
         return None
     environment = runs[0].record.environment
@@ -150,7 +150,7 @@ def _build_fields(
         if result is not None:
             finite_distances = result.distances[np.isfinite(result.distances)]
             largest_distance = max(largest_distance, float(finite_distances.max(initial=0.0)))
-    return Fields(cost, round_limit(_COLOUR_SCALE_FACTOR * largest_distance))
+    return Fields(cost, round_limit(_COLOR_SCALE_FACTOR * largest_distance))
 
 
 def write_frames_and_video(

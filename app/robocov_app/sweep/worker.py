@@ -39,7 +39,7 @@ FIGURES = {
     "settled_at_s": ("double", "s", "when the team came to rest, null if it did not"),
     "contacts": ("int64", "", "how often a robot began to touch a wall or another robot"),
     "min_clearance_m": ("double", "m", "smallest gap between a robot and a wall"),
-    "path_length_m": ("double", "m", "distance travelled, mean over the robots"),
+    "path_length_m": ("double", "m", "distance traveled, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }
 """Figures of a run in the table, in this order: kind of the column, unit and meaning."""

@@ -50,7 +50,7 @@ class Dialog:
         """Take a key; return whether it meant something."""
         return False
 
-    def cancelled(self) -> None:
+    def canceled(self) -> None:
         """Take note that it was given up."""
 
 
@@ -81,7 +81,7 @@ class Question(Dialog):
         for line in lines[:_MOST_LINES]:
             ui.words(line, size=TEXT + 1)
         if len(lines) > _MOST_LINES:
-            ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, colour=ui.theme.faint)
+            ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, color=ui.theme.faint)
         ui.space(12)
         widths = [text_width(each.text, ui.px(TEXT), True) / ui.scale + 36 for each in self.answers]
         ui.row(max(ui.wide - sum(widths) - 8 * len(widths), 1.0), *widths, height=30, gap=8, below=0)
@@ -105,7 +105,7 @@ class Question(Dialog):
             self._give(own)
         return True
 
-    def cancelled(self) -> None:
+    def canceled(self) -> None:
         self.on_cancel()
 
 
@@ -138,13 +138,13 @@ class Choice(Dialog):
     trouble: str = ""
 
     def page(self, ui: Ui) -> None:
-        ui.words(self.title, colour=ui.theme.faint, bold=True)
+        ui.words(self.title, color=ui.theme.faint, bold=True)
         if ui.edit is None or ui.focus != "text":
             ui.focus, ui.edit = "text", TextEdit(self.text, len(self.text), len(self.text))
         ui.row(height=32, below=8)
         ui.text_entry("text", self.text, ghost=self.ghost)
         self.typed(ui)
-        ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
+        ui.words(self.trouble, color=ui.theme.trajectory, bold=True)
         found = list(self.options(self.text))
         self.chosen = min(self.chosen, max(len(found) - 1, 0))
         ui.row(height=26, below=1)
@@ -292,7 +292,7 @@ class Dialogs:
     def close(self) -> None:
         asked, self.asked = self.asked, None
         if asked is not None:
-            asked.cancelled()
+            asked.canceled()
 
     def drop(self) -> None:
         """Remove a dialog that cannot be drawn, even if it cannot be closed in an orderly way."""

@@ -5,7 +5,7 @@ from math import dist
 from typing import TypeAlias
 
 Point: TypeAlias = tuple[float, float]
-SAME = 1e-6  # metres below which two points are one
+SAME = 1e-6  # meters below which two points are one
 
 
 @dataclass

@@ -8,7 +8,7 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import kept
-from robocov_app.render.theme import LIGHT, Colour, Theme, mix
+from robocov_app.render.theme import LIGHT, Color, Theme, mix
 from robocov_app.toolkit.layout import Box
 
 _FINE = 4
@@ -21,7 +21,7 @@ def flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
 
 
 @kept(4_000_000)
-def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, width: int) -> Surface:
+def _rounded(size: tuple[int, int], fill: Color, edge: Color, radius: int, width: int) -> Surface:
     large = Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
     box = large.get_rect()
     pygame.draw.rect(large, edge, box, border_radius=radius * _FINE)
@@ -30,17 +30,17 @@ def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, wid
     return pygame.transform.smoothscale(large.premul_alpha(), size)
 
 
-def rounded(screen: Surface, box: Rect, fill: Colour, edge: Colour, radius: int, width: int = 1) -> None:
+def rounded(screen: Surface, box: Rect, fill: Color, edge: Color, radius: int, width: int = 1) -> None:
     if box.width > 0 and box.height > 0:
         picture = _rounded(box.size, fill, edge, min(radius, min(box.size) // 2), width)
         screen.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def on_accent(theme: Theme) -> Colour:
+def on_accent(theme: Theme) -> Color:
     return (255, 255, 255) if theme is LIGHT else theme.background
 
 
-def field_colour(theme: Theme) -> Colour:
+def field_color(theme: Theme) -> Color:
     return theme.background if theme is LIGHT else mix(theme.panel, theme.background, 0.8)
 
 
@@ -88,7 +88,7 @@ def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: li
     while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
         kept.pop()
     canvas.text(shortened("    ".join(kept), canvas.text_size(size), room), (left + 12 * scale, y), size=size)
-    canvas.text(hint, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")
+    canvas.text(hint, (left + width - 12 * scale, y), size=size, color=theme.faint, anchor="right")
 
 
 def draw_message(screen: Surface, words: str, arena: Box, theme: Theme, scale: float, trouble: bool) -> None:

@@ -24,10 +24,10 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.theme import LIGHT, Colour, Theme, mix
+from robocov_app.render.theme import LIGHT, Color, Theme, mix
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.layout import Layout
-from robocov_app.toolkit.overlay import field_colour, on_accent, rounded, wrapped
+from robocov_app.toolkit.overlay import field_color, on_accent, rounded, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 
 # pixels at scale 1
@@ -96,7 +96,7 @@ class Ui:
     def __init__(self, page: Callable[["Ui"], None], theme: Theme, scale: float = 1.0) -> None:
         self.page, self.theme, self.scale = page, theme, scale
         self.box = Rect(0, 0, 1, 1)  # where the page is, px
-        self.background: Colour | None = theme.panel
+        self.background: Color | None = theme.panel
         self.stale = True  # whether what was drawn is not what there is any more
         self.at = (-1, -1)
         self.focus: str | None = None
@@ -345,7 +345,7 @@ class Ui:
         self._round(knob.inflate(-self.px(4), -self.px(2)), fill, radius=BAR / 2)
         return top
 
-    def _shade(self, part: float) -> Colour:
+    def _shade(self, part: float) -> Color:
         return mix(self.theme.panel, self.theme.ink, part)
 
     def _draws(self, rect: Rect) -> bool:
@@ -384,12 +384,12 @@ class Ui:
         return False
 
     def _round(
-        self, rect: Rect, fill: Colour, edge: Colour | None = None, radius: float = 4, width: int = 1
+        self, rect: Rect, fill: Color, edge: Color | None = None, radius: float = 4, width: int = 1
     ) -> None:
         if self.surface is not None:
             rounded(self.surface, rect, fill, edge or fill, self.px(radius), width)
 
-    def _face(self, rect: Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
+    def _face(self, rect: Rect, key: str, why: str, *, chosen: bool = False) -> Color:
         theme, hovered = self.theme, self._hovers(rect)
         held = self.active == key and rect.collidepoint(self.at)
         if why:
@@ -398,7 +398,7 @@ class Ui:
             fill = mix(theme.final, theme.ink, 0.25 if held else 0.15 if hovered else 0.0)
             edge, ink = fill, on_accent(theme)
         else:
-            fill = mix(field_colour(theme), theme.final, 0.28 if held else 0.14 if hovered else 0.0)
+            fill = mix(field_color(theme), theme.final, 0.28 if held else 0.14 if hovered else 0.0)
             edge, ink = theme.final if held or hovered else self._shade(0.24), theme.ink
         self._round(rect, fill, edge, width=max(1, self.px(0.75)))
         self._ring(key, rect)
@@ -410,10 +410,10 @@ class Ui:
             pygame.draw.rect(self.surface, self.theme.final, rect, width, border_radius=self.px(4))
 
     def _write(
-        self, text: str, rect: Rect, colour: Colour, size: float, *, bold: bool = False, at: str = "left"
+        self, text: str, rect: Rect, color: Color, size: float, *, bold: bool = False, at: str = "left"
     ) -> None:
         if self.surface is not None and text and self._draws(rect):
-            picture = label(shortened(text, self.px(size), rect.width, bold), self.px(size), colour, bold)
+            picture = label(shortened(text, self.px(size), rect.width, bold), self.px(size), color, bold)
             side = "center" if at == "center" else f"mid{at}"
             self.surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
 
@@ -427,15 +427,15 @@ class Ui:
         rect = self.cell()
         self._note("label", key or text, rect, text, None, tip, "")
         faint, bold = style in ("header", "unit"), style in ("header", "bold")
-        colour = self.theme.faint if faint else self.theme.ink
-        self._write(text, rect, colour, SMALL if faint else TEXT, bold=bold, at=at)
+        color = self.theme.faint if faint else self.theme.ink
+        self._write(text, rect, color, SMALL if faint else TEXT, bold=bold, at=at)
 
     def words(
         self,
         text: str,
         *,
         size: float = TEXT,
-        colour: Colour | None = None,
+        color: Color | None = None,
         bold: bool = False,
         indent: float = 0.0,
     ) -> None:
@@ -443,7 +443,7 @@ class Ui:
         for line in wrapped(text, self.px(size), self.px(self.wide - indent), bold):
             if indent:
                 self.cell()
-            self._write(line, self.cell(), colour or self.theme.ink, size, bold=bold)
+            self._write(line, self.cell(), color or self.theme.ink, size, bold=bold)
         self.row()
 
     def button(
@@ -519,7 +519,7 @@ class Ui:
             box = Rect(0, 0, self.px(16), self.px(16))
             box.midleft = rect.midleft
             theme, hovered = self.theme, self._hovers(rect)
-            field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
+            field = mix(field_color(theme), theme.final, 0.14 if hovered else 0.0)
             edge = theme.final if now or hovered else self._shade(0.35)
             self._round(box, theme.final if now else field, edge, 3, max(1, self.px(0.75)))
             if now and self.surface is not None:
@@ -633,7 +633,7 @@ class Ui:
         assert screen is not None
         edge = theme.final if edit is not None or self._hovers(rect) else self._shade(0.24)
         width = max(1, self.px(0.75)) if edit is None else max(2, self.px(1.25))
-        self._round(rect, field_colour(theme), edge, width=width)
+        self._round(rect, field_color(theme), edge, width=width)
         inner = rect.inflate(-self.px(12), -self.px(4))
         if edit is None:
             self._write(text or ghost, inner, theme.ink if text else theme.faint, TEXT)
@@ -646,7 +646,7 @@ class Ui:
         tall = Rect(left + low, 0, high - low, self.px(17))
         tall.centery = rect.centery
         if low != high:
-            screen.fill(mix(field_colour(theme), theme.final, 0.35), tall)
+            screen.fill(mix(field_color(theme), theme.final, 0.35), tall)
         picture = label(whole or ghost, size, theme.ink if whole else theme.faint)
         screen.blit(picture, picture.get_rect(midleft=(left, rect.centery)))
         x = left + text_width(edit.text[: edit.caret], size)
@@ -726,7 +726,7 @@ class Ui:
         self.open_list = None
 
     def _draw_list(self, screen: Surface, found: _List) -> None:
-        theme, field = self.theme, field_colour(self.theme)
+        theme, field = self.theme, field_color(self.theme)
         rounded(screen, found.rect, field, self._shade(0.4), self.px(4))
         inner = found.rect.inflate(-2, -2)
         screen.set_clip(inner)

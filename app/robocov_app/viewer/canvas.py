@@ -27,7 +27,7 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 
 RAYS, MOST_RAYS = 120, 720  # of one scan, of all scans of a pane together
-FAR_SCAN = 12.0  # metres that scans reach where the sensor has no limit
+FAR_SCAN = 12.0  # meters that scans reach where the sensor has no limit
 _OLD = 0.25  # seconds from which on a cost that lags behind is shown with its time
 _REACH = 12.0  # pixels at scale 1 that a finger is wide
 
@@ -135,7 +135,7 @@ class ViewerCanvas:
         known, field = viewer.costs.known.get(pane.number), None
         if known is not None and painter.needs_field:
             field, largest = known.field, known.field.largest
-            # the scale of colours follows what is shown, without trembling
+            # the scale of colors follows what is shown, without trembling
             if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
                 self._limit = round_limit(1.1 * largest)
         numbers, scans = setup.numbers, list[tuple[Array, Array]]()

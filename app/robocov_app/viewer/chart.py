@@ -14,7 +14,7 @@ from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
 from robocov_app.render.fonts import shortened, text_width
-from robocov_app.render.theme import Colour, Theme, mix
+from robocov_app.render.theme import Color, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
@@ -150,7 +150,7 @@ class Chart:
         self._offer(canvas, named)
         state = self.viewer.costs.state
         if state and right - canvas.text_width(state) > named:
-            canvas.text(state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right")
+            canvas.text(state, (right, 0.5 * TOP * scale), color=theme.faint, anchor="right")
         ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
         values = [pane.curves[what.name].value for pane in session.panes] + [ghost.value for ghost in ghosts]
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
@@ -160,7 +160,7 @@ class Chart:
             return np.column_stack([self.column(time), bottom + (top - bottom) * (cost - low) / (high - low)])
 
         self._place, faint = place, mix(theme.panel, theme.ink, 0.12)
-        note = partial(canvas.text, size=theme.small_text, colour=theme.faint)
+        note = partial(canvas.text, size=theme.small_text, color=theme.faint)
         for mark in np.arange(low, high, step):
             y = bottom - (bottom - top) * (mark - low) / (high - low)
             canvas.surface.fill(faint, (round(left), round(y), round(right - left), 1))
@@ -184,19 +184,19 @@ class Chart:
                 free = x + wide + 8 * scale
         self._ghosts = [(ghost.node, place(ghost.time, ghost.value)) for ghost in ghosts]
         for ghost, (_, points) in zip(ghosts, self._ghosts, strict=True):
-            colour = mix(theme.panel, theme.controller(ghost.law), 0.45)
+            color = mix(theme.panel, theme.controller(ghost.law), 0.45)
             for k in range(len(points) - 1):
                 if k % 4 < 3 or len(points) < 12:
-                    canvas.line(points[k].tolist(), points[k + 1].tolist(), colour)
+                    canvas.line(points[k].tolist(), points[k + 1].tolist(), color)
             if len(points):
                 x = max(points[-1][0] - 4 * scale, left + canvas.text_width(ghost.words, theme.small_text))
-                note(ghost.words, (x, points[-1][1] - 9 * scale), anchor="right", colour=colour)
-        colours = curve_colours(session.panes, theme)
+                note(ghost.words, (x, points[-1][1] - 9 * scale), anchor="right", color=color)
+        colors = curve_colors(session.panes, theme)
         for pane in session.panes:
             curve = pane.curves[what.name]
             points = _thinned(place(curve.time, curve.value))
             if len(points) > 1:
-                canvas.segments(np.hstack([points[:-1], points[1:]]), colours[pane.number], canvas.width(1.8))
+                canvas.segments(np.hstack([points[:-1], points[1:]]), colors[pane.number], canvas.width(1.8))
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         """Name the other quantity beside the title, where there are two: a click plots it."""
@@ -204,7 +204,7 @@ class Chart:
         if not self._timed:
             return
         words, left = f"{(DISTANCE if self.plotted is TIME else TIME).short} ›", left + 16 * scale
-        canvas.text(words, (left, 0.5 * TOP * scale), colour=self.theme.faint, size=size)
+        canvas.text(words, (left, 0.5 * TOP * scale), color=self.theme.faint, size=size)
         (x, y, _, _), wide = self.layout.chart, canvas.text_width(words, size)
         self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
 
@@ -213,7 +213,7 @@ class Chart:
         session, theme, scale = self.viewer.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
         canvas = flat_canvas(chart, theme, scale)
-        (_, right, _), colours = self._span, curve_colours(session.panes, theme)
+        (_, right, _), colors = self._span, curve_colors(session.panes, theme)
         time, known = session.compared(self.plotted.name)
         best = min(known.values(), default=0.0)
         panes = [pane for pane in session.panes if pane.number in known]
@@ -230,8 +230,8 @@ class Chart:
                 room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
                 name = shortened(pane.law.label, canvas.text_size(theme.small_text), room, True)
                 words = f"{name}  {words}{gap}"
-            at, colour = (right + 9 * scale, y), colours[pane.number]
-            canvas.text(words, at, colour=colour, bold=True, size=theme.small_text)
+            at, color = (right + 9 * scale, y), colors[pane.number]
+            canvas.text(words, at, color=color, bold=True, size=theme.small_text)
 
     def _track(self, canvas: Canvas) -> None:
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
@@ -242,18 +242,18 @@ class Chart:
         thick = max(4, round(5 * scale))
         box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
         pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
-        canvas.text("time", (12 * scale, middle), colour=theme.faint, size=theme.small_text)
-        words, colour = ("live", theme.start) if session.live else ("past", theme.final)
+        canvas.text("time", (12 * scale, middle), color=theme.faint, size=theme.small_text)
+        words, color = ("live", theme.start) if session.live else ("past", theme.final)
         beside, size, thinned = right + 9 * scale, theme.small_text, session.live and session.history.thinned
         if thinned:
             words = "live · past thinned"
             fits = beside + canvas.text_width(words, size=size) <= self.layout.track[2]
             words = words if fits else "thinned"
-        canvas.text(words, (beside, middle), colour=colour, bold=not thinned, size=size)
+        canvas.text(words, (beside, middle), color=color, bold=not thinned, size=size)
 
-    def _rule(self, screen: pygame.Surface, x: float, colour: Colour, top: int) -> None:
+    def _rule(self, screen: pygame.Surface, x: float, color: Color, top: int) -> None:
         height, scale = self.layout.chart[3], self.layout.scale
-        screen.fill(colour, (round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale)))
+        screen.fill(color, (round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale)))
 
     def _cursor(self, screen: pygame.Surface) -> None:
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
@@ -264,9 +264,9 @@ class Chart:
         if not session.live:
             bars.append((x, theme.final))
             self._rule(screen, x, theme.final, self.layout.chart[1])
-        for end, colour in bars:
+        for end, color in bars:
             bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
-            pygame.draw.rect(screen, colour, bar, border_radius=thick)
+            pygame.draw.rect(screen, color, bar, border_radius=thick)
         dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
         for event in session.events:
             canvas.stamp(dot, (self.column(event.time), middle))
@@ -295,9 +295,9 @@ class Chart:
         tag(screen, words, at, theme, scale)
 
 
-def curve_colours(panes: Iterable[Pane], theme: Theme) -> dict[int, Colour]:
-    """Return the colours of curves by pane: the controller's, or another one where that is taken."""
-    taken: dict[int, Colour] = {}
+def curve_colors(panes: Iterable[Pane], theme: Theme) -> dict[int, Color]:
+    """Return the colors of curves by pane: the controller's, or another one where that is taken."""
+    taken: dict[int, Color] = {}
     for pane in panes:
         wanted = [theme.controllers.get(pane.law.name), *theme.others]
         taken[pane.number] = next(each for each in wanted if each and each not in taken.values())

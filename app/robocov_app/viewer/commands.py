@@ -19,7 +19,7 @@ _NUMBERED = (
     "cells centroids trajectories velocities force_attraction force_repulsion_robots "
     "force_repulsion_obstacle force_viscosity force_resultant links "
     "distances geodesic_cells path scan sensed sensing communication obstacle_points goals starts "
-    "obstacles boundary grid robots failed selection legend scale_bar status colour_bar"
+    "obstacles boundary grid robots failed selection legend scale_bar status color_bar"
 )
 _NUMBER_KEYS = [f"{modifier}{digit}" for modifier in ("", "shift+", "alt+") for digit in "1234567890"]
 _LAYER_KEYS = {**dict(zip(_NUMBERED.split(), _NUMBER_KEYS, strict=True)), "density": "alt+d"}

@@ -1,6 +1,6 @@
 """Says in words and numbers why a robot moves, or why it is stuck. Knows no pygame.
 
-Distances to goals, obstacle points and other robots are from the robot's centre, as in the laws; what
+Distances to goals, obstacle points and other robots are from the robot's center, as in the laws; what
 it is *clear of* is told from its rim. Plane vectors are complex here, x + i y.
 """
 
@@ -231,10 +231,10 @@ def _number(value: float) -> str:
     return "0" if value < 0.005 else f"{value:.2f}" if value < 0.995 else f"{value:.1f}"
 
 
-def _length(metres: float) -> str:
-    if metres < 0.00995:
-        return f"{1000 * max(metres, 0.0):.0f} mm"
-    return f"{100 * metres:.0f} cm" if metres < 0.995 else f"{_number(metres)} m"
+def _length(meters: float) -> str:
+    if meters < 0.00995:
+        return f"{1000 * max(meters, 0.0):.0f} mm"
+    return f"{100 * meters:.0f} cm" if meters < 0.995 else f"{_number(meters)} m"
 
 
 def _force(newtons: float) -> str:

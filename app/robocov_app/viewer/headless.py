@@ -210,10 +210,10 @@ def story_frames(
 
     All panes have the same layout and one legend, of whatever the story shows, also where some are left out.
     """
-    theme, painters = film.colour_theme, dict[int, Painter]()
+    theme, painters = film.color_theme, dict[int, Painter]()
     widest, root = max(parts, key=lambda part: len(part.setups)), document.path(node)[0]
     count, dt = len(widest.setups), root.begun.dt
-    layers = partial(standard_layers if count == 1 else pane_layers, film.colours)
+    layers = partial(standard_layers if count == 1 else pane_layers, film.colors)
     width, height = film.video_size
     strip, layout = round(STRIP * scale_for((width, height))), None
     if count > 1:

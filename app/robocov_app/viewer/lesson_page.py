@@ -66,11 +66,11 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
     row = min(23 * scale, max((bottom - y) / len(chapters), 15 * scale))
     y = max(y, bottom - row * len(chapters))
     for k, chapter in enumerate(chapters):
-        now, colour = k == tour.number, theme.ink if k == tour.number else theme.faint
+        now, color = k == tour.number, theme.ink if k == tour.number else theme.faint
         fill = theme.final if k <= tour.number else mix(theme.panel, theme.ink, 0.25)
         canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (x + 4 * scale, y + 8 * scale))
         words = shortened(chapter.title, small, wide - 18 * scale, now)
-        screen.blit(label(words, small, colour, now), (round(x + 16 * scale), round(y)))
+        screen.blit(label(words, small, color, now), (round(x + 16 * scale), round(y)))
         box = pygame.Rect(round(x), round(y - 3 * scale), round(wide), round(row))
         spots.append((box, partial(tour.skip, k - tour.number)))
         y += row

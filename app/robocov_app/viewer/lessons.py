@@ -15,7 +15,7 @@ READING = 4.0  # seconds on the wall after a chapter's end, and for an answer wh
 LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
 PLAIN = {  # layers that every chapter shows
     *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
-    *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
+    *("selection", "color_bar", "legend", "scale_bar", "status", "caption"),
 }
 
 

@@ -221,7 +221,7 @@ class Panel(SidePanel):
         self._does(ui, "Remove", "robot:remove", why=why)
         with ui.scroll(f"robot:{self.viewer.selected}"):
             if self.report is None:
-                ui.words(_NOBODY, colour=ui.theme.faint)
+                ui.words(_NOBODY, color=ui.theme.faint)
             else:
                 show_report(ui, self.report)
 
@@ -235,7 +235,7 @@ class Panel(SidePanel):
 def show_report(ui: Ui, report: Report) -> None:
     ui.words(report.title, size=14, bold=True)
     ui.space(3)
-    ui.words(report.verdict, size=12.5, bold=True, colour=ui.theme.final)
+    ui.words(report.verdict, size=12.5, bold=True, color=ui.theme.final)
     ui.space(4)
     largest = max((float(np.hypot(*e.vector)) for e in report.lines if e.vector is not None), default=1.0)
     for each in report.lines:
@@ -245,8 +245,8 @@ def show_report(ui: Ui, report: Report) -> None:
             half = np.array(each.vector) / size * (length, -length)
             middle = np.array(ui.rest.topleft) + np.array([14, 8]) * ui.scale
             canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
-            colour = ui.theme.forces.get(each.kind, ui.theme.ink)
-            canvas.arrow((middle - half).tolist(), (middle + half).tolist(), colour, 2 * ui.scale)
+            color = ui.theme.forces.get(each.kind, ui.theme.ink)
+            canvas.arrow((middle - half).tolist(), (middle + half).tolist(), color, 2 * ui.scale)
         ui.words(each.text, size=11.5, indent=34.0 if each.vector is not None else 0.0)
         ui.space(3)
 

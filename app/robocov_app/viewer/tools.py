@@ -1,4 +1,4 @@
-"""Tools: what the mouse does on the canvas, and how walls that are drawn snap to others. Metres."""
+"""Tools: what the mouse does on the canvas, and how walls that are drawn snap to others. Meters."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -38,7 +38,7 @@ class Preview:
 class Tool:
     """Mouse tool; this one does nothing. Returned words are told.
 
-    `press`: of the left button; `reach` is so many metres as a finger is wide, `number` the robot under the
+    `press`: of the left button; `reach` is so many meters as a finger is wide, `number` the robot under the
     cursor. `move`: pressed or not. `finish`: Enter, a double or a right click. `cancel`: Escape; says whether
     there was something to give up.
     """

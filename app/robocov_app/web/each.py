@@ -154,7 +154,7 @@ class Sessions:
         self._openings = asyncio.Semaphore(MAX_OPENING)
 
     async def serve(self, tell: Callable[[str], object]) -> None:
-        """Serve until the task is cancelled; `tell` is called with the line that names the link."""
+        """Serve until the task is canceled; `tell` is called with the line that names the link."""
         listener = Listener(self._answer, self._talk)
         host = self._options.host
         port = await listener.listen(host, self._options.port)

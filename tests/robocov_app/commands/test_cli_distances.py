@@ -27,7 +27,7 @@ def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: 
         assert main([*words, *options, *more]) == 0
     plain, bare, warm = (frames(tmp_path / name) for name in ("plain", "bare", "warm"))
     assert len(plain) == len(bare) == len(warm) >= 3
-    # tints of cells are many colours; without them the page is mostly white, with distances mostly blue
+    # tints of cells are many colors; without them the page is mostly white, with distances mostly blue
     assert (bare[0] == 255).all(axis=2).mean() > (plain[0] == 255).all(axis=2).mean() + 0.2
     blue = (warm[0][..., 2] - warm[0][..., 0] > 25).mean()
     assert blue > (plain[0][..., 2] - plain[0][..., 0] > 25).mean() + 0.1

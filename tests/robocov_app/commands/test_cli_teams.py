@@ -33,7 +33,7 @@ def test_a_run_of_robots_that_differ(tmp_path: Path, team: Path, capsys: pytest.
     out = tmp_path / "run"
     words = ("run", "rooms", "--team", str(team), "--set", "cells=time", *SHORT, "--out", str(out))
     said = answer(capsys, *words)
-    assert said["mean_time_s"] > said["mean_distance_m"], "the slow ones take longer than a second a metre"
+    assert said["mean_time_s"] > said["mean_distance_m"], "the slow ones take longer than a second a meter"
     record = Record.load(out)
     assert record.team.max_speed.tolist() == [1.0, 0.3, 0.3]
     assert record.team.radius.tolist() == [0.2, 0.1, 0.1]

@@ -113,7 +113,7 @@ def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
             assert hands.shapes[-1] == circle
 
 
-def test_a_file_can_be_opened_after_leaving_for_it_was_cancelled(tmp_path):
+def test_a_file_can_be_opened_after_leaving_for_it_was_canceled(tmp_path):
     write_sketch(SKETCH, tmp_path / "hall.json")
     with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
         hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))

@@ -82,25 +82,25 @@ places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
 
 
 @given(backgrounds, st.tuples(st.integers(0, 99), st.integers(0, 99)), st.sampled_from([0.1, 2.5, 40.0]))
-def test_two_clicked_points_come_to_be_so_far_apart(background, offset, metres):
+def test_two_clicked_points_come_to_be_so_far_apart(background, offset, meters):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.to_world((0, 0)), background.to_world((offset[0] + 5, offset[1]))
     pixel_a, pixel_b = pixel_at(background, a), pixel_at(background, b)
-    scaled = scale_to_length(background, a, b, metres)
-    assert math.dist(scaled.to_world(pixel_a), scaled.to_world(pixel_b)) == pytest.approx(metres)
+    scaled = scale_to_length(background, a, b, meters)
+    assert math.dist(scaled.to_world(pixel_a), scaled.to_world(pixel_b)) == pytest.approx(meters)
     assert scaled.to_world(pixel_a) == pytest.approx(a, abs=1e-6)
     assert scaled.turn == background.turn
 
 
 def test_what_gives_no_scale_is_said():
-    for a, b, metres, words in [
+    for a, b, meters, words in [
         ((1.0, 1.0), (1.01, 1.0), 3.0, "farther apart"),
         ((1.0, 1.0), (5.0, 1.0), 0.0, "above 0 m"),
         ((1.0, 1.0), (5.0, 1.0), math.inf, "above 0 m"),
         ((1.0, 1.0), (5.0, 1.0), 1e9, "is 1e\\+09 m right"),
     ]:
         with pytest.raises(MapError, match=words):
-            scale_to_length(PLAN, a, b, metres)
+            scale_to_length(PLAN, a, b, meters)
 
 
 @given(backgrounds, st.tuples(st.integers(10, 99), st.integers(-99, 99)))

@@ -52,7 +52,7 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
         return
     results = [change.sketch.get_item(key).shape for key in change.selection.items]
     assert len(results) == len(change.sketch.obstacles)
-    # every vertex may move by half of a tenth of a millimetre each way, and crumbs go
+    # every vertex may move by half of a tenth of a millimeter each way, and crumbs go
     assert sum(shape.polygon.area for shape in results) == pytest.approx(
         wanted[name].area, abs=2e-4 * perimeter
     )
@@ -210,7 +210,7 @@ def test_walls_and_circles_become_the_polygons_that_they_are(sketch):
 
 
 def test_outlines_are_valid_on_their_grid():
-    # a spike thinner than the grid, a crumb, and a hole no wider than a millimetre
+    # a spike thinner than the grid, a crumb, and a hole no wider than a millimeter
     spike = shapely.Polygon([(0, 0), (1, 0), (1, 0.5), (1.3, 0.50001), (1, 0.50002), (1, 1), (0, 1)])
     (shape,) = extract_polygons(spike)
     assert shape.polygon.is_valid

@@ -186,10 +186,10 @@ def test_a_mere_length_goes_towards_the_cursor():
         parse_next_point("2", None, (4.0, 6.0))
 
 
-metres = st.integers(-(10**7), 10**7).map(lambda k: k / 1000)
+meters = st.integers(-(10**7), 10**7).map(lambda k: k / 1000)
 
 
-@given(metres, metres, st.sampled_from([" ", "; ", " ;", ", "]), st.booleans())
+@given(meters, meters, st.sampled_from([" ", "; ", " ;", ", "]), st.booleans())
 def test_what_is_written_plainly_is_read(x, y, between, comma):
     text = f"{x:.3f}{between}{y:.3f}"
     if comma and between != ", ":

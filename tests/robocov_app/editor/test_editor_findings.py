@@ -18,11 +18,11 @@ NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5
 CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
 
 
-def near(picture: np.ndarray, at: tuple[float, float], colour: tuple[int, int, int], within: int) -> int:
-    """Return how many pixels around one are of a colour."""
+def near(picture: np.ndarray, at: tuple[float, float], color: tuple[int, int, int], within: int) -> int:
+    """Return how many pixels around one are of a color."""
     x, y = (round(value) for value in at)
     part = picture[y - within : y + within + 1, x - within : x + within + 1]
-    return int((np.abs(part - np.array(colour)).max(axis=2) < 40).sum())
+    return int((np.abs(part - np.array(color)).max(axis=2) < 40).sum())
 
 
 def without_message(hands: Hands) -> np.ndarray:

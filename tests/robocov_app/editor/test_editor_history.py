@@ -42,7 +42,7 @@ def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
 
 @settings(max_examples=100)
 @given(st.data())
-def test_coordinates_come_out_to_the_tenth_of_a_millimetre(data):
+def test_coordinates_come_out_to_the_tenth_of_a_millimeter(data):
     sketch = data.draw(sound_sketches(least=1))
     change = data.draw(changes(sketch))
     document = to_document(change.sketch) if change is not None else {}

@@ -1,4 +1,4 @@
-"""The import dialogue: its options, what they change, a click into the map, and how it ends."""
+"""The import dialog: its options, what they change, a click into the map, and how it ends."""
 
 import time
 from collections.abc import Iterator
@@ -54,9 +54,9 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
     asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
     assert asked.build_settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
-    given |= {"colours": "red, #00ff00", "width": "3px"}
+    given |= {"colors": "red, #00ff00", "width": "3px"}
     meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
-    meant |= {"colours": ("red", "#00ff00"), "width": "3px"}
+    meant |= {"colors": ("red", "#00ff00"), "width": "3px"}
     for option in options:
         asked.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
         value = (
@@ -115,7 +115,7 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     taken = asked.poll()
     assert taken is not None and taken.environment.free_area == pytest.approx(56)
     assert worker.process is process
-    asked.cancelled()
+    asked.canceled()
     assert process.poll() is not None
 
 

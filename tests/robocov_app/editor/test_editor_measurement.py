@@ -30,14 +30,14 @@ def doors(*widths: float) -> Sketch:
 
 
 def rastered(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where the centre of a robot can be, by parts, on a raster; and where it sweeps."""
+    """Where the center of a robot can be, by parts, on a raster; and where it sweeps."""
     xs, ys = np.arange(cell / 2, 12.0, cell), np.arange(cell / 2, 8.0, cell)
     x, y = np.meshgrid(xs, ys)
     inside = shapely.contains_xy(free, x.ravel(), y.ravel()).reshape(x.shape)
     distance = shapely.distance(free.boundary, shapely.points(x.ravel(), y.ravel())).reshape(x.shape)
-    centres = inside & (distance >= radius)
-    parts, _ = ndimage.label(centres, np.ones((3, 3)))
-    swept = ndimage.distance_transform_edt(~centres) * cell <= radius if centres.any() else centres
+    centers = inside & (distance >= radius)
+    parts, _ = ndimage.label(centers, np.ones((3, 3)))
+    swept = ndimage.distance_transform_edt(~centers) * cell <= radius if centers.any() else centers
     return parts, swept & inside
 
 

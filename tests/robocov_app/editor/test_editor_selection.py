@@ -56,7 +56,7 @@ def test_a_click_takes_the_topmost(sketch):
     assert owner_at(sketch, (2.7, 2.05), 0.1) == 0
 
 
-def test_starts_lie_above_at_their_centre_and_rim_but_not_inside(sketch):
+def test_starts_lie_above_at_their_center_and_rim_but_not_inside(sketch):
     assert owner_at(sketch, (4.5, 2.0), 0.1) == "disc"
     assert owner_at(sketch, (4.5, 1.02), 0.1) == "disc"
     assert find_owners(sketch, (4.5, 1.5), 0.1) == (0, "disc")

@@ -16,7 +16,7 @@ from PIL import Image
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.outlines import Outlines, build_outline
 from robocov_app.editor.canvas.sheet import Sheet, compute_grid_steps, compute_hull_excess
-from robocov_app.editor.canvas.view import View, choose_outside_colour
+from robocov_app.editor.canvas.view import View, choose_outside_color
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
@@ -129,13 +129,13 @@ def test_a_hole_shows_what_lies_below() -> None:
     at = view(shown=frozenset())
     page = Sheet().draw(at, sheet(*SHAPES))
 
-    def colour(point: tuple[float, float]) -> tuple[int, ...]:
+    def color(point: tuple[float, float]) -> tuple[int, ...]:
         x, y = at.camera.to_pixels(np.array(point))
         return tuple(page.get_at((round(x), round(y))))[:3]
 
-    assert colour((2.8, 2.3)) == LIGHT.background
-    assert colour((1.5, 1.5)) == LIGHT.obstacle
-    assert colour((11.0, 5.0)) == choose_outside_colour(LIGHT)
+    assert color((2.8, 2.3)) == LIGHT.background
+    assert color((1.5, 1.5)) == LIGHT.obstacle
+    assert color((11.0, 5.0)) == choose_outside_color(LIGHT)
 
 
 def test_what_the_hull_adds_is_told_apart() -> None:

@@ -82,7 +82,7 @@ def test_several_things_move_together(sketch):
     assert after.get_start("two").positions == ((7.0, 6.0), (8.5, 5.75))
 
 
-def test_centre_and_rim_of_discs(sketch):
+def test_center_and_rim_of_discs(sketch):
     assert vertices.place_vertices(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).get_start("disc") == DiscStart(
         (9.0, 5.0), 1.0
     )
@@ -188,7 +188,7 @@ def test_a_bevel_is_as_long_as_asked_and_a_rounding_touches_both_edges(degrees, 
     assert len(points) == 4
     np.testing.assert_allclose(points[1], (length, 0.0), atol=1e-4)
     np.testing.assert_allclose(points[-2], (length * math.cos(angle), length * math.sin(angle)), atol=1e-4)
-    # the circle that touches both edges there: its centre lies on the bisector
+    # the circle that touches both edges there: its center lies on the bisector
     radius = length * math.tan(angle / 2)
     center = np.array([length, radius])
     rounded = vertices.round_corners(sketch, picked(Vertex(key, 0, 1)), radius)

@@ -76,7 +76,7 @@ def test_a_floor_plan_from_nothing_to_a_running_demo_and_saved(display: str, tmp
         time.sleep(0.4)  # or it would be a double click
         hands.click(*at(8, 8))
         hands.move(*at(8, 6))
-        hands.type("5")  # metres downwards
+        hands.type("5")  # meters downwards
         hands.key("Return", "Return")
         hands.key("r")
         hands.drag(at(9, 1), at(10, 1.5), at(11, 2))
@@ -98,7 +98,7 @@ def test_a_floor_plan_from_nothing_to_a_running_demo_and_saved(display: str, tmp
         hands.until((tmp_path / "plan.json").exists, "saved map")
 
         hands.key("F5")
-        tried = differs(hands, drawn, 0.3)  # cells are coloured
+        tried = differs(hands, drawn, 0.3)  # cells are colored
         differs(hands, tried, 0.0)  # robots move
         hands.key("F5")
         time.sleep(0.5)

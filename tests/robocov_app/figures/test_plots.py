@@ -93,7 +93,7 @@ def test_a_png_has_exactly_the_pixels_asked_for(tmp_path, size):
 
 
 class TestTrajectories:
-    def test_the_papers_colours_and_the_records_positions(self):
+    def test_the_papers_colors_and_the_records_positions(self):
         record = run_of(ROOMS, 5)
         axes = plot_trajectories(record).axes[0]
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
@@ -185,12 +185,12 @@ class TestTrajectories:
         assert [text.get_position() for text in texts] == [tuple(p) for p in record.positions[-1].tolist()]
 
     @pytest.mark.parametrize("n", [5, 40])
-    def test_robots_colours(self, n):
-        axes = plot_trajectories(run_of(ROOMS, n), colours="robots", theme=DARK).axes[0]
+    def test_robots_colors(self, n):
+        axes = plot_trajectories(run_of(ROOMS, n), colors="robots", theme=DARK).axes[0]
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
         assert len({to_rgb(c) for c in lines.get_colors()}) == (5 if n == 5 else 1)
-        with pytest.raises(ParameterError, match="colours"):
-            plot_trajectories(run_of(ROOMS, 2), colours="rainbow")
+        with pytest.raises(ParameterError, match="colors"):
+            plot_trajectories(run_of(ROOMS, 2), colors="rainbow")
 
     def test_title_and_legend(self):
         figure = plot_trajectories(run_of(ROOMS, 6), mean_distance=1.23456)
@@ -286,7 +286,7 @@ class TestCost:
         assert len(words) >= 3
         assert all(re.fullmatch(r"\d+|0\.\d", word) for word in words)
 
-    def test_values_units_and_the_papers_colours(self):
+    def test_values_units_and_the_papers_colors(self):
         given_curves = curves(1.0, 1.4)
         figure = plot_cost(given_curves)
         axes = figure.axes[0]

@@ -95,7 +95,7 @@ def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
 @pytest.mark.parametrize(
     "theme", [LIGHT, pytest.param(DARK, marks=pytest.mark.slow)], ids=lambda theme: theme.name
 )
-def test_the_colours_are_those_of_the_scale(theme, tmp_path):
+def test_the_colors_are_those_of_the_scale(theme, tmp_path):
     moment = moment_of(HALL)
     figure = plot_coverage([], [moment], theme, (800, 640))
     save_figure(figure, tmp_path / "a.png")
@@ -120,7 +120,7 @@ def test_the_colours_are_those_of_the_scale(theme, tmp_path):
     assert bar.get_xticklabels()[-1].get_text() == f"{limit:g} m"
 
 
-def test_all_maps_are_in_one_scale_of_colours():
+def test_all_maps_are_in_one_scale_of_colors():
     near, far = moment_of(ROOMS, n=12), moment_of(ROOMS, n=1)
     figure = plot_coverage([], [near, far])
     (bar,) = [axes for axes in figure.axes if axes.axison]

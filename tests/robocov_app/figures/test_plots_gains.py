@@ -76,7 +76,7 @@ def test_numbers_of_a_grid_tell_small_differences() -> None:
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_ink_can_be_read_on_all_colours_of_a_grid(theme) -> None:
-    colours = theme.quiet_heat
-    assert len(colours) == len(set(colours)) == HEAT_LEVELS
-    assert min(contrast(theme.ink, colour) for colour in colours) >= 4.5
+def test_ink_can_be_read_on_all_colors_of_a_grid(theme) -> None:
+    colors = theme.quiet_heat
+    assert len(colors) == len(set(colors)) == HEAT_LEVELS
+    assert min(contrast(theme.ink, color) for color in colors) >= 4.5

@@ -106,22 +106,22 @@ def test_names_that_are_too_long_are_cut_and_values_are_not(size) -> None:
         assert text.get_window_extent(renderer).x1 <= figure.bbox.x1 + 0.5
 
 
-def test_controllers_keep_their_colours_in_all_plots() -> None:
+def test_controllers_keep_their_colors_in_all_plots() -> None:
     known = curve_styles(["rpf", "mine", "rapf", "other", "mine"])
-    assert known["rapf"].colour(LIGHT) == LIGHT.controllers["rapf"]
-    assert known["mine"].colour(DARK) == DARK.others[0]
-    assert known["other"].colour(LIGHT) == LIGHT.others[1]
+    assert known["rapf"].color(LIGHT) == LIGHT.controllers["rapf"]
+    assert known["mine"].color(DARK) == DARK.others[0]
+    assert known["other"].color(LIGHT) == LIGHT.others[1]
     for axes in (figure_with(BANDS).axes[0], boxes([("", SAMPLES)])):
         assert tone(LIGHT.controllers["rpf"]) in {line.get_color() for line in axes.lines}
 
 
 @pytest.mark.parametrize("controllers", [["rapf"] * 6, ["mine", "rapf", "mine", "rpf", "rapf", "mine"]])
-def test_gains_of_one_controller_differ_in_colour_dashes_and_mark(controllers) -> None:
+def test_gains_of_one_controller_differ_in_color_dashes_and_mark(controllers) -> None:
     styles = styles_of(controllers)
     for part in zip(*styles, strict=True):
         assert len(set(map(str, part))) == len(controllers)
     for theme in (LIGHT, DARK):
-        assert len({style.colour(theme) for style in styles}) == len(controllers)
+        assert len({style.color(theme) for style in styles}) == len(controllers)
 
 
 @given(st.lists(st.sampled_from(["rapf", "lloyd", "mine", "other"]), max_size=8))
@@ -163,14 +163,14 @@ def test_pairs_have_their_interval_and_one_is_marked() -> None:
     assert axes.get_xscale() == "log"
 
 
-def test_pairs_have_the_colour_of_their_style() -> None:
+def test_pairs_have_the_color_of_their_style() -> None:
     mine = style("mine")
-    for each, colour in (
+    for each, color in (
         (PAIRS[0], LIGHT.controllers["rapf"]),
-        (PAIRS[0]._replace(style=mine), mine.colour(LIGHT)),
+        (PAIRS[0]._replace(style=mine), mine.color(LIGHT)),
     ):
         (points,) = (line for line in paired([each]).lines if line.get_marker() == "o" and line.get_clip_on())
-        assert points.get_color() == tone(colour)
+        assert points.get_color() == tone(color)
 
 
 def test_a_single_pair_has_no_interval() -> None:

@@ -138,7 +138,7 @@ def test_a_boundary_of_two_parts_keeps_its_obstacle(tmp_path: Path, start: float
     text = f'{{"type":"GeometryCollection","geometries":[{halves},{TABLE}]}}'
     (tmp_path / "hall.geojson").write_text(text)
     for outlines in (None, "solid"):
-        options = ReadOptions(units="metres", outlines=outlines)
+        options = ReadOptions(units="meters", outlines=outlines)
         environment, _, _ = import_map(tmp_path / "hall.geojson", options=options)
         assert environment.free_area == pytest.approx(59.0, abs=1e-3)
     wkt = f"GEOMETRYCOLLECTION(MULTIPOLYGON(((0 0,5 0,5 6,0 6,0 0)),(({start} 0,10 0,10 6,{start} 6,{start} 0))))"  # noqa: E501
@@ -179,7 +179,7 @@ def test_a_thin_wall_with_a_door_is_no_gap() -> None:
     closed = close_gaps([*rooms, door], 0.01)
     assert closed.number == 0
     assert closed.area.area == pytest.approx(25 + 4.995 * 5 + 0.005)
-    # no wall of a map is thinner than a millimetre
+    # no wall of a map is thinner than a millimeter
     assert close_gaps([rooms[0], box(5.0005, 0, 10, 5), door], 0.01).number == 1
 
 

@@ -334,7 +334,7 @@ def test_a_map_of_many_vertices_says_what_that_means() -> None:
     angle = [k * math.tau / 6000 for k in range(6000)]
     round_room = Polygon([(400 * math.cos(a), 400 * math.sin(a)) for a in angle])
     _, report = build_environment(foreign(round_room), Shaping(simplify=0.0), "plan")
-    assert report.vertices_kept > 5900  # after rounding, some are on the line between their neighbours
+    assert report.vertices_kept > 5900  # after rounding, some are on the line between their neighbors
     assert report.notes[-1].startswith(
         f"This map has many vertices ({report.vertices_kept}): computing the distances between them takes "
         "about"

@@ -52,14 +52,14 @@ def test_bezier_curves_stay_within_the_tolerance(
     st.sampled_from([1e-3, 0.1, 5.0]),
 )
 def test_arcs_stay_within_the_tolerance(
-    centre: tuple[float, float],
+    center: tuple[float, float],
     u: tuple[float, float],
     v: tuple[float, float],
     begin: float,
     sweep: float,
     tolerance: float,
 ) -> None:
-    c, p, q = np.array(centre), np.array(u), np.array(v)
+    c, p, q = np.array(center), np.array(u), np.array(v)
     angle = begin + sweep * _FINE
     exact = c + np.cos(angle) * p + np.sin(angle) * q
     drawn = np.concatenate([exact[:1], flatten_arc(c, p, q, start=begin, sweep=sweep, tolerance=tolerance)])
@@ -88,11 +88,11 @@ def test_many_at_once_are_each_one_alone() -> None:
     assert len(set(count.tolist())) > 2
     for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
         assert (part == alone(curves[k], 1e-2)).all()
-    centre, u, v = np.random.default_rng(3).random((3, 7, 2)) * 10
+    center, u, v = np.random.default_rng(3).random((3, 7, 2)) * 10
     angle, sweep = np.random.default_rng(4).random((2, 7)) * 6 - 3
-    points, count = flatten_arcs(centre, u, v, angle, sweep, tolerance=1e-2)
+    points, count = flatten_arcs(center, u, v, angle, sweep, tolerance=1e-2)
     for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
-        single = flatten_arc(centre[k], u[k], v[k], start=angle[k], sweep=sweep[k], tolerance=1e-2)
+        single = flatten_arc(center[k], u[k], v[k], start=angle[k], sweep=sweep[k], tolerance=1e-2)
         assert (part == single).all()
 
 

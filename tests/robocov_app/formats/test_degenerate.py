@@ -12,7 +12,7 @@ NODES = '<node id="1" lat="48" lon="11"/><node id="2" lat="48.001" lon="11"/>'
 
 
 def geojson(kind: str, coordinates: object) -> str:
-    return json.dumps({"type": kind, "units": "metres", "coordinates": coordinates})
+    return json.dumps({"type": kind, "units": "meters", "coordinates": coordinates})
 
 
 def svg(body: str) -> str:

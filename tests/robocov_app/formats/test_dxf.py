@@ -21,12 +21,12 @@ from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format
 from robocov_app.formats.dxf import UNITS, polyline
 
-METRES = 6
+METERS = 6
 Draw = Callable[[Any, Any], Any]
 
 
 def drawn(
-    folder: Path, draw: Draw, *, unit: int = METRES, version: str = "R2010", hall: bool = True, **options: Any
+    folder: Path, draw: Draw, *, unit: int = METERS, version: str = "R2010", hall: bool = True, **options: Any
 ) -> ForeignMap:
     """Return what is read of a drawing; a hall of 20 x 10 units is its boundary."""
     document = ezdxf.new(version)
@@ -113,8 +113,8 @@ def test_closed_curves_are_areas(tmp_path: Path) -> None:
     spline = solid(tmp_path, lambda d, m: m.add_spline().set_closed(points))
     assert 4 < spline.area < 12
     assert spline.centroid.coords[0] == pytest.approx((5, 5), abs=1e-3)
-    centre = ezdxf.math.OCS((1, 0, 1)).from_wcs((5, 5, 0))
-    tilted = solid(tmp_path, lambda d, m: m.add_circle(centre, 1, dxfattribs={"extrusion": (1, 0, 1)}))
+    center = ezdxf.math.OCS((1, 0, 1)).from_wcs((5, 5, 0))
+    tilted = solid(tmp_path, lambda d, m: m.add_circle(center, 1, dxfattribs={"extrusion": (1, 0, 1)}))
     assert tilted.area == pytest.approx(math.pi * math.sqrt(0.5), rel=2e-3)
 
 
@@ -276,7 +276,7 @@ def test_units(tmp_path: Path, unit: int) -> None:
 
 
 def test_a_drawing_without_a_unit_needs_one(tmp_path: Path) -> None:
-    with pytest.raises(MapError, match=r"plan.dxf: .INSUNITS: expected a unit, got 0: --scale METRES"):
+    with pytest.raises(MapError, match=r"plan.dxf: .INSUNITS: expected a unit, got 0: --scale METERS"):
         drawn(tmp_path, lambda d, m: None, unit=0)
     assert drawn(tmp_path, lambda d, m: None, unit=0, scale=0.5).free.area == pytest.approx(50.0)
     assert drawn(tmp_path, lambda d, m: None, unit=0, scale=0.5, version="R12").free.area == pytest.approx(

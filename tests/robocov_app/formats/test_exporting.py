@@ -137,7 +137,7 @@ WAYS: dict[str, tuple[str, WriteOptions]] = {
     "a picture": (".png", WriteOptions()),
     "SVG": (".svg", WriteOptions()),
     "WKT": (".wkt", WriteOptions()),
-    "metres": (".geojson", WriteOptions()),
+    "meters": (".geojson", WriteOptions()),
     **{place: (".geojson", WriteOptions(origin=at)) for place, at in PLACES.items()},
 }
 MAPS = [

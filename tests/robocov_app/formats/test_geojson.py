@@ -1,4 +1,4 @@
-"""GeoJSON, against shapely's own reader; degrees and metres; names; what is refused."""
+"""GeoJSON, against shapely's own reader; degrees and meters; names; what is refused."""
 
 import json
 from pathlib import Path
@@ -76,7 +76,7 @@ def test_degrees_are_projected(tmp_path: Path) -> None:
     foreign = read(tmp_path, "geojson", polygon(square(8.4, 49, 0.001, 0.0005)))
     assert foreign.free.area == pytest.approx(73.17 * 55.6, rel=1e-3)
     assert foreign.notes[0].startswith(
-        "degrees projected to metres about longitude 8.40050, latitude 49.00025"
+        "degrees projected to meters about longitude 8.40050, latitude 49.00025"
     )
     line = [[179.9999, 10], [-179.9999, 10], [-179.9999, 10.0001], [179.9999, 10.0001]]
     across = read(tmp_path, "geojson", polygon(line))
@@ -90,10 +90,11 @@ def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
     assert read(tmp_path, "geojson", {**utm, "crs": crs}).free.area == pytest.approx(5000, rel=2e-3)
     small = polygon(square(0, 0, 0.05, 0.05))
     assert read(tmp_path, "geojson", small).free.area > 1e6
+    assert read(tmp_path, "geojson", {**small, "units": "meters"}).free.area == pytest.approx(0.0025)
     assert read(tmp_path, "geojson", {**small, "units": "metres"}).free.area == pytest.approx(0.0025)
     here = read(tmp_path, "geojson", {**small, "origin": [0.0, 0.0]})
     assert here.free.bounds[0] == pytest.approx(0.0, abs=1e-9)
-    assert read(tmp_path, "geojson", small, units="metres", scale=100.0).free.area == pytest.approx(25.0)
+    assert read(tmp_path, "geojson", small, units="meters", scale=100.0).free.area == pytest.approx(25.0)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +127,7 @@ def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
         (collection(feature(HALL) | {"properties": 3}), "features[0].properties: expected an object"),
         ({"type": "GeometryCollection"}, "geometries: expected a list of geometries"),
         ({**HALL, "crs": {"type": "link"}}, "crs: expected the name of a reference system"),
-        ({**HALL, "units": "feet"}, "units: expected metres or degrees"),
+        ({**HALL, "units": "feet"}, "units: expected meters or degrees"),
         ({**HALL, "origin": [0]}, "origin: expected longitude and latitude"),
         ({**HALL, "origin": [0, 95]}, "origin: expected longitude and latitude"),
         ("{", "not JSON"),
@@ -159,7 +160,7 @@ _POINT = st.tuples(_COORDINATE, _COORDINATE)
 def test_free_space_is_what_shapely_reads(tmp_path_factory: pytest.TempPathFactory, polygons: Any) -> None:
     text = shapely.to_geojson(shapely.MultiPolygon(polygons))
     try:
-        found = read(tmp_path_factory.getbasetemp(), "geojson", text, units="metres", outlines="free").free
+        found = read(tmp_path_factory.getbasetemp(), "geojson", text, units="meters", outlines="free").free
     except MapError as error:
         assert "without an area" in str(error)
         return
@@ -194,7 +195,7 @@ def test_a_sequence_of_texts_is_read_as_one_map(tmp_path: Path, name: str, text:
     path = tmp_path / name
     path.write_bytes(text.encode())
     assert detect_format(path) is IMPORTERS["geojson"]
-    environment, _, _ = import_map(path, options=ReadOptions(units="metres"))
+    environment, _, _ = import_map(path, options=ReadOptions(units="meters"))
     assert environment.free_area == pytest.approx(900 * 400)
 
 

@@ -1,4 +1,4 @@
-"""From the globe to metres, against geodesics."""
+"""From the globe to meters, against geodesics."""
 
 import sys
 from typing import Any
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import convert_to_metres
+from robocov_app.formats.georeference import convert_to_meters
 
 PLAIN = ReadOptions()
 _GLOBE = pyproj.Geod(ellps="WGS84")
@@ -21,7 +21,7 @@ _GLOBE = pyproj.Geod(ellps="WGS84")
 def moved(points: Any, options: ReadOptions = PLAIN, **given: Any) -> tuple[np.ndarray, list[str]]:
     shapes = Shapes("plan", options)
     given = {"crs": None, **given}
-    (figure,) = convert_to_metres([SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **given)
+    (figure,) = convert_to_meters([SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **given)
     return figure.rings[0], shapes.notes
 
 
@@ -35,10 +35,10 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
     narrow = max(np.cos(np.radians(latitude)), 0.05)
     degrees = np.array([(longitude + 0.02 / narrow * x, latitude + 0.02 * y) for x, y in places])
     degrees[:, 0] = (degrees[:, 0] + 180.0) % 360.0 - 180.0  # across the antimeridian as well
-    metres, (note,) = moved(degrees, may_be_degrees=True)
-    assert note.startswith("degrees projected to metres about longitude")
+    meters, (note,) = moved(degrees, may_be_degrees=True)
+    assert note.startswith("degrees projected to meters about longitude")
     azimuth, _, length = _GLOBE.inv(*degrees[:-1].T, *degrees[1:].T)
-    step = np.diff(metres, axis=0)
+    step = np.diff(meters, axis=0)
     # PROJ puts points that are about a millimeter from the origin onto it.
     assert np.hypot(*step.T) == pytest.approx(length, rel=1e-6, abs=2e-3)
     # north is up in the middle; elsewhere meridians lean to the pole
@@ -47,14 +47,14 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
     assert (np.abs(lean[long]) < 0.06 / narrow).all()
 
 
-def test_what_is_wide_is_metres() -> None:
-    metres, (note,) = moved([[0, 0], [20, 10]], may_be_degrees=True)
-    assert metres.tolist() == [[0, 0], [20, 10]]
+def test_what_is_wide_is_meters() -> None:
+    meters, (note,) = moved([[0, 0], [20, 10]], may_be_degrees=True)
+    assert meters.tolist() == [[0, 0], [20, 10]]
     assert "as degrees the map would be larger than 10 km" in note
     assert moved([[500, 0], [520, 10]], may_be_degrees=True)[0][0, 0] == 500.0
     assert moved([[0, 0], [20, 10]])[1] == []
     assert moved([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]
-    # ten kilometres are more degrees near the pole
+    # ten kilometers are more degrees near the pole
     assert "degrees projected" in moved([[10, 85], [10.9, 85.05]], may_be_degrees=True)[1][0]
     assert "degrees projected" in moved([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]
 
@@ -67,15 +67,15 @@ def test_a_system_is_obeyed() -> None:
     direct, _ = moved(degrees, may_be_degrees=True, **here)
     assert direct[0] == pytest.approx([0, 0], abs=1e-9)
     for name in ("EPSG:25832", "urn:ogc:def:crs:EPSG::25832", "http://www.opengis.net/def/crs/EPSG/0/25832"):
-        metres, (note,) = moved(utm, crs=name, **here)
-        assert metres == pytest.approx(direct, abs=1e-3)
+        meters, (note,) = moved(utm, crs=name, **here)
+        assert meters == pytest.approx(direct, abs=1e-3)
         assert note.startswith("EPSG:25832 projected")
     for name in ("EPSG:4326", "urn:ogc:def:crs:OGC:1.3:CRS84"):
         assert moved(degrees, crs=name, **here)[0] == pytest.approx(direct)
-    plain, notes = moved(utm, ReadOptions(units="metres"), crs="EPSG:25832")
+    plain, notes = moved(utm, ReadOptions(units="meters"), crs="EPSG:25832")
     assert (plain == utm).all()
     assert notes == ["coordinates of EPSG:25832 taken as they are"]
-    # Mercator's metres are not metres
+    # Mercator's meters are not meters
     mercator = np.column_stack(pyproj.Transformer.from_crs(4326, 3857, always_xy=True).transform(*degrees.T))
     assert moved(mercator, crs="EPSG:3857", **here)[0] == pytest.approx(direct, abs=1e-3)
 
@@ -96,7 +96,7 @@ def test_a_system_is_obeyed() -> None:
     ],
 )
 def test_what_no_place_is_is_refused(crs: str, points: Any, wanted: str) -> None:
-    with pytest.raises(MapError, match=rf"^plan: {wanted}.*--units metres") as caught:
+    with pytest.raises(MapError, match=rf"^plan: {wanted}.*--units meters") as caught:
         moved(points, crs=crs)
     assert "\n" not in str(caught.value)
 
@@ -105,7 +105,7 @@ def test_without_pyproj_there_is_one_line_with_the_way_to_get_it(monkeypatch: py
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(MapError, match=r'^plan: coordinates in degrees: .*pip install "robocov\[geo\]"'):
         moved([[8, 49], [8.001, 49.001]], may_be_degrees=True)
-    assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="metres"), may_be_degrees=True)[0][0, 0] == 8.0
+    assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="meters"), may_be_degrees=True)[0][0, 0] == 8.0
 
 
 def test_figures_keep_their_rings() -> None:
@@ -113,7 +113,7 @@ def test_figures_keep_their_rings() -> None:
         SourceGeometry("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
         SourceGeometry("point", (np.full((1, 2), 5.0),)),
     ]
-    scaled = convert_to_metres(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
+    scaled = convert_to_meters(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
     assert [[len(ring) for ring in figure.rings] for figure in scaled] == [[4, 3], [1]]
     assert (scaled[0].rings[1] == 2.0).all()
     assert (scaled[0].labels, scaled[0].at, scaled[1].rings[0].tolist()) == (
@@ -122,4 +122,4 @@ def test_figures_keep_their_rings() -> None:
         [[10.0, 10.0]],
     )
     nothing = Shapes("plan", ReadOptions(units="degrees"))
-    assert (convert_to_metres([], nothing, None, may_be_degrees=True), nothing.notes) == ([], [])
+    assert (convert_to_meters([], nothing, None, may_be_degrees=True), nothing.notes) == ([], [])

@@ -97,7 +97,7 @@ def _files(folder: Path) -> dict[str, bytes]:
         "deep.geojson": b'{"type":"Polygon","coordinates":' + b"[" * 400_000,
         "objects.geojson": b'{"type":"Polygon","x":' + b'{"a":' * 500_000,
         "knot.geojson": json.dumps({"type": "Polygon", "coordinates": [knot]}).encode(),
-        "far.geojson": b'{"type":"Polygon","units":"metres","coordinates":[[[0,0],[1e99,0],[1,1]]]}',
+        "far.geojson": b'{"type":"Polygon","units":"meters","coordinates":[[[0,0],[1e99,0],[1,1]]]}',
         "knot.json": json.dumps([knot]).encode(),
         "plan.json": json.dumps({"verts": knot}).encode(),
         "vertices.json": b'{"verts":[' + b"[0,0]," * MB + b"[0,0]]}",

@@ -115,7 +115,7 @@ def test_the_starts(tmp_path: Path) -> None:
         ({"vertices": []}, 'expected an object with "verts"'),
         (plan([]), "verts: expected a list of at least 3 points"),
         (plan("many"), "verts: expected a list"),
-        (plan([[0, 0], [1, 0], [1, "1"]]), "verts[2]: expected a point [x, y] in metres"),
+        (plan([[0, 0], [1, 0], [1, "1"]]), "verts[2]: expected a point [x, y] in meters"),
         (plan([[0, 0], [1, True], [1, 1]]), "verts[1]: expected a point"),
         (plan([[0, 0], [1, 0, 0], [1, 1]]), "verts[1]: expected a point"),
         (plan([[0, 0], [1, 0], [1e9, 1]]), "verts[2]: expected a point"),
@@ -158,7 +158,7 @@ def test_options_out_of_range(tmp_path: Path) -> None:
         imported(path, default_start="door")  # type: ignore[arg-type]
 
 
-def test_other_files_are_not_recognised(tmp_path: Path) -> None:
+def test_other_files_are_not_recognized(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"unknown format .*, expected one of .*houseexpo"):
         detect_format(write(tmp_path, {"rooms": []}))
     with pytest.raises(MapError, match="no such file"):

@@ -15,7 +15,7 @@ from raster_files import chunk, pgm, raw_png
 from robocov.errors import MapError
 from robocov_app.formats.picture import Brightness, is_picture, read_picture
 
-GREY = np.array([[0, 17, 34, 255], [255, 204, 119, 0], [136, 0, 255, 51]], dtype=np.uint8)
+GRAY = np.array([[0, 17, 34, 255], [255, 204, 119, 0], [136, 0, 255, 51]], dtype=np.uint8)
 """Multiples of 17: as exact in 4 bits as in 8."""
 
 
@@ -37,25 +37,25 @@ def shade(picture: Brightness) -> np.ndarray:
 
 def test_pgm_plain_and_raw_of_8_and_16_bits(tmp_path: Path) -> None:
     plain = "P2\n# a comment\n4 # and here\n3\n#another\n255\n" + "\n".join(
-        " ".join(map(str, row)) for row in GREY
+        " ".join(map(str, row)) for row in GRAY
     )
-    deep = np.rint(GREY / 255 * 65535).astype(int)
+    deep = np.rint(GRAY / 255 * 65535).astype(int)
     files = [
-        pgm(GREY),
-        pgm(GREY, head="# one\n#two\n\n"),
-        pgm(GREY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1),
-        b"P5\r\n4 3\r\n255\r\n" + GREY.tobytes(),
-        pgm(GREY) + b"and more after it",
+        pgm(GRAY),
+        pgm(GRAY, head="# one\n#two\n\n"),
+        pgm(GRAY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1),
+        b"P5\r\n4 3\r\n255\r\n" + GRAY.tobytes(),
+        pgm(GRAY) + b"and more after it",
         plain.encode(),
         plain.replace("\n", "\r\n").encode(),
         plain.replace("17 34", "17 # in the midst\n34").encode(),
         pgm(deep, 65535),
         f"P2 4 3 65535 {' '.join(map(str, deep.ravel()))}".encode(),
-        pgm(np.rint(GREY / 255 * 15), 15),
+        pgm(np.rint(GRAY / 255 * 15), 15),
     ]
     for data in files:
         picture = read(tmp_path, data)
-        np.testing.assert_allclose(shade(picture), GREY / 255, atol=1e-5)
+        np.testing.assert_allclose(shade(picture), GRAY / 255, atol=1e-5)
         assert picture.alpha is None
         assert is_picture(data)
     # the blank after the largest value may be a byte that looks like a line end of the picture
@@ -63,12 +63,12 @@ def test_pgm_plain_and_raw_of_8_and_16_bits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(tmp_path, b"P5 3 1 255\n" + first.tobytes()).level, first)
 
 
-def test_png_of_every_depth_and_colour(tmp_path: Path) -> None:
-    base = Image.fromarray(GREY)
+def test_png_of_every_depth_and_color(tmp_path: Path) -> None:
+    base = Image.fromarray(GRAY)
     packed = b"".join(
-        b"\0" + bytes((row[0] // 17 << 4 | row[1] // 17, row[2] // 17 << 4 | row[3] // 17)) for row in GREY
+        b"\0" + bytes((row[0] // 17 << 4 | row[1] // 17, row[2] // 17 << 4 | row[3] // 17)) for row in GRAY
     )
-    deep = b"".join(b"\0" + (row.astype(">u2") * 257).tobytes() for row in GREY)
+    deep = b"".join(b"\0" + (row.astype(">u2") * 257).tobytes() for row in GRAY)
     files = {
         "8 bit": png(base),
         "4 bit": raw_png(4, 3, 4, 0, packed),
@@ -79,7 +79,7 @@ def test_png_of_every_depth_and_colour(tmp_path: Path) -> None:
     }
     for name, data in files.items():
         picture = read(tmp_path, data)
-        wanted = GREY if name != "interlaced" else np.array([[0x77]])
+        wanted = GRAY if name != "interlaced" else np.array([[0x77]])
         np.testing.assert_allclose(shade(picture), wanted / 255, atol=1e-5, err_msg=name)
         assert picture.alpha is None
     for bits, step in ((1, 255), (2, 85)):
@@ -89,23 +89,23 @@ def test_png_of_every_depth_and_colour(tmp_path: Path) -> None:
         np.testing.assert_array_equal(shade(picture)[0], levels * step / 255)
 
 
-def test_colours_are_added_up_and_alpha_is_kept_apart(tmp_path: Path) -> None:
-    colours = np.array([[[255, 0, 0, 255], [0, 255, 0, 128], [10, 20, 30, 0]]], dtype=np.uint8)
-    picture = read(tmp_path, png(Image.fromarray(colours)))
+def test_colors_are_added_up_and_alpha_is_kept_apart(tmp_path: Path) -> None:
+    colors = np.array([[[255, 0, 0, 255], [0, 255, 0, 128], [10, 20, 30, 0]]], dtype=np.uint8)
+    picture = read(tmp_path, png(Image.fromarray(colors)))
     assert picture.full == 765
     assert picture.level.tolist() == [[255, 255, 60]]
     assert picture.alpha is not None
     assert picture.alpha.tolist() == [[255, 128, 0]]
-    grey = read(tmp_path, png(Image.fromarray(np.array([[[7, 255], [9, 3]]], dtype=np.uint8))))
-    assert (grey.full, grey.level.tolist()) == (255, [[7, 9]])
-    assert grey.alpha is not None and grey.alpha.tolist() == [[255, 3]]
+    gray = read(tmp_path, png(Image.fromarray(np.array([[[7, 255], [9, 3]]], dtype=np.uint8))))
+    assert (gray.full, gray.level.tolist()) == (255, [[7, 9]])
+    assert gray.alpha is not None and gray.alpha.tolist() == [[255, 3]]
     deep = b"\0" + struct.pack(">8H", 65535, 0, 0, 65535, 257, 514, 771, 0)
     picture = read(tmp_path, raw_png(2, 1, 16, 6, deep))
     assert picture.level.tolist() == [[255, 6]]
     assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0]]
 
 
-def test_a_transparent_colour_of_a_palette_or_a_grey(tmp_path: Path) -> None:
+def test_a_transparent_color_of_a_palette_or_a_grey(tmp_path: Path) -> None:
     image = Image.fromarray(np.array([[0, 1, 2]], dtype=np.uint8), mode=None).convert("L")
     palette = Image.new("P", (3, 1))
     palette.putpalette([0, 0, 0, 255, 255, 255, 100, 100, 100])
@@ -121,7 +121,7 @@ def test_texts(tmp_path: Path) -> None:
     texts = PngImagePlugin.PngInfo()
     texts.add_text("Title", "a plan")
     texts.add_itxt("robocov", "α", zip=True)
-    picture = read(tmp_path, png(Image.fromarray(GREY), pnginfo=texts))
+    picture = read(tmp_path, png(Image.fromarray(GRAY), pnginfo=texts))
     assert picture.texts["Title"] == "a plan"
     assert picture.texts["robocov"] == "α"
 
@@ -138,7 +138,7 @@ def test_tall_pictures_are_converted_strip_by_strip(tmp_path: Path) -> None:
     np.testing.assert_array_equal(picture.level, tall.sum(axis=2))
 
 
-COLOURS = np.array([[[255, 0, 0], [0, 250, 0]], [[0, 3, 255], [10, 20, 30]], [[9, 9, 9], [255, 255, 255]]])
+COLORS = np.array([[[255, 0, 0], [0, 250, 0]], [[0, 3, 255], [10, 20, 30]], [[9, 9, 9], [255, 255, 255]]])
 
 
 def saved(image: Image.Image, kind: str, **options: object) -> bytes:
@@ -150,7 +150,7 @@ def saved(image: Image.Image, kind: str, **options: object) -> bytes:
 @pytest.mark.parametrize("kind", ["BMP", "TIFF", "PPM", "PNG"])
 @pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA", "I;16", "CMYK"])
 def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: str) -> None:
-    image = Image.fromarray(COLOURS.astype(np.uint8)).convert("L" if mode == "I;16" else mode)
+    image = Image.fromarray(COLORS.astype(np.uint8)).convert("L" if mode == "I;16" else mode)
     if mode == "I;16":
         image = Image.fromarray(np.asarray(image).astype(np.uint16) * 257)
     if (kind, mode) in {("BMP", "I;16"), ("BMP", "CMYK"), ("PPM", "CMYK"), ("PNG", "CMYK"), ("PPM", "P")}:
@@ -167,7 +167,7 @@ def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: s
 
 @pytest.mark.parametrize("compression", ["tiff_lzw", "tiff_adobe_deflate", "packbits", "group4"])
 def test_tiff_with_compression(tmp_path: Path, compression: str) -> None:
-    image = Image.fromarray(np.array(GREY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
+    image = Image.fromarray(np.array(GRAY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
     picture = read(tmp_path, saved(image, "TIFF", compression=compression))
     np.testing.assert_array_equal(shade(picture), np.asarray(image.convert("L")) / 255)
 
@@ -258,10 +258,10 @@ def test_jpeg(tmp_path: Path, mode: str) -> None:
 
 
 def test_ppm_of_16_bits_and_in_words(tmp_path: Path) -> None:
-    deep = (COLOURS * 257).astype(">u2")
-    words = " ".join(map(str, COLOURS.ravel().tolist()))
+    deep = (COLORS * 257).astype(">u2")
+    words = " ".join(map(str, COLORS.ravel().tolist()))
     for data in (b"P6 2 3 65535\n" + deep.tobytes(), f"P3 2 3 255 {words}".encode()):
-        np.testing.assert_array_equal(shade(read(tmp_path, data)), COLOURS.sum(axis=2) / 765)
+        np.testing.assert_array_equal(shade(read(tmp_path, data)), COLORS.sum(axis=2) / 765)
 
 
 WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), dtype=np.uint8)))

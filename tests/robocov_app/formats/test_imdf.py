@@ -229,7 +229,7 @@ def test_a_folder_or_zip_of_something_else_is_none(tmp_path: Path) -> None:
 def test_hairlines_between_units_are_closed(tmp_path: Path) -> None:
     given = venue()
     del given["opening"]
-    # without the corners of the rooms beside it, and askew: edges miss each other by some micrometres
+    # without the corners of the rooms beside it, and askew: edges miss each other by some micrometers
     given["unit"][0]["geometry"] = polygon((0, 8), (30, 8.1), (30, 12.1), (0, 12))
     given["unit"][1]["geometry"] = polygon((0, 12), (10, 12 + 0.1 / 3), (10, 20), (0, 20))
     foreign = read(as_folder(tmp_path / "mill", given))

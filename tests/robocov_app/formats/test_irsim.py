@@ -274,6 +274,6 @@ def test_without_irsim_a_bundled_map_is_said_to_need_it(
 
 def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
-    cause = "no cell is free: 100 % of the pixels are transparent, and count by the colour that is hidden"
+    cause = "no cell is free: 100 % of the pixels are transparent, and count by the color that is hidden"
     with pytest.raises(MapError, match=cause):
         read(tmp_path, "  obstacle_map: dark.png\n")

@@ -98,7 +98,7 @@ def test_the_place_that_it_says_of_itself(tmp_path: Path) -> None:
 def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) -> None:
     path = saved(tmp_path, LEVELS, chunk)
     with pytest.raises(
-        MapError, match=r"plan.png: a picture has no scale, expected --cell, the metres per pixel"
+        MapError, match=r"plan.png: a picture has no scale, expected --cell, the meters per pixel"
     ):
         read(path)
     assert read(path, cell=1.0).bounds == (0.0, 0.0, 4.0, 2.0)

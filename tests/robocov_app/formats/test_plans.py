@@ -1,4 +1,4 @@
-"""Plans on paper: the page around them, thin strokes, colours, and what transparency stands for."""
+"""Plans on paper: the page around them, thin strokes, colors, and what transparency stands for."""
 
 from pathlib import Path
 
@@ -118,8 +118,8 @@ def test_an_opening_does_not_depend_on_strips(monkeypatch: pytest.MonkeyPatch) -
     assert all((one == other).all() for one, other in zip(whole, strips, strict=True))
 
 
-def coloured() -> Image.Image:
-    """A room of 20 x 12 m with a pale grey bench, a dark blue rug, and a red line across everything."""
+def colored() -> Image.Image:
+    """A room of 20 x 12 m with a pale gray bench, a dark blue rug, and a red line across everything."""
     picture, draw = paper()
     draw.rectangle((0, 0, 199, 119), outline="black", width=3)
     draw.rectangle((20, 20, 59, 39), fill="#c8c8c8")
@@ -129,59 +129,59 @@ def coloured() -> Image.Image:
 
 
 @pytest.mark.parametrize("name", ["plan.png", "plan.ppm", "plan.jpg"])
-def test_colours_of_a_picture_are_what_is_declared(tmp_path: Path, name: str) -> None:
+def test_colors_of_a_picture_are_what_is_declared(tmp_path: Path, name: str) -> None:
     room, bench, rug = 19.4 * 11.4, 8.0, 8.0
     above = 9.7 * 19.4
-    area, _, _ = imported(tmp_path, coloured(), name)
+    area, _, _ = imported(tmp_path, colored(), name)
     assert area == pytest.approx(above - rug, abs=1.0)
-    declared = {"free_colour": ("navy", "white"), "solid_colour": ("#c8c8c8",), "ignore_colour": ("red",)}
-    area, report, _ = imported(tmp_path, coloured(), name, **declared, colour_tolerance=90.0)
+    declared = {"free_color": ("navy", "white"), "solid_color": ("#c8c8c8",), "ignore_color": ("red",)}
+    area, report, _ = imported(tmp_path, colored(), name, **declared, color_tolerance=90.0)
     assert area == pytest.approx(room - bench, abs=1.0)
     shares = [note for note in report.notes if "of the pixels are" in note]
     assert [note.rpartition(" ")[2] for note in shares] == ["free", "obstacles", "out"]
 
 
 @pytest.mark.parametrize("role", ["free", "ignore"])
-def test_soft_edges_of_a_dark_colour_are_no_walls(tmp_path: Path, role: str) -> None:
+def test_soft_edges_of_a_dark_color_are_no_walls(tmp_path: Path, role: str) -> None:
     large = Image.new("RGB", (800, 480), "white")
     draw = ImageDraw.Draw(large)
     draw.rectangle((0, 0, 799, 479), outline="black", width=16)
     draw.rectangle((501, 101, 702, 303), fill="#204080")
     soft = large.resize((200, 120), Image.Resampling.LANCZOS)
-    area, _, _ = imported(tmp_path, soft, **{f"{role}_colour": ("#204080",)})
+    area, _, _ = imported(tmp_path, soft, **{f"{role}_color": ("#204080",)})
     assert area == pytest.approx(19.2 * 11.2, abs=0.3)
 
 
 def test_an_ignored_line_leaves_the_wall_below_it(tmp_path: Path) -> None:
-    _, _, foreign = imported(tmp_path, coloured(), ignore_colour=("red",))
+    _, _, foreign = imported(tmp_path, colored(), ignore_color=("red",))
     low_x, _, high_x, _ = foreign.free.bounds
     assert (low_x, high_x) == pytest.approx((0.3, 19.7))
 
 
-def test_the_nearest_declared_colour_counts(tmp_path: Path) -> None:
+def test_the_nearest_declared_color_counts(tmp_path: Path) -> None:
     picture, draw = paper(40, 40)
     draw.rectangle((0, 0, 39, 39), outline="black", width=2)
     draw.rectangle((10, 10, 19, 19), fill=(200, 200, 200))
     draw.rectangle((25, 25, 34, 34), fill=(210, 210, 210))
-    options = {"solid_colour": ("#c8c8c8",), "free_colour": ("#d2d2d2",)}
+    options = {"solid_color": ("#c8c8c8",), "free_color": ("#d2d2d2",)}
     area, _, _ = imported(tmp_path, picture, **options)
     assert area == pytest.approx(3.6**2 - 1.0)
-    assert imported(tmp_path, picture, solid_colour=("#c8c8c8",))[0] == pytest.approx(3.6**2 - 2.0)
-    exact = imported(tmp_path, picture, solid_colour=("#c8c8c8",), colour_tolerance=0.0)
+    assert imported(tmp_path, picture, solid_color=("#c8c8c8",))[0] == pytest.approx(3.6**2 - 2.0)
+    exact = imported(tmp_path, picture, solid_color=("#c8c8c8",), color_tolerance=0.0)
     assert exact[0] == pytest.approx(3.6**2 - 1.0)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"free_colour": ("nocolour",)}, "free_colour: expected a colour name or #rrggbb"),
-        ({"solid_colour": ("transparent",)}, "solid_colour: expected a colour name"),
-        ({"free_colour": ("red",), "ignore_colour": ("#f00",)}, "ignore_colour: '#f00' is a colour of free"),
-        ({"colour_tolerance": 256.0}, "colour_tolerance: expected a number from 0 to 255, got 256"),
-        ({"free_colour": tuple(f"#0000{k:02x}" for k in range(33))}, "expected at most 32 colours, got 33"),
+        ({"free_color": ("nocolor",)}, "free_color: expected a color name or #rrggbb"),
+        ({"solid_color": ("transparent",)}, "solid_color: expected a color name"),
+        ({"free_color": ("red",), "ignore_color": ("#f00",)}, "ignore_color: '#f00' is a color of free"),
+        ({"color_tolerance": 256.0}, "color_tolerance: expected a number from 0 to 255, got 256"),
+        ({"free_color": tuple(f"#0000{k:02x}" for k in range(33))}, "expected at most 32 colors, got 33"),
     ],
 )
-def test_what_is_no_colour_is_refused(options: dict[str, object], message: str) -> None:
+def test_what_is_no_color_is_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         ReadOptions(**options)  # type: ignore[arg-type]
 

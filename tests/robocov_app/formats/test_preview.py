@@ -34,8 +34,8 @@ def plotted(free: Any, shaping: Shaping = Shaping(specks=0.05), theme: str = "li
     return plot_import(read, *build_environment(read, shaping, "plan.svg"), theme=theme)
 
 
-def marked(axes: Any, colour: tuple[int, int, int]) -> list[Any]:
-    return [patch for patch in axes.patches if to_rgb(patch.get_facecolor()) == tone(colour)]
+def marked(axes: Any, color: tuple[int, int, int]) -> list[Any]:
+    return [patch for patch in axes.patches if to_rgb(patch.get_facecolor()) == tone(color)]
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)

@@ -150,7 +150,7 @@ WKT = "POLYGON ((0 0, 9 0, 9 6, 0 6, 0 0))\nPOINT (3 3)\nLINESTRING (5 0, 5 2.5)
     [
         ("plan.dxf", "\n".join(map(str, DXF)) + "\n", {}, True, 1),
         ("plan.svg", SVG, {"scale": 1.0}, True, 3),
-        ("plan.geojson", json.dumps(GEOJSON), {"pillar": 0.5, "units": "metres"}, False, 0),
+        ("plan.geojson", json.dumps(GEOJSON), {"pillar": 0.5, "units": "meters"}, False, 0),
         ("plan.wkt", WKT, {"pillar": 0.5}, False, 0),
     ],
     ids=["dxf", "svg", "geojson", "wkt"],

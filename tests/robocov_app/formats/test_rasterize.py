@@ -30,7 +30,7 @@ points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)
 @given(
     st.lists(points, min_size=3, max_size=9), st.integers(11, 130).map(lambda k: k / 100), st.integers(1, 3)
 )
-def test_a_cell_is_covered_where_its_centre_is(
+def test_a_cell_is_covered_where_its_center_is(
     ring: list[tuple[float, float]], cell: float, finer: int
 ) -> None:
     shape = shapely.make_valid(Polygon(ring), method="structure", keep_collapsed=False)
@@ -43,7 +43,7 @@ def test_a_cell_is_covered_where_its_centre_is(
 
 
 def test_rooms_that_share_a_wall_share_no_cell() -> None:
-    # centres lie on the common edge: each belongs to just one
+    # centers lie on the common edge: each belongs to just one
     grid = CellGrid(4, 4, 1.0, (0.0, 0.0))
     left, right = shapely.box(0, 0, 1.5, 4), shapely.box(1.5, 0, 4, 4)
     both = grid.find_covered_cells(left).astype(int) + grid.find_covered_cells(right)

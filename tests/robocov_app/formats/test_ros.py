@@ -85,9 +85,9 @@ def test_a_map_that_is_turned_is_said_to_be(tmp_path: Path, yaw: str, notes: lis
     [
         (
             "trinary",
-            "100 % of the pixels are transparent, which map_server averages in as if it were a dark colour",
+            "100 % of the pixels are transparent, which map_server averages in as if it were a dark color",
         ),
-        ("raw", "100 % of the pixels are transparent, and count by the colour that is hidden in them"),
+        ("raw", "100 % of the pixels are transparent, and count by the color that is hidden in them"),
     ],
 )
 def test_transparency_is_named_as_the_cause(tmp_path: Path, mode: str, cause: str) -> None:
@@ -123,7 +123,7 @@ def test_of_a_cut_map_the_island_with_most_free_space_stays(tmp_path: Path) -> N
 
 
 def occupancy(level: int, mode: str, negate: bool, low: float, high: float, alpha: int) -> int:
-    """Return what map_server makes of a grey pixel, -1 to 100, word for word as it is documented."""
+    """Return what map_server makes of a gray pixel, -1 to 100, word for word as it is documented."""
     if mode == "raw":
         return level if level <= 100 else -1
     x = (3 * level + alpha) / 4 if mode == "trinary" and alpha >= 0 else level
@@ -166,12 +166,12 @@ def test_every_pixel_means_what_map_server_says(
         assert near or cells[0, value] == kind, (value, wanted)
 
 
-def test_colours_count_as_their_mean(tmp_path: Path) -> None:
-    colours = np.zeros((4, 4, 3), dtype=np.uint8)
-    colours[:, :2] = (255, 255, 200)  # mean 237: dark by 0.07
-    colours[:, 2] = (255, 0, 0)  # dark by 0.67
-    colours[:, 3] = (255, 100, 100)  # dark by 0.4: unknown
-    Image.fromarray(colours).save(tmp_path / "plan.png")
+def test_colors_count_as_their_mean(tmp_path: Path) -> None:
+    colors = np.zeros((4, 4, 3), dtype=np.uint8)
+    colors[:, :2] = (255, 255, 200)  # mean 237: dark by 0.07
+    colors[:, 2] = (255, 0, 0)  # dark by 0.67
+    colors[:, 3] = (255, 100, 100)  # dark by 0.4: unknown
+    Image.fromarray(colors).save(tmp_path / "plan.png")
     path = ros_map(tmp_path, b"", image="plan.png", resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 2, 4))
     assert shapely.equals(read(path, unknown="free"), shapely.box(0, 0, 2, 4) | shapely.box(3, 0, 4, 4))

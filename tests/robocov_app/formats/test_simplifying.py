@@ -18,7 +18,7 @@ CELL = 0.05
 
 
 def cells_of(shape: shapely.Geometry, cell: float = CELL, rim: int = 2) -> MultiPolygon:
-    """Return the outline of the cells whose centres are in `shape`."""
+    """Return the outline of the cells whose centers are in `shape`."""
     low_x, low_y, high_x, high_y = shape.bounds
     columns, rows = int((high_x - low_x) / cell) + 2 * rim, int((high_y - low_y) / cell) + 2 * rim
     x, y = np.meshgrid(

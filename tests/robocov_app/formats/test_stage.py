@@ -225,6 +225,6 @@ def test_files_that_are_included_are_limited_together(tmp_path: Path) -> None:
 
 def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
-    cause = "all is dark, .*: 100 % of the pixels are transparent, and count by the colour that is hidden"
+    cause = "all is dark, .*: 100 % of the pixels are transparent, and count by the color that is hidden"
     with pytest.raises(MapError, match=cause):
         read(tmp_path, 'model ( size [4 4 1] bitmap "dark.png" )')

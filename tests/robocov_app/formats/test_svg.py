@@ -20,7 +20,7 @@ XLINK = 'xmlns:xlink="http://www.w3.org/1999/xlink"'
 
 
 def drawn(folder: Path, body: str, head: str = 'width="1000" height="600"', **options: Any) -> ForeignMap:
-    """Read a drawing in which a unit is a centimetre."""
+    """Read a drawing in which a unit is a centimeter."""
     return read(folder, "svg", svg(body, head), **{"scale": 0.01, **options})
 
 
@@ -223,7 +223,7 @@ def test_an_origin_that_the_file_gives(tmp_path: Path) -> None:
 
 
 def test_a_plan_as_small_as_its_paper_needs_a_scale(tmp_path: Path) -> None:
-    wanted = "expected at least 1 m, got 0.265 x 0.159 m at its own scale: --scale METRES"
+    wanted = "expected at least 1 m, got 0.265 x 0.159 m at its own scale: --scale METERS"
     with pytest.raises(MapError, match=wanted):
         drawn(tmp_path, PAGE, scale=None)
 

@@ -72,7 +72,7 @@ def test_arcs_obey_the_equation_of_their_ellipse(
     x1: float, y1: float, x2: float, y2: float, rx: float, ry: float, turn: int, large: bool, clockwise: bool
 ) -> None:
     assume((x1, y1) != (x2, y2))
-    flags = f"{int(large)}{int(clockwise)}"  # compressed, as optimisers write them
+    flags = f"{int(large)}{int(clockwise)}"  # compressed, as optimizers write them
     [(found, _)], _ = parse_path(f"M{x1} {y1}A{rx} {ry} {turn} {flags}{x2} {y2}", 1e-3, 100_000)
     assert found[0].tolist() == [x1, y1]
     assert found[-1].tolist() == [x2, y2]
@@ -89,9 +89,9 @@ def test_arcs_obey_the_equation_of_their_ellipse(
     a, b = flat[0], flat[-1]
     height = math.sqrt(max(1.0 - chord**2 / 4, 0.0))
     across = np.array([a[1] - b[1], b[0] - a[0]]) / chord
-    centre = (a + b) / 2 + across * height * (1 if large != clockwise else -1)
-    assert np.hypot(*(flat - centre).T) == pytest.approx(1.0, abs=1e-6)
-    turned = np.diff(np.unwrap(np.arctan2(*(flat - centre).T[::-1])))
+    center = (a + b) / 2 + across * height * (1 if large != clockwise else -1)
+    assert np.hypot(*(flat - center).T) == pytest.approx(1.0, abs=1e-6)
+    turned = np.diff(np.unwrap(np.arctan2(*(flat - center).T[::-1])))
     assert (turned > -1e-6).all() if clockwise else (turned < 1e-6).all()
     if chord < 1.9999:
         assert (abs(turned.sum()) > math.pi) == large
@@ -203,7 +203,7 @@ def test_lists_of_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("how", "corner", "centre"),
+    ("how", "corner", "center"),
     [
         ("", (0, 50), (50, 100)),
         ("xMinYMin", (0, 0), (50, 50)),
@@ -213,8 +213,8 @@ def test_lists_of_numbers() -> None:
     ],
 )
 def test_view_boxes_fit_as_they_are_told(
-    how: str, corner: tuple[float, float], centre: tuple[float, float]
+    how: str, corner: tuple[float, float], center: tuple[float, float]
 ) -> None:
     matrix = fit_view_box((10.0, 10.0, 20.0, 20.0), 100.0, 200.0, how)
     places = transform_points(matrix, np.array([[10.0, 10.0], [20.0, 20.0]]))
-    assert places.tolist() == [list(map(float, corner)), list(map(float, centre))]
+    assert places.tolist() == [list(map(float, corner)), list(map(float, center))]

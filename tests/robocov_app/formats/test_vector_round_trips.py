@@ -38,7 +38,7 @@ def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignM
     edge = environment.free.length
     assert report.files == (path,)
     assert report.area == environment.free_area
-    # coordinates have six decimals: where walls cross, places move by a micrometre
+    # coordinates have six decimals: where walls cross, places move by a micrometer
     assert report.area_written == pytest.approx(foreign.free.area, abs=1e-6 * edge)
     assert foreign.free.symmetric_difference(environment.free).area <= 1e-6 * edge
     return foreign
@@ -51,7 +51,7 @@ def test_bundled_maps(tmp_path: Path, name: str, kind: str, options: dict[str, A
     environment = load_map(name)
     foreign = out_and_in(environment, tmp_path / f"{name}.{kind}", **options)
     again, _ = build_environment(foreign, AS_IT_IS, name)
-    # maps that are imported have tenths of millimetres
+    # maps that are imported have tenths of millimeters
     assert again.free.symmetric_difference(environment.free).area <= 1e-4 * environment.free.length
     first = (tmp_path / f"{name}.{kind}").read_bytes()
     export_map(environment, tmp_path / f"{name}.{kind}", options=WriteOptions(**options))
@@ -129,7 +129,7 @@ def test_geojson_has_features_with_names(tmp_path: Path) -> None:
     document = json.loads(path.read_text())
     assert (document["type"], document["units"], document["name"]) == (
         "FeatureCollection",
-        "metres",
+        "meters",
         environment.name,
     )
     kinds = [feature["properties"]["kind"] for feature in document["features"]]

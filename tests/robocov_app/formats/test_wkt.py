@@ -163,7 +163,7 @@ def test_a_system_is_projected(tmp_path: Path) -> None:
     assert foreign.free.area == pytest.approx(73.17 * 111.2, rel=1e-3)
     text = "SRID=25832;POLYGON((456000 5430000,456100 5430000,456100 5430050,456000 5430050,456000 5430000))"
     assert read(tmp_path, "wkt", text).free.area == pytest.approx(5000, rel=2e-3)
-    plain = read(tmp_path, "wkt", text, units="metres")
+    plain = read(tmp_path, "wkt", text, units="meters")
     assert plain.free.bounds == (456000, 5430000, 456100, 5430050)
 
 

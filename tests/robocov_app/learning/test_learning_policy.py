@@ -201,7 +201,7 @@ from robocov_app.learning import ObservationLayout, PolicyController
 
 @dataclass(frozen=True)
 class Outwards(PolicyController):
-    """Goes away from the nearest neighbour."""
+    """Goes away from the nearest neighbor."""
 
     layout: ObservationLayout = ObservationLayout(neighbors=1)
     action: str = "velocity"

@@ -49,7 +49,7 @@ def test_ones_own_part_is_what_one_has_done(cost: CoverageCost) -> None:
 
 
 def test_those_who_stay_get_next_to_nothing(cost: CoverageCost) -> None:
-    """What two slopes leave over of a step of 22 cm: a part in a thousand of a metre, divided by four."""
+    """What two slopes leave over of a step of 22 cm: a part in a thousand of a meter, divided by four."""
     left = []
     for seed in range(12):
         begin = places(cost.environment, seed)

@@ -21,8 +21,8 @@ def test_the_scale_bar_is_as_long_as_it_says(environment, size):
     rows, counts = np.unique(pixels[:, 1], return_counts=True)
     bar = pixels[pixels[:, 1] == rows[counts.argmax()]]
     run = np.split(np.sort(bar[:, 0]), np.nonzero(np.diff(np.sort(bar[:, 0])) > 1)[0] + 1)[0]
-    metres = (len(run) - 1) / painter.camera.zoom
-    assert metres == pytest.approx(round_length(metres * 1.02), rel=0.03)
+    meters = (len(run) - 1) / painter.camera.zoom
+    assert meters == pytest.approx(round_length(meters * 1.02), rel=0.03)
 
 
 def test_the_status_line_says_what_it_is_given():
@@ -92,7 +92,7 @@ def test_the_legend_lists_exactly_what_is_shown():
         "robots": "robot",
         "goals": "goal",
         "velocities": "velocity",
-        "links": "neighbours",
+        "links": "neighbors",
         "sensing": "sensing range",
         "communication": "communication range",
         "obstacle_points": "nearest obstacle point",

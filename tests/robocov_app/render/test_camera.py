@@ -77,7 +77,7 @@ def test_round_length_is_the_largest_round_one(limit):
 
 
 @pytest.mark.parametrize(
-    ("metres", "text"), [(0.01, "1 cm"), (0.1, "0.1 m"), (20.0, "20 m"), (1000.0, "1 km"), (0.002, "0.2 cm")]
+    ("meters", "text"), [(0.01, "1 cm"), (0.1, "0.1 m"), (20.0, "20 m"), (1000.0, "1 km"), (0.002, "0.2 cm")]
 )
-def test_length_labels(metres, text):
-    assert length_label(metres) == text
+def test_length_labels(meters, text):
+    assert length_label(meters) == text

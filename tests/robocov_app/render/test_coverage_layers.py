@@ -45,7 +45,7 @@ def free_pixels(painter, environment, count, seed=0):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda map_: map_.name)
-def test_colours_are_those_of_the_exact_distances(environment, theme):
+def test_colors_are_those_of_the_exact_distances(environment, theme):
     cost, what = scene(environment)
     frame, painter = painted(what, "distances", theme=theme)
     pixels, places = free_pixels(painter, environment, 150)
@@ -59,7 +59,7 @@ def test_colours_are_those_of_the_exact_distances(environment, theme):
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
-def test_no_colour_leaves_the_free_space(theme):
+def test_no_color_leaves_the_free_space(theme):
     _, what = scene(HALL)
     frame, painter = painted(what, "distances", "geodesic_cells", "obstacles", theme=theme)
     rows, columns = np.indices(frame.shape[:2])
@@ -100,7 +100,7 @@ def test_borders_are_drawn_where_owners_change_and_nowhere_else():
     assert (exact[:, 1] - exact[:, 0]).max() < 3.0 / painter.camera.zoom
 
 
-def test_cells_below_colours_are_lines_only():
+def test_cells_below_colors_are_lines_only():
     _, what = scene()
     with_cells, _ = painted(what, "distances", "cells")
     without, _ = painted(what, "distances")
@@ -110,7 +110,7 @@ def test_cells_below_colours_are_lines_only():
 
 def test_without_a_field_nothing_is_drawn_or_explained():
     _, what = scene()
-    frame, painter = painted(replace(what, field=None), "distances", "geodesic_cells", "colour_bar", "legend")
+    frame, painter = painted(replace(what, field=None), "distances", "geodesic_cells", "color_bar", "legend")
     assert (frame == LIGHT.background).all()
     assert painter.legend(replace(what, field=None)) == []
 
@@ -128,16 +128,16 @@ def test_the_legend_explains_what_is_shown():
     "size", [(480, 360), *(pytest.param(size, marks=pytest.mark.slow) for size in ((900, 600), (1920, 1080)))]
 )
 @pytest.mark.parametrize("limit", [0.8, 8.0, 15.0, 2500.0])
-def test_the_scale_of_colours_stands_beside_the_map_and_is_whole(size, limit):
+def test_the_scale_of_colors_stands_beside_the_map_and_is_whole(size, limit):
     _, what = scene(limit=limit)
-    frame, painter = painted(what, "distances", "colour_bar", "boundary", "status", size=size)
+    frame, painter = painted(what, "distances", "color_bar", "boundary", "status", size=size)
     corner = painter.camera.to_pixels(np.array([16.0, 0.0]))
     beside = frame[:, int(np.ceil(corner[0])) + 3 :]
     ink = (beside != LIGHT.background).any(axis=2)
     assert ink.any()
     # nothing touches the edge of the page
     assert not ink[:, -1].any()
-    # the farthest colour is above the nearest
+    # the farthest color is above the nearest
     table = LIGHT.heat_table(256).astype(int)
     far = np.nonzero(np.abs(beside - table[-1]).max(axis=2) < 4)[0]
     assert len(far)
@@ -152,7 +152,7 @@ def test_the_scale_says_when_there_is_more(monkeypatch):
     for limit, last in ((50.0, "50 m"), (2.0, "≥ 2 m"), (2500.0, "2.5 km")):
         said.clear()
         _, what = scene(limit=limit)
-        painted(what, "distances", "colour_bar")
+        painted(what, "distances", "color_bar")
         assert said[-1] == last
         assert said[0] == "0"
 
@@ -177,7 +177,7 @@ def test_an_unchanged_picture_is_kept(layer, monkeypatch):
 
 
 @pytest.mark.parametrize("zoom", [0.05, 4.0, 300.0])
-def test_any_zoom_shows_the_same_colours(zoom):
+def test_any_zoom_shows_the_same_colors(zoom):
     cost, what = scene()
     painter = Painter(ROOMS, (300, 200))
     painter.show(["distances"])

@@ -1,4 +1,4 @@
-"""The density as colours and in words."""
+"""The density as colors and in words."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from density_cases import GAUSSIANS, POLYGONS
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import Environment
 from robocov_app.render.density import (
-    colours,
+    colors,
     density_label,
     density_range,
     mean_label,
@@ -37,20 +37,20 @@ def test_the_range_finds_narrow_hot_spots():
 
 def test_the_more_the_stronger():
     x = np.linspace(0.1, 7.9, 60)
-    picture = colours(parts(GAUSSIANS["one"], BOUNDS, x, x), LIGHT)
+    picture = colors(parts(GAUSSIANS["one"], BOUNDS, x, x), LIGHT)
     assert picture.shape == (60, 60, 4) and (picture[..., :3] == LIGHT.density).all()
     values = GAUSSIANS["one"].evaluate(np.column_stack([np.tile(x, 60), np.repeat(x, 60)])).reshape(60, 60)
     order = np.argsort(values.ravel())
     assert (np.diff(picture[..., 3].ravel()[order].astype(int)) >= 0).all()
     assert picture[..., 3].min() == 0
     assert picture[..., 3].max() == pytest.approx(255 * LIGHT.density_strength, abs=3)
-    flat = colours(parts(Uniform(), BOUNDS, x, x), LIGHT)
+    flat = colors(parts(Uniform(), BOUNDS, x, x), LIGHT)
     assert not flat[..., 3].any()
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_it_is_seen_and_nothing_drowns_in_it(theme):
-    alpha = float(colours(np.array([1.0]), theme)[0, 3]) / 255.0
+    alpha = float(colors(np.array([1.0]), theme)[0, 3]) / 255.0
     full = mix(theme.background, theme.density, alpha)
     assert contrast(full, theme.background) > 1.4
     assert contrast(full, theme.ink) > 4.5

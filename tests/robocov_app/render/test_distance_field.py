@@ -1,4 +1,4 @@
-"""Distances to the nearest robot at every pixel, and their colours."""
+"""Distances to the nearest robot at every pixel, and their colors."""
 
 from __future__ import annotations
 
@@ -161,12 +161,12 @@ THEMES = [LIGHT, DARK]
 
 
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-def test_colours_run_one_way_from_the_page_to_its_opposite(theme):
-    brightness = np.array([luminance(tuple(colour)) for colour in theme.heat_table(254).tolist()])
+def test_colors_run_one_way_from_the_page_to_its_opposite(theme):
+    brightness = np.array([luminance(tuple(color)) for color in theme.heat_table(254).tolist()])
     steps = np.diff(brightness) * (1 if theme is DARK else -1)
     assert (steps >= -1e-3).all()
     # every tenth of the scale can be told from the next
-    tenths = [tuple(colour) for colour in theme.heat_table(11).tolist()]
+    tenths = [tuple(color) for color in theme.heat_table(11).tolist()]
     assert min(contrast(one, two) for one, two in pairwise(tenths)) > 1.08
     assert contrast(tenths[0], theme.background) < 1.1
     assert contrast(tenths[-1], theme.background) > 7.0
@@ -202,9 +202,9 @@ def test_where_nobody_can_come_is_hatched():
     assert set(np.unique(courtyard)) == {FARTHEST + 1, FARTHEST + 2}
     assert 0.05 < (courtyard == FARTHEST + 2).mean() < 0.2
     for theme in THEMES:
-        colours = palette(theme)
-        assert colours.shape == (256, 3)
-        assert tuple(colours[FARTHEST + 1]) == theme.unreached
+        colors = palette(theme)
+        assert colors.shape == (256, 3)
+        assert tuple(colors[FARTHEST + 1]) == theme.unreached
 
 
 def test_lines_are_as_wide_as_asked_for_and_smooth():

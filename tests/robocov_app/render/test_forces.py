@@ -85,7 +85,7 @@ def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_viscosity_has_its_colour_and_its_words(theme):
+def test_viscosity_has_its_color_and_its_words(theme):
     scene = gliding(-0.9, 0.0)
     frame, painter = drawn(scene, "force_viscosity", theme=theme)
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])

@@ -12,7 +12,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
-from robocov_app.figures.arena import draw_map, map_handles, ticks_in_metres
+from robocov_app.figures.arena import draw_map, map_handles, ticks_in_meters
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
@@ -62,7 +62,7 @@ def test_the_legend_tells_of_it():
     assert not any("φ" in words for words in painter.legend(scene_of(HEAVY)))
 
 
-def test_colours_of_distances_hide_it():
+def test_colors_of_distances_hide_it():
     painter = Painter(HEAVY, (400, 380))
     painter.show({"density", "distances", "obstacles"})
     cost = CoverageCost(HEAVY, 32)
@@ -92,7 +92,7 @@ def test_zoomed_in_it_stays_in_the_view():
 
 def test_on_a_page():
     axes = Figure().subplots()
-    ticks_in_metres(axes, HEAVY, LIGHT)
+    ticks_in_meters(axes, HEAVY, LIGHT)
     draw_map(axes, HEAVY, LIGHT)
     (image,) = axes.images
     assert axes.get_xlim() == (0.0, 8.0) and axes.get_ylim() == (0.0, 8.0)

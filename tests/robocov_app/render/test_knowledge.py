@@ -76,10 +76,10 @@ class TestRayScan:
         fills = []
         for frame in (alone, both):
             x, y = np.rint(painter.camera.to_pixels(np.array([4.25, 4.0]))).astype(int)
-            colours, count = np.unique(
+            colors, count = np.unique(
                 frame[y - 30 : y + 31, x - 30 : x + 31].reshape(-1, 3), axis=0, return_counts=True
             )
-            fills.append(colours[count.argmax()].tolist())
+            fills.append(colors[count.argmax()].tolist())
         assert fills[0] == fills[1] != list(LIGHT.background)
 
     def test_close_up_it_is_drawn_too(self):
@@ -114,8 +114,8 @@ def knowing(points=SEEN, numbers=(1, 2, 3), time=0.0, n=4, **more):
 
 def dots(frame, painter, theme=LIGHT, points=SEEN):
     """Return which points are drawn."""
-    colour = theme.forces["repulsion_obstacle"]
-    return [nearest(frame, pixel, colour) < 25 for pixel in painter.camera.to_pixels(points)]
+    color = theme.forces["repulsion_obstacle"]
+    return [nearest(frame, pixel, color) < 25 for pixel in painter.camera.to_pixels(points)]
 
 
 class TestSensedObstacles:
@@ -146,8 +146,8 @@ class TestSensedObstacles:
         yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
         frame, painter = drawn(replace(scene_of(run_of(yard, 2)), sensed=Sensed()), "obstacles", "sensed")
         pale = mix(LIGHT.background, LIGHT.obstacle, 0.3)
-        for point, colour in (((0.75, 4.0), pale), ((4.0, 4.0), pale), ((1.25, 4.0), LIGHT.background)):
-            assert distance(frame, painter.camera.to_pixels(np.array(point)), colour) == 0
+        for point, color in (((0.75, 4.0), pale), ((4.0, 4.0), pale), ((1.25, 4.0), LIGHT.background)):
+            assert distance(frame, painter.camera.to_pixels(np.array(point)), color) == 0
 
     def test_the_boundary_stays_as_it_is(self):
         scene = scene_of(run_of(HALL, 2))  # a third of it lies along what is outside
@@ -306,7 +306,7 @@ class TestCursorPath:
         assert np.abs(away).max() < 45 * painter.scale
         assert len(tags(frame, painter, "9.87 m", theme)) == 0
 
-    def test_long_ways_are_told_in_whole_metres(self):
+    def test_long_ways_are_told_in_whole_meters(self):
         painter = Painter(SQUARE, SIZE)
         painter.show({"path"})
         painter.camera = Camera((4.0, 4.0), 0.5, painter.camera.view)
@@ -357,11 +357,11 @@ class TestCursorPath:
 
 @THEMES
 def test_glyphs_of_the_legend(theme):
-    for layer, scene, colour in (
+    for layer, scene, color in (
         ("scan", scanned(scan()), theme.final),
         ("sensed", knowing(), theme.forces["repulsion_obstacle"]),
         ("path", pathed(), theme.final),
     ):
         pictures = glyphs(layer_named(layer), scene, theme)
         assert len(pictures) == 1
-        check_glyph(pictures[0], theme, colour)
+        check_glyph(pictures[0], theme, color)

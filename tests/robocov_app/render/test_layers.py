@@ -88,8 +88,8 @@ def test_edges_of_cells_are_drawn_between_robots():
 @pytest.mark.parametrize("n", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_narrow_cells_have_plain_edges(n):
     frame, _ = drawn(scene_of(run_of(SQUARE, n)), "cells")
-    colours = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}
-    assert (set(map(tuple, np.unique(frame.reshape(-1, 3), axis=0).tolist())) <= colours) == (n == 1000)
+    colors = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}
+    assert (set(map(tuple, np.unique(frame.reshape(-1, 3), axis=0).tolist())) <= colors) == (n == 1000)
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=["rooms", "hall"])
@@ -112,9 +112,9 @@ def test_an_obstacle_in_the_courtyard_of_a_thin_one_is_drawn():
     yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
     frame, painter = drawn(scene_of(run_of(yard, 2)), "obstacles")
     points = np.array([[0.75, 4.0], [4.0, 4.0], [1.25, 4.0], [0.25, 4.0]])
-    colours = [LIGHT.obstacle, LIGHT.obstacle, LIGHT.background, LIGHT.background]
-    for pixel, colour in zip(painter.camera.to_pixels(points), colours, strict=True):
-        assert distance(frame, pixel, colour) == 0
+    colors = [LIGHT.obstacle, LIGHT.obstacle, LIGHT.background, LIGHT.background]
+    for pixel, color in zip(painter.camera.to_pixels(points), colors, strict=True):
+        assert distance(frame, pixel, color) == 0
 
 
 def test_the_boundary_is_the_convex_hull():
@@ -125,7 +125,7 @@ def test_the_boundary_is_the_convex_hull():
     assert distance(frame, painter.camera.to_pixels(np.array([6.0, 7.0])), LIGHT.background) == 0
 
 
-def test_the_grid_has_lines_at_round_metres_inside_the_region_only():
+def test_the_grid_has_lines_at_round_meters_inside_the_region_only():
     pixels, painter = changed(scene_of(run_of(HALL, 4)), "grid")
     points = painter.camera.to_world(pixels.astype(float))
     off = np.abs(points - np.rint(points)).min(axis=1)
@@ -213,13 +213,13 @@ class TestCrowds:
 
 class TestRobots:
     def ink_of_numbers(self, frame, painter, scene):
-        """Return how many pixels within each disc are nearly of its number's colour."""
+        """Return how many pixels within each disc are nearly of its number's color."""
         counts = []
         for pixel, hue in zip(painter.camera.to_pixels(scene.snapshot.positions), painter._hues, strict=True):
             x, y = np.rint(pixel).astype(int)
             patch = frame[y - 3 : y + 4, x - 3 : x + 4].reshape(-1, 3)
-            colour = np.array(readable_on(LIGHT.robots[hue]))
-            counts.append(int((np.abs(patch - colour).max(axis=1) < 70).sum()))
+            color = np.array(readable_on(LIGHT.robots[hue]))
+            counts.append(int((np.abs(patch - color).max(axis=1) < 70).sum()))
         return counts
 
     def test_each_has_a_disc_of_its_hue_and_a_number(self):
@@ -298,7 +298,7 @@ class TestNumbers:
         return frame[y - reach : y + reach + 1, x - reach : x + reach + 1]
 
     def test_robots_are_called_by_theirs(self):
-        """What is called 7 looks as the seventh of seven does, number and colour."""
+        """What is called 7 looks as the seventh of seven does, number and color."""
         several = np.column_stack([np.full(7, 1.0), np.arange(7.0) + 0.5])
         several[6] = 4.0
         expected, painter = drawn(explained(several), "robots")
@@ -311,7 +311,7 @@ class TestNumbers:
         assert [explained(TWO).number(row) for row in (0, 1)] == [1, 2]
 
     @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-    def test_in_a_small_team_colours_stay_with_them(self, theme):
+    def test_in_a_small_team_colors_stay_with_them(self, theme):
         places = np.array([[1.0, 1.0], [4.0, 4.0], [7.0, 7.0]])
         painter = Painter(SQUARE, SIZE, theme)
         painter.show({"robots", "cells"})
@@ -361,16 +361,16 @@ class TestCells:
 
 
 class TestTrajectories:
-    @pytest.mark.parametrize("colours", ["robots", "paper"])
-    def test_run_along_the_positions(self, colours):
+    @pytest.mark.parametrize("colors", ["robots", "paper"])
+    def test_run_along_the_positions(self, colors):
         record = run_of(SQUARE, 4)
         frame, painter = drawn(
-            scene_of(record), "trajectories", layers=standard_layers(colours), size=(800, 800)
+            scene_of(record), "trajectories", layers=standard_layers(colors), size=(800, 800)
         )
         for robot in range(4):
-            colour = LIGHT.trajectory if colours == "paper" else LIGHT.robots[robot]
+            color = LIGHT.trajectory if colors == "paper" else LIGHT.robots[robot]
             for pixel in painter.camera.to_pixels(record.positions[5:35:4, robot]):
-                assert nearest(frame, pixel, colour) < 110
+                assert nearest(frame, pixel, color) < 110
 
     def test_frame_by_frame_looks_like_all_at_once(self):
         record = run_of(SQUARE, 5, steps=60)

@@ -113,11 +113,11 @@ def test_what_is_magnified_is_still_true(factor, x, y):
         assert tuple(frame[row, column]) == LIGHT.cell(robot)
 
 
-def test_the_legend_follows_the_colours_of_the_trajectories():
+def test_the_legend_follows_the_colors_of_the_trajectories():
     scene = scene_of(run_of(ROOMS, 6))
     tops = []
-    for colours in ("robots", "paper"):
-        painter = Painter(ROOMS, (640, 480), layers=standard_layers(colours))
+    for colors in ("robots", "paper"):
+        painter = Painter(ROOMS, (640, 480), layers=standard_layers(colors))
         painter.show({"legend", "trajectories"})
         tops.append(painter.frame(scene)[:20].copy())
     assert (tops[0] != tops[1]).any()

@@ -52,15 +52,15 @@ def test_robots_that_work_failed_ones_and_obstacles_where_they_are(record: Recor
         assert cart.center[0] == pytest.approx(1.0 + 2.0 * float(record.time[row]))
 
 
-def test_neighbours_are_renumbered(record: Record) -> None:
+def test_neighbors_are_renumbered(record: Record) -> None:
     scene = record_scene(record, 30)
     assert scene.snapshot is not None
     whole, part = record.snapshot(30).seen.neighbors, scene.snapshot.seen.neighbors
     rows = np.array(scene.numbers) - 1
-    robot, neighbour = whole.list_pairs()
-    expected = set(zip(robot.tolist(), neighbour.tolist(), strict=True))
-    robot, neighbour = part.list_pairs()
-    assert set(zip(rows[robot].tolist(), rows[neighbour].tolist(), strict=True)) == expected
+    robot, neighbor = whole.list_pairs()
+    expected = set(zip(robot.tolist(), neighbor.tolist(), strict=True))
+    robot, neighbor = part.list_pairs()
+    assert set(zip(rows[robot].tolist(), rows[neighbor].tolist(), strict=True)) == expected
 
 
 def test_who_joins_has_no_trail_before(record: Record) -> None:
@@ -75,7 +75,7 @@ def test_films_and_plots_of_it_can_be_drawn(record: Record) -> None:
     frames = [
         frame.copy()
         for frame in draw_frames(
-            record, VideoSettings(colours="robots"), size=(320, 240), rows=np.array([0, 12, 30])
+            record, VideoSettings(colors="robots"), size=(320, 240), rows=np.array([0, 12, 30])
         )
     ]
     assert len({frame.tobytes() for frame in frames}) == 3

@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 
 from robocov.errors import ParameterError
 from robocov_app.render.theme import (
-    MAP_COLOURS,
+    MAP_COLORS,
     ONE_HUE_EACH,
     THEMES,
     contrast,
@@ -66,11 +66,11 @@ class TestReadability:
 
     def test_hues_differ(self, theme):
         assert len(set(theme.robots)) == ONE_HUE_EACH
-        cells = np.array([theme.cell(hue) for hue in range(MAP_COLOURS)], dtype=float)
-        apart = np.abs(cells[:, None] - cells[None]).max(axis=2) + 1000 * np.eye(MAP_COLOURS)
+        cells = np.array([theme.cell(hue) for hue in range(MAP_COLORS)], dtype=float)
+        apart = np.abs(cells[:, None] - cells[None]).max(axis=2) + 1000 * np.eye(MAP_COLORS)
         assert apart.min() >= 9
 
-    def test_the_papers_colours(self, theme):
+    def test_the_papers_colors(self, theme):
         red, green, blue = theme.controller("rapf")
         assert blue > red and blue > green
         red, green, blue = theme.controller("rpf")
@@ -98,16 +98,16 @@ def test_small_teams_have_one_hue_each(n):
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(ONE_HUE_EACH + 1, 150), st.integers(0, 10_000))
-def test_cells_of_large_teams_differ_from_their_neighbours(n, seed):
+def test_cells_of_large_teams_differ_from_their_neighbors(n, seed):
     adjacency = adjacency_of(np.random.default_rng(seed).uniform(size=(n, 2)))
     hues = robot_hues(n, adjacency)
-    assert hues.min() >= 0 and hues.max() < MAP_COLOURS
+    assert hues.min() >= 0 and hues.max() < MAP_COLORS
     assert (hues[adjacency[:, 0]] != hues[adjacency[:, 1]]).all()
 
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(ONE_HUE_EACH + 1, 80), st.integers(0, 10_000))
-def test_colours_stay_but_for_cells_that_conflict(n, seed):
+def test_colors_stay_but_for_cells_that_conflict(n, seed):
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(n, 2))
     before = robot_hues(n, adjacency_of(points))
@@ -116,12 +116,12 @@ def test_colours_stay_but_for_cells_that_conflict(n, seed):
     after = robot_hues(n, adjacency, before)
     assert (after[adjacency[:, 0]] != after[adjacency[:, 1]]).all()
     conflicts = int((before[adjacency[:, 0]] == before[adjacency[:, 1]]).sum())
-    # a conflict may push a neighbour aside, which pushes another, but the rest of the map keeps its colours
+    # a conflict may push a neighbor aside, which pushes another, but the rest of the map keeps its colors
     assert (after != before).sum() <= 6 * conflicts
 
 
-def test_a_wheel_with_too_many_spokes_is_coloured_afresh():
-    # the hub's neighbours show every colour: no colour is free for it
+def test_a_wheel_with_too_many_spokes_is_colored_afresh():
+    # the hub's neighbors show every color: no color is free for it
     ring = [(i, i % 11 + 1) for i in range(1, 12)]
     spokes = [(0, i) for i in range(1, 12)]
     adjacency = np.sort(np.array(ring + spokes), axis=1)
@@ -132,5 +132,5 @@ def test_a_wheel_with_too_many_spokes_is_coloured_afresh():
 
 def test_without_adjacency_hues_take_turns_and_stay():
     hues = robot_hues(20)
-    assert set(hues.tolist()) == set(range(MAP_COLOURS))
+    assert set(hues.tolist()) == set(range(MAP_COLORS))
     assert robot_hues(20, None, hues[::-1].copy()).tolist() == hues[::-1].tolist()

@@ -244,7 +244,7 @@ class TestFading:
 
     @THEMES
     def test_it_fades_into_what_lies_below(self, theme):
-        """On a cell it is neither paler nor darker than the cell and the colour of its robot."""
+        """On a cell it is neither paler nor darker than the cell and the color of its robot."""
         trail = straight(70)
         painter, _ = painter_of(3.0, theme, also={"cells"})
         frame = frame_of(painter, trail)
@@ -312,7 +312,7 @@ class TestFading:
         for trail in (walks(43, seed=1), walks(41, seed=1), walks(42), walks(20), walks(3)):
             assert (frame_of(painter, trail) == frame_of(painter_of(4.0)[0], trail)).all()
 
-    def test_other_colours_are_drawn_anew(self):
+    def test_other_colors_are_drawn_anew(self):
         trail = straight(40, 2)
         for fade in (None, 4.0):
             painter, _ = painter_of(fade)
@@ -352,7 +352,7 @@ class TestFading:
         frame = frame_of(painter, trail)
         assert nearest(frame, painter.camera.to_pixels(trail[-5, 0]), LIGHT.trail(0), reach=3) < 110
 
-    def test_large_teams_are_in_one_quiet_colour(self):
+    def test_large_teams_are_in_one_quiet_color(self):
         trail = straight(40, 12) * np.array([1.0, 0.55])
         frame = frame_of(painter_of(4.0)[0], trail)
         painter, _ = painter_of(4.0)

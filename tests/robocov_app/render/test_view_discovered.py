@@ -44,10 +44,10 @@ def test_walls_and_what_is_unknown_are_seen(theme):
             "unknown": (40, known.raster.shape[1] - 6),
         }.items()
     }
-    colour = theme.forces["repulsion_obstacle"]
+    color = theme.forces["repulsion_obstacle"]
     assert distance(frame, at["free"], theme.background) == 0
-    assert distance(frame, at["wall"], mix(theme.background, colour, 0.85)) < 6
-    assert distance(frame, at["presumed"], mix(theme.background, colour, 0.45)) < 6
+    assert distance(frame, at["wall"], mix(theme.background, color, 0.85)) < 6
+    assert distance(frame, at["presumed"], mix(theme.background, color, 0.45)) < 6
     assert distance(frame, at["unknown"], mix(theme.background, theme.obstacle, 0.28)) < 6
 
 

@@ -13,7 +13,7 @@ from robocov_app.render.surface_cache import Latest, kept
 from robocov_app.render.theme import mix, rgb
 
 
-def test_colours() -> None:
+def test_colors() -> None:
     assert rgb("88CCEE") == (136, 204, 238)
     assert mix((0, 0, 0), (200, 100, 50), 0.5) == (100, 50, 25)
 

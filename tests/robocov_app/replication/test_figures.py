@@ -63,11 +63,11 @@ def test_files_have_the_width_of_a_journals_columns_and_come_out_the_same(number
     assert b"/FontFile2" in content and b"/Type3" not in content
 
 
-def test_a_partition_with_centres_of_mass():
+def test_a_partition_with_centers_of_mass():
     axes = draw_figure(1, RUNS, PARTITION, "light").axes[0]
-    centres = partition(PARTITION.positions[0], SQUARE.region).centroid
+    centers = partition(PARTITION.positions[0], SQUARE.region).centroid
     (dots,) = [line for line in axes.lines if len(line.get_xdata()) == 6]
-    assert np.asarray(dots.get_xydata()) == pytest.approx(centres)
+    assert np.asarray(dots.get_xydata()) == pytest.approx(centers)
     (robots,) = [c for c in axes.collections if type(c) is PathCollection]
     assert np.asarray(robots.get_offsets()) == pytest.approx(PARTITION.positions[0])
     assert {to_rgb(c) for c in robots.get_facecolors()} == {tone(LIGHT.final)}
@@ -82,7 +82,7 @@ def test_a_partition_with_centres_of_mass():
         (8, "other/rapf", "other/rpf"),
     ],
 )
-def test_panels_show_their_runs_in_the_papers_colours(number, left, right):
+def test_panels_show_their_runs_in_the_papers_colors(number, left, right):
     figure = draw_figure(number, RUNS, PARTITION, "light")
     for axes, name in zip(figure.axes, (left, right), strict=True):
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]

@@ -60,9 +60,9 @@ class TestMaps:
         pillar = Environment("pillar", ring, (CircleObstacle((4.0, 3.0), 1.0),))
         starts = study_maps.replace_starts(pillar).starts
         assert starts["corner"] == DiscStart((0.8, 0.8), 0.8)
-        centre = starts["centre"]
-        assert isinstance(centre, DiscStart)
-        assert np.hypot(centre.center[0] - 4.0, centre.center[1] - 3.0) == pytest.approx(1.8, abs=0.02)
+        center = starts["centre"]
+        assert isinstance(center, DiscStart)
+        assert np.hypot(center.center[0] - 4.0, center.center[1] - 3.0) == pytest.approx(1.8, abs=0.02)
 
     def test_narrow_maps_get_smaller_discs_and_too_narrow_ones_none(self):
         for width, radius in ((1.3, 0.6), (1.0, 0.45)):

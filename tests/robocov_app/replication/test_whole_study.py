@@ -260,8 +260,8 @@ class TestBeyond:
 
     def test_mixed_teams_are_judged_by_time(self, beyond):
         for law in TEAMS:
-            seconds, metres = (beyond.teams.get_values(law.key, measure) for measure in ("time", "final"))
-            assert (seconds > metres).all() and (seconds < 4.0 * metres + 1e-9).all()
+            seconds, meters = (beyond.teams.get_values(law.key, measure) for measure in ("time", "final"))
+            assert (seconds > meters).all() and (seconds < 4.0 * meters + 1e-9).all()
 
     def test_degradations_have_every_value_of_every_axis(self, beyond):
         axes = studies.list_disturbances(TINY)["conditions"].axes.items()

@@ -42,8 +42,8 @@ function light(code) {
 }
 function ground(element) {
   for (let e = element; e; e = e.parentElement) {
-    const { backgroundColor: colour } = getComputedStyle(e);
-    if ((channels(colour)[3] ?? 1) === 1 && colour !== "transparent") return colour;
+    const { backgroundColor: color } = getComputedStyle(e);
+    if ((channels(color)[3] ?? 1) === 1 && color !== "transparent") return color;
   }
   return "rgb(255, 255, 255)";
 }

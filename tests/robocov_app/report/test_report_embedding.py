@@ -25,7 +25,7 @@ from robocov_app.report.replay import (
     embedded_map,
     embedded_run,
     even_times,
-    quantised,
+    quantized,
     script_json,
 )
 
@@ -33,7 +33,7 @@ STYLE = curve_styles(["rapf"])["rapf"]
 
 
 def read_back(text: str, low: float, high: float) -> np.ndarray:
-    """Return what `quantised` was given: an implementation of its own."""
+    """Return what `quantized` was given: an implementation of its own."""
     words = np.frombuffer(base64.b64decode(text), dtype="<u2").astype(float)
     return np.where(words == NONE, np.nan, low + words / (NONE - 1) * (high - low))
 
@@ -67,12 +67,12 @@ def test_speeds_are_there_where_cells_are_by_time() -> None:
 def test_numbers_come_back_to_within_half_a_step(values) -> None:
     array = np.array(values)
     low, high = float(array.min()), float(array.max())
-    back = read_back(quantised(array, low, high), low, high)
+    back = read_back(quantized(array, low, high), low, high)
     assert np.abs(back - array).max() <= 0.51 * (high - low) / (NONE - 1) + 1e-12
 
 
 def test_what_is_not_there_stays_so() -> None:
-    back = read_back(quantised(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
+    back = read_back(quantized(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
     assert np.isnan(back).tolist() == [False, True, True, False]
 
 
@@ -172,7 +172,7 @@ def test_a_run_of_a_single_moment() -> None:
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
-def test_maps_are_rounded_to_millimetres(environment) -> None:
+def test_maps_are_rounded_to_millimeters(environment) -> None:
     data = embedded_map(environment)
     assert data["unit"] == 1e-3
     ring = np.array(data["region"]).reshape(-1, 2) * data["unit"]

@@ -52,7 +52,7 @@ def test_variants_are_lettered_where_no_one_short_gain_tells_them_apart(sets) ->
     assert [group.label for group in groups] == ["RAPF A", "RAPF B"]
 
 
-def test_variants_differ_in_label_colour_dashes_and_mark_and_their_controller_keeps_its_own() -> None:
+def test_variants_differ_in_label_color_dashes_and_mark_and_their_controller_keeps_its_own() -> None:
     result = result_of([*grid(levels=(1, 3, 30, 100)), entry("rapf", error="no"), entry("mine", error="no")])
     looks = styles(result)
     own = [looks[group.label] for group in shown_groups(result)]

@@ -19,7 +19,7 @@ from robocov_app.figures.results import (
 from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import LIGHT
 from robocov_app.report.svg import inline_svg
-from robocov_app.report.theme_css import named_colours
+from robocov_app.report.theme_css import named_colors
 
 RNG = np.random.default_rng(5)
 TIME = np.linspace(0.0, 10.0, 40)
@@ -60,11 +60,11 @@ FIGURES = {
 
 
 @pytest.mark.parametrize("kind", FIGURES)
-def test_all_colours_are_the_pages(kind) -> None:
+def test_all_colors_are_the_pages(kind) -> None:
     svg = inline_svg(FIGURES[kind](), "k", "what it shows")
     assert not re.findall(r"#[0-9a-fA-F]{3,6}\b|rgb\(", svg.replace("#k-", "="))
     used = set(re.findall(r"var\(--rc-([\w-]+)\)", svg))
-    assert used and used <= named_colours(LIGHT).keys()
+    assert used and used <= named_colors(LIGHT).keys()
 
 
 @pytest.mark.parametrize("kind", FIGURES)

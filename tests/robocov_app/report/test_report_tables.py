@@ -68,7 +68,7 @@ def test_what_is_zero_but_for_rounding_has_no_sign() -> None:
     assert column(table, "Clearance, m") == ["0.000"]
 
 
-def test_every_map_has_a_table_and_metres_of_different_maps_no_common_median() -> None:
+def test_every_map_has_a_table_and_meters_of_different_maps_no_common_median() -> None:
     result = result_of([*FIVE, *(entry("rapf", k, 9.0, map_name="museum") for k in range(5))])
     tables = summary_tables(result)
     assert [table.caption for table in tables] == ["All maps and teams together", "rooms", "museum"]

@@ -1,4 +1,4 @@
-"""The project's colours as CSS variables: the same names in light and dark, and readable in both."""
+"""The project's colors as CSS variables: the same names in light and dark, and readable in both."""
 
 import re
 
@@ -6,7 +6,7 @@ import pytest
 
 from robocov.errors import ParameterError
 from robocov_app.render.theme import DARK, HEAT_LEVELS, LIGHT, contrast, rgb
-from robocov_app.report.theme_css import hex_code, named_colours, theme_rules, variables
+from robocov_app.report.theme_css import hex_code, named_colors, theme_rules, variables
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
@@ -16,8 +16,8 @@ def declared(css: str) -> dict[str, str]:
 
 
 def test_both_themes_have_the_same_names() -> None:
-    assert list(named_colours(LIGHT)) == list(named_colours(DARK))
-    assert declared(variables(DARK)).keys() == named_colours(DARK).keys()
+    assert list(named_colors(LIGHT)) == list(named_colors(DARK))
+    assert declared(variables(DARK)).keys() == named_colors(DARK).keys()
     assert declared(variables(DARK))["ink"] == hex_code(DARK.ink)
     assert rgb(hex_code((1, 171, 255))[1:]) == (1, 171, 255)
 
@@ -25,23 +25,23 @@ def test_both_themes_have_the_same_names() -> None:
 @THEMES
 @pytest.mark.parametrize("ground", ["background", "panel"])
 def test_all_that_is_written_can_be_read(theme, ground) -> None:
-    colours = named_colours(theme)
+    colors = named_colors(theme)
     curves = [*theme.controllers, *(f"other-{k}" for k in range(len(theme.others)))]
     for name in ("ink", "faint", "accent", *curves):
-        assert contrast(colours[name], colours[ground]) >= 4.5, (theme.name, name, ground)
+        assert contrast(colors[name], colors[ground]) >= 4.5, (theme.name, name, ground)
     for name in ("warning", "final", "trajectory", "start", "boundary"):
-        assert contrast(colours[name], colours[ground]) >= 3.0, (theme.name, name, ground)
+        assert contrast(colors[name], colors[ground]) >= 3.0, (theme.name, name, ground)
 
 
 @THEMES
-def test_what_is_written_on_colours_can_be_read(theme) -> None:
-    colours = named_colours(theme)
-    assert contrast(colours["on-accent"], colours["accent"]) >= 4.5
-    assert contrast(colours["on-final"], colours["final"]) >= 4.5
+def test_what_is_written_on_colors_can_be_read(theme) -> None:
+    colors = named_colors(theme)
+    assert contrast(colors["on-accent"], colors["accent"]) >= 4.5
+    assert contrast(colors["on-final"], colors["final"]) >= 4.5
     for k in range(HEAT_LEVELS):
-        assert contrast(colours["ink"], colours[f"heat-{k}"]) >= 4.5
+        assert contrast(colors["ink"], colors[f"heat-{k}"]) >= 4.5
     for k in range(len(theme.robots)):
-        assert contrast(colours["trajectory"], colours[f"cell-{k}"]) >= 3.0
+        assert contrast(colors["trajectory"], colors[f"cell-{k}"]) >= 3.0
 
 
 def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:

@@ -25,7 +25,7 @@ from robocov_app.viewer.film import Film
 
 
 def plain(count, width=64, height=48):
-    """Yield frames of one colour each, getting lighter."""
+    """Yield frames of one color each, getting lighter."""
     for k in range(count):
         yield np.full((height, width, 3), 20 * k % 256, dtype=np.uint8)
 
@@ -152,13 +152,13 @@ class TestSaveFilm:
             assert np.abs(frame.astype(int) - 20 * k).max() <= 6
         assert [entry.name for entry in path.parent.iterdir()] == ["run.mp4"]
 
-    def test_colours_survive(self, tmp_path):
-        colours = [(214, 34, 34), (31, 95, 224), (30, 158, 54), (27, 35, 48)]
-        frames = [np.broadcast_to(np.array(c, dtype=np.uint8), (720, 1280, 3)) for c in colours]
+    def test_colors_survive(self, tmp_path):
+        colors = [(214, 34, 34), (31, 95, 224), (30, 158, 54), (27, 35, 48)]
+        frames = [np.broadcast_to(np.array(c, dtype=np.uint8), (720, 1280, 3)) for c in colors]
         save_video(tmp_path / "a.mp4", frames)
         back, _ = read(tmp_path / "a.mp4")
-        for frame, colour in zip(back, colours, strict=True):
-            assert np.abs(frame[300, 600].astype(int) - colour).max() <= 12
+        for frame, color in zip(back, colors, strict=True):
+            assert np.abs(frame[300, 600].astype(int) - color).max() <= 12
 
     @pytest.mark.parametrize(("width", "height"), [(63, 48), (64, 47), (63, 47)])
     def test_odd_sizes_are_made_even_without_scaling(self, tmp_path, width, height):

@@ -18,16 +18,16 @@ def known(record):
     return CostHistory(record.time[:1], one, one, one)
 
 
-def film(records, theme="light", colours="robots", size=None, speed=4.0):
-    style = VideoSettings(theme=theme, colours=colours, fps=5, speed=speed)
+def film(records, theme="light", colors="robots", size=None, speed=4.0):
+    style = VideoSettings(theme=theme, colors=colors, fps=5, speed=speed)
     layout = build_pane_layout(records, style, size)
     costs = [known(record) for record in records]
     return layout, draw_comparison_frames(records, costs, layout, style)
 
 
 def test_frames_stand_in_rows_and_a_place_may_be_free():
-    greys = [np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(1, 6)]
-    frame = tile_frames(greys, 3, gap=2, line=(99, 98, 97), background=(1, 2, 3))
+    grays = [np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(1, 6)]
+    frame = tile_frames(grays, 3, gap=2, line=(99, 98, 97), background=(1, 2, 3))
     assert frame.shape == (2 * 48 + 2, 3 * 64 + 2 * 2, 3)
     for k in range(5):
         row, column = divmod(k, 3)
@@ -104,11 +104,11 @@ class TestFrames:
         assert (twice == both).all()
 
     @pytest.mark.slow
-    def test_trajectories_have_the_colours_asked_for(self):
+    def test_trajectories_have_the_colors_asked_for(self):
         record = run_of(ROOMS, 4)
         reds = []
-        for colours in ("paper", "robots"):
-            _, frames = film([record, record], colours=colours, size=(1280, 640))
+        for colors in ("paper", "robots"):
+            _, frames = film([record, record], colors=colors, size=(1280, 640))
             last = list(frames)[-1].astype(int)
             body = last[100:]
             reds.append(int((np.abs(body - np.array(LIGHT.trajectory)).max(axis=2) < 12).sum()))

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.render.canvas import Canvas
-from robocov_app.viewer.chart import curve_colours, spread, time_axis, value_axis
+from robocov_app.viewer.chart import curve_colors, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.scenario import ControllerChoice
 
@@ -87,17 +87,17 @@ def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
     assert chart.time_at(1e5) == driver.session.end
 
 
-def test_curves_are_drawn_in_the_colours_of_their_controllers(driver: Driver) -> None:
+def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> None:
     played(driver)
     window = driver.window
     left, top, width, height = window.layout.chart
     picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
     for pane in driver.session.panes:
-        colour = np.array(curve_colours(driver.session.panes, window.theme)[pane.number])
-        assert (np.abs(picture - colour).max(axis=2) < 12).sum() > 20, pane.law.name
+        color = np.array(curve_colors(driver.session.panes, window.theme)[pane.number])
+        assert (np.abs(picture - color).max(axis=2) < 12).sum() > 20, pane.law.name
 
 
-def test_the_same_controller_twice_has_two_colours(tmp_path: Path) -> None:
+def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
     with opened(
         tmp_path,
         ControllerChoice("rapf"),
@@ -105,8 +105,8 @@ def test_the_same_controller_twice_has_two_colours(tmp_path: Path) -> None:
         ControllerChoice("rpf"),
         ControllerChoice("rpf"),
     ) as driver:
-        colours = set(curve_colours(driver.session.panes, driver.window.theme).values())
-        assert len(colours) == 4
+        colors = set(curve_colors(driver.session.panes, driver.window.theme).values())
+        assert len(colors) == 4
 
 
 def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:

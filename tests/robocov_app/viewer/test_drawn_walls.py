@@ -22,7 +22,7 @@ def test_a_wall_drawn_nearly_from_wall_to_wall_closes_the_room_and_says_what_is_
 ) -> None:
     with opened(tmp_path, RAPF, environment=room(), robots=2) as driver:
         driver.key("w")
-        driver.click_at((5.0, 0.02))  # cracks of two centimetres
+        driver.click_at((5.0, 0.02))  # cracks of two centimeters
         driver.click_at((5.0, 5.98))
         driver.key("return")
         assert len(driver.session.environment.free.geoms) == 2

@@ -27,7 +27,7 @@ def test_eight_directions():
 
 
 @pytest.mark.parametrize(
-    ("metres", "words"),
+    ("meters", "words"),
     [
         (-1e-5, "0 mm"),
         (0, "0 mm"),
@@ -42,8 +42,8 @@ def test_eight_directions():
         (1e9, "over a million m"),
     ],
 )
-def test_lengths(metres, words):
-    assert explaining._length(metres) == words
+def test_lengths(meters, words):
+    assert explaining._length(meters) == words
 
 
 @pytest.mark.parametrize(

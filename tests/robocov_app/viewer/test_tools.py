@@ -12,7 +12,7 @@ from robocov.errors import MapError, ParameterError, RobocovError
 from robocov_app.viewer.tools import WALL_WIDTH, Circle, Hand, Polygon, Ruler, Tool, Wall, toolbox
 
 REACH = 0.1
-"""Metres that a finger is wide."""
+"""Meters that a finger is wide."""
 
 
 def clicked(tool, session, *points, number=None) -> str | None:

@@ -48,7 +48,7 @@ def test_the_nearest_place_where_a_robot_fits(point, others, radius):
         assert np.hypot(*(others - place).T).min() >= 2 * radius
     assert shapely.distance(HALL.free.boundary, shapely.Point(place)) >= radius - 1e-9
     assert HALL.free.contains(shapely.Point(place))
-    # no other is nearer, but for a millimetre's room
+    # no other is nearer, but for a millimeter's room
     nearest = shapely.distance(room, shapely.Point(point))
     assert np.hypot(place[0] - point[0], place[1] - point[1]) <= nearest + 0.02
 

@@ -60,7 +60,7 @@ def rested(browser):
     return seen[0]
 
 
-def test_the_demo_follows_hands_page_and_colours(browser, tmp_path):
+def test_the_demo_follows_hands_page_and_colors(browser, tmp_path):
     sized(browser, 1280, 720)
     browser.prefer(color_scheme="light")
     with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:

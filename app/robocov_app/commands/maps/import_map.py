@@ -25,17 +25,17 @@ class Arguments(JsonOption):
       ros        YAML of ROS map_server with its PGM or PNG: --unknown --threshold --anywhere
       movingai   .map of the Moving AI benchmarks: --cell --trees --water
       picture    PNG, JPEG, BMP, TIFF, PGM or PPM of a plan, dark pixels are obstacles: --cell --threshold
-                 --invert --unknown --min-stroke --free-colour --solid-colour --ignore-colour
+                 --invert --unknown --min-stroke --free-color --solid-color --ignore-color
       stage, argos, irsim
                  worlds of these simulators, robots become a start: --only --skip --anywhere
       tmx        map of Tiled, --only LAYER selects the solid tiles: --cell --scale --skip --thickness
-      houseexpo  JSON with "verts" in metres
+      houseexpo  JSON with "verts" in meters
       osm        buildings, water and barriers of OpenStreetMap, XML or JSON of Overpass: --water
                  --thickness --pillar --skip; or the rooms of a floor: --level
       imdf       a floor of an indoor map, zip or folder: --level --thickness --only --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
-                 an unknown value is answered with the known ones; svg also by colour, as a picture
+                 an unknown value is answered with the known ones; svg also by color, as a picture
 
     --ignore-layer (or --skip) and --only select by the name of a layer, group, class or shape. Options with
     several values can be repeated.

@@ -98,7 +98,7 @@ class EditorCanvas:
         self._legend_key: object = None
         self._legend: Latest[Surface] = Latest()
         self._has_hull_excess: Latest[bool] = Latest()
-        self._fitted: tuple[Point, float] | None = None  # centre and zoom of the camera that shows all
+        self._fitted: tuple[Point, float] | None = None  # center and zoom of the camera that shows all
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Adapt to another size or theme of the window."""

@@ -8,10 +8,10 @@ from shapely import total_bounds
 from robocov_app.editor.canvas.outlines import Outline, build_outline
 from robocov_app.editor.canvas.view import View, compute_pixel_box
 from robocov_app.editor.model.measurement import Measurement
-from robocov_app.render.theme import Colour
+from robocov_app.render.theme import Color
 
 HATCH_STEP_PX = 7  # between slanted lines, at scale 1
-CUT_OFF_FORCE = "repulsion_robots"  # the force whose colour areas have that are cut off
+CUT_OFF_FORCE = "repulsion_robots"  # the force whose color areas have that are cut off
 CUT_OFF_STRENGTH = 0.5
 _WHITE = (255, 255, 255)
 _TINT_OPACITY = 56
@@ -33,7 +33,7 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
     tuple of Surface and Rect, or None
         A premultiplied picture and its position in the window, px; None if nothing is visible.
     """
-    areas: list[tuple[Outline, Colour, float]] = []
+    areas: list[tuple[Outline, Color, float]] = []
     if not measurement.sealed.is_empty:
         outline = build_outline(measurement.sealed)
         areas.append((outline, view.theme.forces[CUT_OFF_FORCE], CUT_OFF_STRENGTH))
@@ -46,14 +46,14 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
     if not box:
         return None
     patch = Surface(box.size, pygame.SRCALPHA, 32)
-    for outline, colour, strength in areas:
-        _hatch_area(view, patch, box, outline, (colour, strength))
+    for outline, color, strength in areas:
+        _hatch_area(view, patch, box, outline, (color, strength))
     return patch, box
 
 
-def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tuple[Colour, float]) -> None:
-    """Hatch one area on a patch that lies at a box of the window; `ink` is its colour and strength."""
-    colour, strength = ink
+def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tuple[Color, float]) -> None:
+    """Hatch one area on a patch that lies at a box of the window; `ink` is its color and strength."""
+    color, strength = ink
     mask = view.build_canvas(Surface(box.size, pygame.SRCALPHA, 32))
     edges = view.build_canvas(patch)
     rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
@@ -62,34 +62,34 @@ def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tu
         if is_outer:
             # Areas thinner than a pixel become a line.
             mask.outline(ring, _WHITE, 1)
-    lines = draw_hatch_page(box, colour, view.scale, strength)
+    lines = draw_hatch_page(box, color, view.scale, strength)
     mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
     patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
     for ring, is_outer in zip(rings, outline.outer, strict=True):
         if is_outer:
-            edges.outline(ring, colour, edges.width(1.0))
+            edges.outline(ring, color, edges.width(1.0))
 
 
-def draw_hatch_page(box: Rect, colour: Colour, scale: float, strength: float = 1.0) -> Surface:
+def draw_hatch_page(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:
     """Draw slanted lines over a tint; the lines keep their position when the sheet is moved.
 
     Parameters
     ----------
     box : Rect
         Box of the window that the page covers, px.
-    colour : tuple of int
-        Colour of lines and tint.
+    color : tuple of int
+        Color of lines and tint.
     scale : float
         Scale of the window.
     strength : float
         Opacity, from 0 to 1.
     """
     page = Surface(box.size, pygame.SRCALPHA, 32)
-    page.fill((*colour, round(_TINT_OPACITY * strength)))
+    page.fill((*color, round(_TINT_OPACITY * strength)))
     step = max(4, round(HATCH_STEP_PX * scale))
     thickness = max(1, round(1.2 * scale))
-    line_colour = (*colour, round(_LINE_OPACITY * strength))
+    line_color = (*color, round(_LINE_OPACITY * strength))
     first = -((box.left + box.top) % step)
     for x in range(first, box.width + box.height, step):
-        pygame.draw.line(page, line_colour, (x, 0), (x - box.height, box.height), thickness)
+        pygame.draw.line(page, line_color, (x, 0), (x - box.height, box.height), thickness)
     return page

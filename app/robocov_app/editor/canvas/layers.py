@@ -20,10 +20,10 @@ from robocov_app.render import marks, sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layout import fitted_radii
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Colour, mix
+from robocov_app.render.theme import Color, mix
 
 MANY_OBJECTS = 200  # outlines of more selected objects are drawn once, and then as a picture
-DRAGGED_TINT = 0.22  # share of the accent colour in obstacles that are dragged
+DRAGGED_TINT = 0.22  # share of the accent color in obstacles that are dragged
 MAX_RADIUS_PX = 400.0  # of a robot that is drawn as a sprite
 MIN_NUMBER_PX = 7.5  # at scale 1: smaller numbers are not written on robots
 _PREMULTIPLIED = pygame.BLEND_PREMULTIPLIED
@@ -108,8 +108,8 @@ class Paths:
             path = item.shape.path
             assert path is not None
             is_selected = key in scene.editor.selection.items
-            colour = theme.final if is_selected else mix(theme.background, theme.ink, 0.6)
-            overlay.draw_path(scene.canvas, path, colour)
+            color = theme.final if is_selected else mix(theme.background, theme.ink, 0.6)
+            overlay.draw_path(scene.canvas, path, color)
             if scene.editor.moves_since is not None and paths.leads_somewhere(path):
                 shift = path.compute_displacement(scene.editor.now - scene.editor.moves_since)
                 moved = shapely.transform(item.geometry, lambda points, by=shift: points + by)
@@ -138,12 +138,12 @@ class TeamAtStart:
         canvas = scene.canvas
         theme = canvas.theme
         scale = canvas.scale
-        centres = canvas.camera.to_pixels(np.array(team.positions))
-        true_radii = np.full(len(centres), team.radius * canvas.camera.zoom)
+        centers = canvas.camera.to_pixels(np.array(team.positions))
+        true_radii = np.full(len(centers), team.radius * canvas.camera.zoom)
         readable = min(marks.READABLE * scale, MAX_RADIUS_PX)
-        radii = np.minimum(fitted_radii(centres, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
+        radii = np.minimum(fitted_radii(centers, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
         edge = mix(theme.background, theme.ink, 0.55)
-        for k, (centre, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
+        for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
             size = round(2 * min(radius, MAX_RADIUS_PX)) / 2
             number = str(k + 1)
             is_legible = sprites.number_size(size, min(len(number), 4)) > MIN_NUMBER_PX * scale
@@ -156,7 +156,7 @@ class TeamAtStart:
                 edge,
                 number if is_legible else "",
             )
-            canvas.stamp(sprite, centre)
+            canvas.stamp(sprite, center)
 
 
 class SelectedObjects:
@@ -183,8 +183,8 @@ class SelectedObjects:
             return
         if Selection.of(hovered).restrict_to(scene.sketch):
             theme = scene.canvas.theme
-            colour = mix(theme.background, theme.final, 0.7)
-            draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, colour, 1.5)
+            color = mix(theme.background, theme.final, 0.7)
+            draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, color, 1.5)
 
     def _draw_outlines(self, scene: Scene, selection: Selection, owners: set[Owner]) -> None:
         if len(owners) <= MANY_OBJECTS:
@@ -210,8 +210,8 @@ class SelectedObjects:
         frame = compute_frame(scene.sketch, selection, editor.pixel)
         if frame is not None:
             corners = overlay.to_pixels(canvas, shapely.box(*frame).exterior.coords).tolist()
-            colour = mix(canvas.theme.background, canvas.theme.final, 0.6)
-            overlay.draw_dashes(canvas, corners, colour, 3.0)
+            color = mix(canvas.theme.background, canvas.theme.final, 0.6)
+            overlay.draw_dashes(canvas, corners, color, 3.0)
         handles = editor.handles
         if scene.sketch is not editor.sketch:
             handles = list_handles(scene.sketch, selection, editor.pixel)
@@ -283,14 +283,14 @@ def build_layers(sheet: Sheet) -> tuple[Layer, ...]:
 
 
 def draw_object_outline(
-    canvas: Canvas, sheet: Sheet, sketch: Sketch, owner: Owner, colour: Colour, width: float
+    canvas: Canvas, sheet: Sheet, sketch: Sketch, owner: Owner, color: Color, width: float
 ) -> None:
     """Draw the outline of an obstacle, a start or the boundary; `width` in px at scale 1."""
     if isinstance(owner, str):
         overlay.draw_start(canvas, sketch.get_start(owner), "", is_selected=True, dot_scale=1.3)
     elif owner == BOUNDARY:
         corners = overlay.to_pixels(canvas, sketch.boundary or ())
-        canvas.outline(corners, colour, canvas.width(width + 0.5))
+        canvas.outline(corners, color, canvas.width(width + 0.5))
     else:
         for ring in sheet.outlines.get(sketch.get_item(owner)).rings:
-            canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))
+            canvas.outline(canvas.camera.to_pixels(ring), color, canvas.width(width))

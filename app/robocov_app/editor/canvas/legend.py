@@ -6,7 +6,7 @@ from pygame import Rect
 
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.hatching import CUT_OFF_FORCE, draw_hatch_page
-from robocov_app.editor.canvas.view import choose_outside_colour
+from robocov_app.editor.canvas.view import choose_outside_color
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
 from robocov_app.render.theme import mix
@@ -62,7 +62,7 @@ def _draw_boundary(canvas: Canvas, x: float, y: float) -> None:
 
 def _draw_hull_excess(canvas: Canvas, x: float, y: float) -> None:
     theme = canvas.theme
-    fill = mix(choose_outside_colour(theme), theme.obstacle, 0.55)
+    fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
     canvas.swatch(x, y, fill, mix(fill, theme.obstacle_edge, 0.5))
 
 
@@ -73,12 +73,12 @@ def _draw_start(canvas: Canvas, x: float, y: float) -> None:
 def _draw_robot(canvas: Canvas, x: float, y: float) -> None:
     theme = canvas.theme
     edge = mix(theme.background, theme.ink, 0.55)
-    colours = overlay.DiscColours(theme.robots[0], theme.robot_ring, edge)
-    overlay.draw_disc(canvas, (x, y), 6.5, colours, rim=1.4)
+    colors = overlay.DiscColors(theme.robots[0], theme.robot_ring, edge)
+    overlay.draw_disc(canvas, (x, y), 6.5, colors, rim=1.4)
 
 
 def _draw_hatch(canvas: Canvas, x: float, y: float, *, is_narrow: bool) -> None:
     size = round(12 * canvas.scale)
-    colour = canvas.theme.trajectory if is_narrow else canvas.theme.forces[CUT_OFF_FORCE]
-    page = draw_hatch_page(Rect(0, 0, size, size), colour, canvas.scale)
+    color = canvas.theme.trajectory if is_narrow else canvas.theme.forces[CUT_OFF_FORCE]
+    page = draw_hatch_page(Rect(0, 0, size, size), color, canvas.scale)
     canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))

@@ -19,7 +19,7 @@ MIN_NAME_GAIN = 1.2  # a second position for a name must be so much wider than t
 
 
 class NameSpace(NamedTuple):
-    """Space for the name of an obstacle: centre, width and height, m."""
+    """Space for the name of an obstacle: center, width and height, m."""
 
     x: float = 0.0
     y: float = 0.0

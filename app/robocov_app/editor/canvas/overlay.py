@@ -22,7 +22,7 @@ from robocov_app.editor.tools.tool import KNOB_HEIGHT_PX, DrawState, Handle
 from robocov_app.render import sprites
 from robocov_app.render.camera import FARTHEST_PIXEL
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.theme import Colour, Theme, mix
+from robocov_app.render.theme import Color, Theme, mix
 from robocov_app.toolkit.overlay import tag
 
 # Lengths in pixels at scale 1.
@@ -42,8 +42,8 @@ MAX_POLYGON_PX = 30_000  # coordinates that pygame fills polygons with
 MIN_LENGTH_PX = 1e-9
 
 
-class DiscColours(NamedTuple):
-    """Colours of a disc.
+class DiscColors(NamedTuple):
+    """Colors of a disc.
 
     Attributes
     ----------
@@ -51,13 +51,13 @@ class DiscColours(NamedTuple):
         Inside, the ring around it, and the thin line around the ring.
     """
 
-    fill: Colour
-    ring: Colour
-    edge: Colour
+    fill: Color
+    ring: Color
+    edge: Color
 
 
-def choose_problem_colour(theme: Theme, *, is_error: bool) -> Colour:
-    """Return the colour of an error or of a warning."""
+def choose_problem_color(theme: Theme, *, is_error: bool) -> Color:
+    """Return the color of an error or of a warning."""
     return theme.trajectory if is_error else theme.others[1]
 
 
@@ -74,33 +74,31 @@ def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
     Returns
     -------
     (k, 2) array
-        Positions, px. What has no position, such as the centre of an infinite box, is far away.
+        Positions, px. What has no position, such as the center of an infinite box, is far away.
     """
     coordinates = np.array(list(points), dtype=float).reshape(-1, 2)
     return np.nan_to_num(canvas.camera.to_pixels(coordinates), nan=-FARTHEST_PIXEL)
 
 
-def draw_ring(canvas: Canvas, at: Point, radius: float, colour: Colour, width: float) -> None:
+def draw_ring(canvas: Canvas, at: Point, radius: float, color: Color, width: float) -> None:
     """Draw a ring at a pixel; radius and width in px at scale 1."""
-    sprite = partial(sprites.ring, radius * canvas.scale, colour, width * canvas.scale)
+    sprite = partial(sprites.ring, radius * canvas.scale, color, width * canvas.scale)
     canvas.stamp(sprite, at)
 
 
 def draw_disc(
-    canvas: Canvas, at: Point, radius: float, colours: DiscColours, *, rim: float, text: str = ""
+    canvas: Canvas, at: Point, radius: float, colors: DiscColors, *, rim: float, text: str = ""
 ) -> None:
     """Draw a disc with a text at a pixel; radius and width of the rim in px at scale 1."""
     scale = canvas.scale
-    sprite = partial(
-        sprites.disc, radius * scale, colours.fill, colours.ring, rim * scale, colours.edge, text
-    )
+    sprite = partial(sprites.disc, radius * scale, colors.fill, colors.ring, rim * scale, colors.edge, text)
     canvas.stamp(sprite, at)
 
 
-def draw_dashes(canvas: Canvas, points: Iterable[sprites.Pixel], colour: Colour, dash: float = 4.0) -> None:
+def draw_dashes(canvas: Canvas, points: Iterable[sprites.Pixel], color: Color, dash: float = 4.0) -> None:
     """Draw a dashed line through pixels."""
     for start, end in pairwise(points):
-        canvas.dashes(start, end, colour, canvas.width(1.0), dash=dash)
+        canvas.dashes(start, end, color, canvas.width(1.0), dash=dash)
 
 
 def draw_handles(
@@ -127,7 +125,7 @@ def draw_handles(
         if handle.kind == "turn":
             canvas.line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.width(1.0))
             radius = 5.5 if is_large else 4.5
-            draw_disc(canvas, (x, y), radius, DiscColours(floor, accent, accent), rim=1.6)
+            draw_disc(canvas, (x, y), radius, DiscColors(floor, accent, accent), rim=1.6)
         elif handle.kind == "scale":
             _draw_square(canvas, (x, y), floor, is_large=is_large)
         else:
@@ -136,7 +134,7 @@ def draw_handles(
 
 
 def _draw_square(
-    canvas: Canvas, at: Point, fill: Colour, *, is_large: bool = False, is_rounded: bool = False
+    canvas: Canvas, at: Point, fill: Color, *, is_large: bool = False, is_rounded: bool = False
 ) -> None:
     half = HANDLE_HALF_PX * canvas.scale
     if is_large:
@@ -152,21 +150,21 @@ def _draw_square(
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
     """Draw the guides of a snap with their labels."""
-    colour = canvas.theme.forces["repulsion_obstacle"]
+    color = canvas.theme.forces["repulsion_obstacle"]
     labels: list[str] = []
     end: Point | None = None
     for guide in guides:
         line = to_pixels(canvas, guide.line).tolist()
-        draw_dashes(canvas, line, colour)
+        draw_dashes(canvas, line, color)
         if line:
             end = (line[-1][0], line[-1][1])
             if guide.kind in ("vertex", "middle", "centre", "crossing", "edge"):
-                draw_ring(canvas, end, 5.0, colour, 1.6)
+                draw_ring(canvas, end, 5.0, color, 1.6)
         if guide.kind != "grid" and guide.label not in labels:
             labels.append(guide.label)
     if end is not None and labels:
         position = (end[0] + 11 * canvas.scale, end[1] + 15 * canvas.scale)
-        canvas.text(" · ".join(labels), position, size=canvas.theme.small_text, colour=colour)
+        canvas.text(" · ".join(labels), position, size=canvas.theme.small_text, color=color)
 
 
 def draw_start(
@@ -205,24 +203,24 @@ def draw_start(
     else:
         return
     if label:
-        colour = mix(theme.start, theme.ink, 0.45)
-        canvas.text(label, label_position, size=theme.small_text, colour=colour, anchor=anchor)
+        color = mix(theme.start, theme.ink, 0.45)
+        canvas.text(label, label_position, size=theme.small_text, color=color, anchor=anchor)
 
 
-def _draw_circle(canvas: Canvas, centre: Point, radius: float, width: float) -> None:
-    """Draw the circle of a start; centre and radius in px, width in px at scale 1."""
-    colour = canvas.theme.start
+def _draw_circle(canvas: Canvas, center: Point, radius: float, width: float) -> None:
+    """Draw the circle of a start; center and radius in px, width in px at scale 1."""
+    color = canvas.theme.start
     if radius < MAX_SPRITE_RADIUS_PX:
-        sprite = partial(sprites.ring, round(2 * radius) / 2, colour, width * canvas.scale)
-        canvas.stamp(sprite, centre)
+        sprite = partial(sprites.ring, round(2 * radius) / 2, color, width * canvas.scale)
+        canvas.stamp(sprite, center)
         return
     sides = int(min(radius, MAX_CIRCLE_SIDES))
     angles = np.arange(sides) * (2 * np.pi / sides)
-    corners = centre + radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    canvas.outline(corners, colour, canvas.width(width))
+    corners = center + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    canvas.outline(corners, color, canvas.width(width))
 
 
-def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
+def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
     """Draw the path of a moving obstacle with an arrow on each leg."""
     points = to_pixels(canvas, path.points)
     legs = list(pairwise(points))
@@ -231,13 +229,13 @@ def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
     for number, (start, end) in enumerate(legs):
         is_closing = number == len(points) - 1
         width = canvas.width(1.0 if is_closing else 1.6)
-        canvas.dashes(start.tolist(), end.tolist(), colour, width, dash=4.0)
-        _draw_arrow(canvas, start, end, colour)
+        canvas.dashes(start.tolist(), end.tolist(), color, width, dash=4.0)
+        _draw_arrow(canvas, start, end, color)
     for point in points.tolist():
-        canvas.stamp(partial(sprites.dot, 2.5 * canvas.scale, colour), point)
+        canvas.stamp(partial(sprites.dot, 2.5 * canvas.scale, color), point)
 
 
-def _draw_arrow(canvas: Canvas, start: Array, end: Array, colour: Colour) -> None:
+def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
     """Draw an arrow in the middle of a leg, unless it is too short."""
     scale = canvas.scale
     length = float(np.hypot(*(end - start)))
@@ -248,7 +246,7 @@ def _draw_arrow(canvas: Canvas, start: Array, end: Array, colour: Colour) -> Non
     tip = (start + end) / 2 + 4 * scale * along
     for side in (1.0, -1.0):
         wing = tip - 7 * scale * along + side * 4 * scale * across
-        canvas.line(tip.tolist(), wing.tolist(), colour, canvas.width(1.6))
+        canvas.line(tip.tolist(), wing.tolist(), color, canvas.width(1.6))
 
 
 def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
@@ -308,7 +306,7 @@ def _draw_preview_line(canvas: Canvas, state: DrawState) -> None:
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
     """Write the length of each edge next to it, except for the last edge, which follows the cursor."""
-    colour = mix(canvas.theme.background, canvas.theme.ink, 0.85)
+    color = mix(canvas.theme.background, canvas.theme.ink, 0.85)
     size = canvas.theme.small_text
     for start, end in list(pairwise(line[:-1]))[-MAX_EDGE_LABELS:]:
         start_pixel, end_pixel = to_pixels(canvas, (start, end))
@@ -324,7 +322,7 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
             across = -across
         offset = 9 * canvas.scale + abs(float(across[0])) * label_width / 2
         position = (start_pixel + end_pixel) / 2 + offset * across
-        canvas.text(label, position.tolist(), size=size, colour=colour, anchor="middle")
+        canvas.text(label, position.tolist(), size=size, color=color, anchor="middle")
 
 
 def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects_touched: bool) -> None:
@@ -333,16 +331,16 @@ def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects
     high = ends.max(axis=0)
     left, top, width, height = np.rint([*low, *(high - low)]).astype(int).tolist()
     box = Rect(left, top, width, height).clip(canvas.surface.get_clip())
-    colour = canvas.theme.start if selects_touched else canvas.theme.final
+    color = canvas.theme.start if selects_touched else canvas.theme.final
     if box:
         page = Surface(box.size, pygame.SRCALPHA, 32)
-        page.fill((*colour, 34))
+        page.fill((*color, 34))
         canvas.surface.blit(page, box)
     outline = shapely.get_coordinates(shapely.box(*low, *high, ccw=False))
     if selects_touched:
-        draw_dashes(canvas, outline.tolist(), colour)
+        draw_dashes(canvas, outline.tolist(), color)
     else:
-        canvas.outline(outline, colour, canvas.width(1.0), closed=False)
+        canvas.outline(outline, color, canvas.width(1.0), closed=False)
 
 
 def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
@@ -363,17 +361,17 @@ def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
     y = box.centery
     canvas.text(value, (box.left + 8 * scale, y), size=size, bold=True)
     hint_position = (box.right - 8 * scale, y)
-    canvas.text(hint, hint_position, size=theme.small_text, colour=theme.faint, anchor="right")
+    canvas.text(hint, hint_position, size=theme.small_text, color=theme.faint, anchor="right")
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
-    """Draw the narrowest gap: in the colour of errors if robots of a radius, m, do not pass."""
+    """Draw the narrowest gap: in the color of errors if robots of a radius, m, do not pass."""
     start, end, across = _locate_gap(canvas, gap)
-    colour = canvas.theme.trajectory if gap.width < 2 * radius else canvas.theme.start
+    color = canvas.theme.trajectory if gap.width < 2 * radius else canvas.theme.start
     for a, b in ((start, end), (start - across, start + across), (end - across, end + across)):
-        canvas.line(a.tolist(), b.tolist(), colour, canvas.width(2))
+        canvas.line(a.tolist(), b.tolist(), color, canvas.width(2))
     for point in (start, end):
-        canvas.stamp(partial(sprites.dot, 2.2 * canvas.scale, colour), point.tolist())
+        canvas.stamp(partial(sprites.dot, 2.2 * canvas.scale, color), point.tolist())
 
 
 def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None = None) -> None:
@@ -416,7 +414,7 @@ def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
 
 
 def place_badges(problems: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
-    """Return the problems that have a position, with the centres of their badges, px."""
+    """Return the problems that have a position, with the centers of their badges, px."""
     badges = []
     for problem in problems[:MAX_BADGES]:
         if problem.geometry is not None and not problem.geometry.is_empty:
@@ -440,10 +438,10 @@ def draw_problems(
             _draw_problem_outline(canvas, problem)
     badges = place_badges(problems, view)
     for problem, (x, y) in reversed(badges):
-        colour = choose_problem_colour(canvas.theme, is_error=problem.is_error)
+        color = choose_problem_color(canvas.theme, is_error=problem.is_error)
         foot = y + STEM_PX * canvas.scale
-        canvas.line((x, y), (x, foot), colour, canvas.width(1.5))
-        canvas.stamp(partial(sprites.dot, 1.8 * canvas.scale, colour), (x, foot))
+        canvas.line((x, y), (x, foot), color, canvas.width(1.5))
+        canvas.stamp(partial(sprites.dot, 1.8 * canvas.scale, color), (x, foot))
         draw_badge(canvas, x, y, is_error=problem.is_error)
     only_error = problems[0] if len(problems) == 1 and problems[0].is_error else None
     for problem, position in badges:
@@ -454,7 +452,7 @@ def draw_problems(
 
 
 def _draw_problem_outline(canvas: Canvas, problem: Problem) -> None:
-    colour = choose_problem_colour(canvas.theme, is_error=problem.is_error)
+    color = choose_problem_color(canvas.theme, is_error=problem.is_error)
     for part in shapely.get_parts(problem.geometry):
         lines = [part]
         if isinstance(part, shapely.Polygon):
@@ -462,7 +460,7 @@ def _draw_problem_outline(canvas: Canvas, problem: Problem) -> None:
         for line in lines:
             points = canvas.camera.to_pixels(shapely.get_coordinates(line))
             if len(points) > 1:
-                canvas.outline(points, colour, canvas.width(2), closed=False)
+                canvas.outline(points, color, canvas.width(2), closed=False)
 
 
 def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> None:
@@ -479,9 +477,9 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
 def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: bool = False) -> None:
     """Draw the badge of a problem at a pixel."""
     theme = canvas.theme
-    fill = choose_problem_colour(theme, is_error=is_error)
-    colours = DiscColours(fill, theme.background, mix(fill, theme.ink, 0.3))
+    fill = choose_problem_color(theme, is_error=is_error)
+    colors = DiscColors(fill, theme.background, mix(fill, theme.ink, 0.3))
     if is_small:
-        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colours, rim=1.0, text="!")
+        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colors, rim=1.0, text="!")
     else:
-        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colours, rim=1.4, text="!")
+        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colors, rim=1.4, text="!")

@@ -110,13 +110,13 @@ class ReferenceImage:
 
 
 def _convert_to_rgb(picture: Image.Image) -> Image.Image:
-    """Return a picture in RGB: transparent ones on white, grey values of any range stretched."""
+    """Return a picture in RGB: transparent ones on white, gray values of any range stretched."""
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         transparent = picture.convert("RGBA")
         white = Image.new("RGBA", transparent.size, "white")
         return Image.alpha_composite(white, transparent).convert("RGB")
     if picture.mode.startswith("I") or picture.mode == "F":
         values = np.asarray(picture, dtype=float)
-        grey = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
-        return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
+        gray = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
+        return Image.fromarray(gray.astype(np.uint8)).convert("RGB")
     return picture.convert("RGB")

@@ -11,14 +11,14 @@ from pygame import Rect, Surface
 from robocov.arrays import Array
 from robocov_app.editor.canvas.outlines import Outline, Outlines
 from robocov_app.editor.canvas.reference_image import ReferenceImage
-from robocov_app.editor.canvas.view import View, choose_outside_colour, compute_pixel_box
+from robocov_app.editor.canvas.view import View, choose_outside_color, compute_pixel_box
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render import fonts, heatmaps
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import LIGHT, Colour, mix
+from robocov_app.render.theme import LIGHT, Color, mix
 
 # Lengths in pixels at scale 1.
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
@@ -150,7 +150,7 @@ class Sheet:
         page.set_clip(box)
         theme = view.theme
         canvas = view.build_canvas(page)
-        page.fill(choose_outside_colour(theme), box)
+        page.fill(choose_outside_color(theme), box)
         boundary = None
         if sketch.boundary is not None and len(sketch.boundary) > 2:
             boundary = view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
@@ -180,7 +180,7 @@ class Sheet:
         """Draw what robots take for free although it lies outside the boundary: their hull contains it."""
         theme = canvas.theme
         excess = self._hull_excess.of(sketch.boundary, None, lambda: compute_hull_excess(sketch))
-        fill = mix(choose_outside_colour(theme), theme.obstacle, 0.55)
+        fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
         for part in shapely.get_parts(excess):
             if isinstance(part, shapely.Polygon):
                 corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
@@ -197,9 +197,9 @@ class Sheet:
         canvas.surface.blit(layer, box)
 
     def draw_items(
-        self, canvas: Canvas, items: list[Item], fill: Colour | None = None, edge: Colour | None = None
+        self, canvas: Canvas, items: list[Item], fill: Color | None = None, edge: Color | None = None
     ) -> None:
-        """Draw obstacles, by default in the colours of the theme."""
+        """Draw obstacles, by default in the colors of the theme."""
         fill = fill or canvas.theme.obstacle
         edge = edge or canvas.theme.obstacle_edge
         outlines = [self.outlines.get(item) for item in items]
@@ -207,7 +207,7 @@ class Sheet:
         if rings:
             ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
             corners = canvas.camera.to_pixels(np.concatenate(rings))
-            fills: list[Colour | None] = []
+            fills: list[Color | None] = []
             for outline in outlines:
                 fills += [None if outline.has_holes else fill] * len(outline.rings)
             canvas.polygons(corners, ends, fills)
@@ -224,7 +224,7 @@ class Sheet:
     def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
         """Write the names of obstacles that are large enough."""
         size = canvas.text_size(canvas.theme.small_text)
-        colour = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
+        color = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
         zoom = canvas.camera.zoom
         for item in items:
             name = item.shape.name
@@ -237,8 +237,8 @@ class Sheet:
             text = fonts.shortened(name, size, width)
             is_readable = text == name or len(text) > MIN_LABEL_CHARACTERS
             if space.height * zoom > size + 2 and is_readable:
-                centre = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
-                canvas.text(text, centre, size=canvas.theme.small_text, colour=colour, anchor="middle")
+                center = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
+                canvas.text(text, center, size=canvas.theme.small_text, color=color, anchor="middle")
 
 
 def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:
@@ -298,7 +298,7 @@ def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) ->
     _draw_grid_lines(page, view, box, coarse_step, mix(theme.background, theme.grid, coarse_share))
 
 
-def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, colour: Colour) -> None:
+def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, color: Color) -> None:
     low_x, low_y, high_x, high_y = view.camera.visible()
     width = max(1, round(view.scale))
     xs = np.arange(np.ceil(low_x / step), np.floor(high_x / step) + 1) * step
@@ -306,9 +306,9 @@ def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, colour: 
     columns = view.camera.to_pixels(np.column_stack([xs, np.zeros(len(xs))]))[:, 0]
     rows = view.camera.to_pixels(np.column_stack([np.zeros(len(ys)), ys]))[:, 1]
     for x in columns[(columns >= box.left - 2) & (columns <= box.right + 2)].tolist():
-        page.fill(colour, Rect(round(x - width / 2), box.top, width, box.height))
+        page.fill(color, Rect(round(x - width / 2), box.top, width, box.height))
     for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
-        page.fill(colour, Rect(box.left, round(y - width / 2), box.width, width))
+        page.fill(color, Rect(box.left, round(y - width / 2), box.width, width))
 
 
 def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
@@ -343,7 +343,7 @@ def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, f
     return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
 
 
-def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Colour) -> None:
+def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
     """Fill an obstacle on a page of its own, so that what lies below is visible through the holes."""
     clip = canvas.surface.get_clip()
     page = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
@@ -353,13 +353,13 @@ def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Colour) -> None:
     canvas.surface.blit(page.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
+def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -> None:
     """Draw closed lines; the (k, 2) corners, px, of all lines follow each other, and `ends` divides them."""
     width = canvas.width(canvas.theme.line)
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
         for start, end in pairwise((0, *ends)):
             if end - start > 1:
-                pygame.draw.aalines(canvas.surface, colour, True, corners[start:end].tolist())
+                pygame.draw.aalines(canvas.surface, color, True, corners[start:end].tolist())
         return
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
@@ -370,7 +370,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour)
     high = np.maximum(edges[:, :2], edges[:, 2:])
     is_visible = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
     is_visible &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
-    canvas.segments(edges[is_visible], colour, width)
+    canvas.segments(edges[is_visible], color, width)
 
 
 def _merge_boxes(boxes: list[Rect]) -> list[Rect]:

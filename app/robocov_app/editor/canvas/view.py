@@ -10,7 +10,7 @@ from pygame import Rect, Surface
 
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
+from robocov_app.render.theme import LIGHT, Color, Theme, mix, robot_hues
 
 MAX_RECT_PX = 30_000  # coordinates of rectangles are limited to this
 
@@ -24,7 +24,7 @@ class View:
     camera : Camera
         Position and magnification.
     theme : Theme
-        Colours.
+        Colors.
     scale : float
         Scale of the window.
     size : tuple of int
@@ -59,8 +59,8 @@ class View:
         return self.build_canvas(Surface(self.size, pygame.SRCALPHA, 32))
 
 
-def choose_outside_colour(theme: Theme) -> Colour:
-    """Return the colour of the sheet outside the boundary."""
+def choose_outside_color(theme: Theme) -> Color:
+    """Return the color of the sheet outside the boundary."""
     if theme is LIGHT:
         return mix(theme.panel, theme.ink, 0.05)
     return mix(theme.background, (0, 0, 0), 0.28)

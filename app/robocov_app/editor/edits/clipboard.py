@@ -10,7 +10,7 @@ from robocov.mapfile import dump_document
 from robocov.mapfile.models import HEADER
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import compute_centre
+from robocov_app.editor.model.geometry import compute_center
 from robocov_app.editor.model.parser import build_sketch
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, to_document
@@ -42,7 +42,7 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
     text : str
         The copied text.
     position : Point, optional
-        Where the centre of what is pasted goes, m; by default it stays where it was.
+        Where the center of what is pasted goes, m; by default it stays where it was.
     grid : float, optional
         The displacement is a multiple of this, m.
 
@@ -78,11 +78,11 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
 def _compute_displacement(
     sketch: Sketch, selection: Selection, position: Point | None, grid: float | None
 ) -> tuple[float, float]:
-    """Return the displacement, m, that brings the centre of a selection to a position."""
+    """Return the displacement, m, that brings the center of a selection to a position."""
     bounds = transform.compute_bounds(sketch, selection)
     if position is None or bounds is None:
         return 0.0, 0.0
-    x, y = compute_centre(bounds)
+    x, y = compute_center(bounds)
     dx = position[0] - x
     dy = position[1] - y
     if grid:

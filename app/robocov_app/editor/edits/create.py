@@ -51,7 +51,7 @@ def add_rectangle(sketch: Sketch, points: Sequence[Point]) -> Change:
 
 
 def add_circle(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Add a circle with a centre and radius, m."""
+    """Add a circle with a center and radius, m."""
     return add_obstacle(sketch, env.CircleObstacle(check_point(center), _check_radius(radius, "a circle")))
 
 
@@ -73,7 +73,7 @@ def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
 
 
 def add_disc_start(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Add a start that is a disc with a centre and radius, m."""
+    """Add a start that is a disc with a center and radius, m."""
     return _add_start(sketch, env.DiscStart(check_point(center), _check_radius(radius, "a start")))
 
 
@@ -172,7 +172,7 @@ def _check_radius(radius: float, label: str) -> float:
 
 
 def find_wall(sketch: Sketch, point: Point, reach: float) -> int | None:
-    """Return the key of the wall within `reach` metres of a point."""
+    """Return the key of the wall within `reach` meters of a point."""
     for key in find_obstacles(sketch, point, reach):
         if isinstance(sketch.get_item(key).shape, env.WallObstacle):
             return key
@@ -189,7 +189,7 @@ def compute_door_ends(sketch: Sketch, key: int, point: Point, width: float) -> t
     key : int
         Key of the wall.
     point : Point
-        The centre of the door is as near to this as the wall allows, m.
+        The center of the door is as near to this as the wall allows, m.
     width : float
         Width of the door, m.
     """
@@ -253,8 +253,8 @@ def _build_wall_line(sketch: Sketch, key: int) -> shapely.LineString:
 def _compute_door_span(line: shapely.LineString, point: Point, width: float) -> tuple[float, float]:
     """Return the lengths along a line, m, between which a door lies."""
     nearest = line.project(shapely.Point(point))
-    centre = min(max(nearest, width / 2), line.length - width / 2)
-    return centre - width / 2, centre + width / 2
+    center = min(max(nearest, width / 2), line.length - width / 2)
+    return center - width / 2, center + width / 2
 
 
 def _interpolate(line: shapely.LineString, length: float) -> Point:

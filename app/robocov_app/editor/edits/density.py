@@ -41,7 +41,7 @@ def compute_spread(peak: Gaussian) -> float:
 
 
 def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
-    """Add a hot spot with a centre and standard deviation, m; without a density, to one of 1 everywhere."""
+    """Add a hot spot with a center and standard deviation, m; without a density, to one of 1 everywhere."""
     if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.is_uniform:
         raise _build_kind_error(sketch.density, ", hot spots are not")
     peak = Gaussian(check_point(center), _check_weight(weight, MIN_PEAK_WEIGHT), _check_sigma(sigma))

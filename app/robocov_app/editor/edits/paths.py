@@ -13,7 +13,7 @@ from robocov.mapfile.models import MAX_SPEED_M_S, MIN_SIZE_M, MIN_SPEED_M_S
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
     check_point,
-    compute_centre,
+    compute_center,
     find_nearest_on_edges,
     to_array,
 )
@@ -44,7 +44,7 @@ def add_waypoint(
     sketch : Sketch
         The map.
     key : int
-        Key of the obstacle. Without a path, it gets one from its centre to the point.
+        Key of the obstacle. Without a path, it gets one from its center to the point.
     point : Point
         The waypoint, m.
     index : int, optional
@@ -56,7 +56,7 @@ def add_waypoint(
     path = item.shape.path
     if path is None:
         require(not item.geometry.is_empty, "what covers nothing cannot move")
-        ends = (check_point(compute_centre(item.geometry.bounds)), check_point(point))
+        ends = (check_point(compute_center(item.geometry.bounds)), check_point(point))
         return _set_path(sketch, key, ObstaclePath(ends, _check_speed(speed), "back-and-forth"), "moves")
     if index is None:
         index = len(path.points)
@@ -109,14 +109,14 @@ def parse_speed(text: str) -> float:
 
 
 def find_waypoint(path: ObstaclePath, point: Point, reach: float) -> int | None:
-    """Return the index of the waypoint within `reach` metres of a point."""
+    """Return the index of the waypoint within `reach` meters of a point."""
     points = to_array(path.points)
     _, gaps = find_nearest_on_edges(points, points, point)
     return _find_nearest(gaps, reach)
 
 
 def find_leg(path: ObstaclePath, point: Point, reach: float) -> int | None:
-    """Return the index at which a waypoint is inserted into the leg within `reach` metres of a point."""
+    """Return the index at which a waypoint is inserted into the leg within `reach` meters of a point."""
     points = to_array(path.points)
     if path.repeat == "loop":
         points = to_array([*path.points, *path.points[:1]])

@@ -145,7 +145,7 @@ def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
 
 
 def _check_size(name: str, size: float) -> float:
-    """Return a size to the tenth of a millimetre, m; raise MapError if it is not possible."""
+    """Return a size to the tenth of a millimeter, m; raise MapError if it is not possible."""
     is_possible = MIN_SIZE_M <= size <= MAX_SIZE_M
     require(is_possible, f"expected a {name} of at least {1000 * MIN_SIZE_M:g} mm")
     return round_length(size)

@@ -17,14 +17,14 @@ from robocov_app.editor.edits.create import add_objects
 from robocov_app.editor.edits.vertices import place_vertices
 from robocov_app.editor.model import geometry, require
 from robocov_app.editor.model.background import rotate_background
-from robocov_app.editor.model.geometry import Box, compute_centre, enclose_boxes, round_length
+from robocov_app.editor.model.geometry import Box, compute_center, enclose_boxes, round_length
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]
 SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
-"""Left, centre and right move along x; top, middle and bottom along y."""
+"""Left, center and right move along x; top, middle and bottom along y."""
 
 ALONG_X = SIDES[:3]
 MAX_COPIES = 10_000
@@ -37,7 +37,7 @@ MIN_RESIZE_FACTOR = 1e-9
 
 @dataclass(frozen=True)
 class Affine:
-    """The map from (x, y) to (xx x + xy y + x0, yx x + yy y + y0), rounded to tenths of a millimetre.
+    """The map from (x, y) to (xx x + xy y + x0, yx x + yy y + y0), rounded to tenths of a millimeter.
 
     Attributes
     ----------
@@ -153,21 +153,21 @@ def move(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
 
 
 def rotate(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
-    """Turn the selection counter-clockwise about a point, m, by default the centre of its box."""
+    """Turn the selection counter-clockwise about a point, m, by default the center of its box."""
     require(math.isfinite(degrees), "expected an angle in degrees")
-    centre = about or _compute_centre(sketch, selection)
-    return _transform(sketch, selection, Affine.turn(degrees, centre), "turned")
+    center = about or _compute_center(sketch, selection)
+    return _transform(sketch, selection, Affine.turn(degrees, center), "turned")
 
 
 def scale(
     sketch: Sketch, selection: Selection, factor_x: float, factor_y: float, about: Point | None = None
 ) -> Change:
-    """Scale the selection about a point, m, by default the centre of its box; factors below 0 mirror."""
+    """Scale the selection about a point, m, by default the center of its box; factors below 0 mirror."""
     for factor in (factor_x, factor_y):
         if not MIN_SIZE_M / MAX_SIZE_M <= abs(factor) <= MAX_SIZE_M / MIN_SIZE_M:
             raise MapError("expected a factor that is not 0")
-    centre = about or _compute_centre(sketch, selection)
-    return _transform(sketch, selection, Affine.stretch(factor_x, factor_y, centre), "scaled")
+    center = about or _compute_center(sketch, selection)
+    return _transform(sketch, selection, Affine.stretch(factor_x, factor_y, center), "scaled")
 
 
 def resize(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
@@ -226,10 +226,10 @@ def place(sketch: Sketch, selection: Selection, x: float | None, y: float | None
 
 
 def mirror(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
-    """Mirror the selection about the centre of its box: "x" swaps left and right, "y" up and down."""
+    """Mirror the selection about the center of its box: "x" swaps left and right, "y" up and down."""
     require(axis in ("x", "y"), "expected an axis x or y")
     factor_x, factor_y = (-1.0, 1.0) if axis == "x" else (1.0, -1.0)
-    affine = Affine.stretch(factor_x, factor_y, _compute_centre(sketch, selection))
+    affine = Affine.stretch(factor_x, factor_y, _compute_center(sketch, selection))
     return _transform(sketch, selection, affine, "mirrored")
 
 
@@ -386,10 +386,10 @@ def _list_boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
 
 
 def _compute_level(box: Box, side: Side) -> float:
-    """Return the coordinate of a side of a box, or of its centre, m."""
+    """Return the coordinate of a side of a box, or of its center, m."""
     axis = 0 if side in ALONG_X else 1
     if side in ("centre", "middle"):
-        return compute_centre(box)[axis]
+        return compute_center(box)[axis]
     return box[axis] if side in ("left", "bottom") else box[axis + 2]
 
 
@@ -433,5 +433,5 @@ def _require_bounds(sketch: Sketch, selection: Selection) -> Box:
     return require(compute_bounds(sketch, selection), "select something first")
 
 
-def _compute_centre(sketch: Sketch, selection: Selection) -> Point:
-    return geometry.round_point(compute_centre(_require_bounds(sketch, selection)))
+def _compute_center(sketch: Sketch, selection: Selection) -> Point:
+    return geometry.round_point(compute_center(_require_bounds(sketch, selection)))

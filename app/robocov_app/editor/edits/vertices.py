@@ -79,7 +79,7 @@ def move_vertices(sketch: Sketch, selection: Selection, dx: float, dy: float) ->
 
 
 def place_vertices(sketch: Sketch, positions: Mapping[Vertex, Point]) -> Sketch:
-    """Place vertices at positions, m; the centre of a circle moves it, its rim sets the radius."""
+    """Place vertices at positions, m; the center of a circle moves it, its rim sets the radius."""
     positions_by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
     for vertex, position in positions.items():
         # Raises if the vertex has gone.
@@ -100,7 +100,7 @@ def place_vertices(sketch: Sketch, positions: Mapping[Vertex, Point]) -> Sketch:
 def _reshape_circle(
     circle: env.CircleObstacle | env.DiscStart, positions: Mapping[Vertex, Point]
 ) -> env.CircleObstacle | env.DiscStart:
-    """Return a circle with its centre at a position, or else with its rim through one."""
+    """Return a circle with its center at a position, or else with its rim through one."""
     vertex = min(positions, key=lambda vertex: vertex.index)
     position = check_point(positions[vertex])
     if vertex.index == 0:
@@ -181,7 +181,7 @@ def bevel_corners(sketch: Sketch, selection: Selection, length: float) -> Change
 
 
 def round_corners(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Round the selected corners with a radius, m, by arcs that touch both edges, to a millimetre."""
+    """Round the selected corners with a radius, m, by arcs that touch both edges, to a millimeter."""
     require(0.0 < radius < math.inf, "expected a radius above 0 m")
 
     def compute_cut(turn: float) -> CornerCut:
@@ -231,10 +231,10 @@ def _compute_cuts(
         if turn >= MIN_CORNER_RAD:
             cuts[index] = compute_cut(turn)
     for index, cut in cuts.items():
-        for neighbour in ((index - 1) % count, (index + 1) % count):
-            edge_length = math.dist(ring[index], ring[neighbour])
-            has_both = neighbour in cuts
-            required = cut.length + (cuts[neighbour].length if has_both else 0.0)
+        for neighbor in ((index - 1) % count, (index + 1) % count):
+            edge_length = math.dist(ring[index], ring[neighbor])
+            has_both = neighbor in cuts
+            required = cut.length + (cuts[neighbor].length if has_both else 0.0)
             if required > edge_length + _EDGE_TOLERANCE_M:
                 reason = " for the corners at both ends" if has_both else ""
                 lengths = f"{round_length(required):g} m of an edge that is {round_length(edge_length):g} m"
@@ -242,7 +242,7 @@ def _compute_cuts(
     return cuts
 
 
-def _list_neighbours(ring: Ring, index: int) -> tuple[complex, complex, complex]:
+def _list_neighbors(ring: Ring, index: int) -> tuple[complex, complex, complex]:
     """Return the vertex before a corner, the corner, and the vertex after it as complex numbers."""
     count = len(ring)
     before = complex(*ring[(index - 1) % count])
@@ -252,17 +252,17 @@ def _list_neighbours(ring: Ring, index: int) -> tuple[complex, complex, complex]
 
 def _compute_turn(ring: Ring, index: int) -> float:
     """Return the angle by which a ring turns at a vertex to either side, rad; 0 at edges without length."""
-    before, corner, after = _list_neighbours(ring, index)
+    before, corner, after = _list_neighbors(ring, index)
     return abs(cmath.phase((after - corner) * (corner - before).conjugate()))
 
 
 def _build_arc(ring: Ring, index: int, cut: CornerCut) -> Array:
     """Return the (segments + 1, 2) points, m, of the arc that touches both edges in place of a corner."""
-    before, corner, after = _list_neighbours(ring, index)
+    before, corner, after = _list_neighbors(ring, index)
     backwards = (before - corner) / abs(before - corner)
     forwards = (after - corner) / abs(after - corner)
     half_angle = cmath.phase(forwards / backwards) / 2.0
-    # The centre is on the bisector, where the normals at both ends meet.
+    # The center is on the bisector, where the normals at both ends meet.
     bisector = (backwards + forwards) / abs(backwards + forwards)
     center = corner + cut.length / math.cos(half_angle) * bisector
     first_spoke = cut.length * backwards + corner - center
@@ -411,7 +411,7 @@ def _simplify_ring(ring: Ring, tolerance: float, is_closed: bool) -> Ring:
         return ring
     if not is_closed:
         return tuple(LineString(ring).simplify(tolerance, preserve_topology=False).coords)
-    # Start at a vertex that stays: the one farthest from the centre is a corner of the convex hull.
+    # Start at a vertex that stays: the one farthest from the center is a corner of the convex hull.
     points = np.array(ring)
     first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())
     line = LineString([*ring[first:], *ring[: first + 1]])

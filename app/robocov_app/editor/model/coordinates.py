@@ -22,8 +22,8 @@ _FEET_AND_INCHES = re.compile(rf"({_NUMBER})\s*'\s*({_NUMBER})\s*\"")
 _ANGLE = re.compile(rf"({_NUMBER})\s*(°|deg|rad|)")
 _TYPOGRAPHIC_SIGNS = str.maketrans("−–″”′’∠", "--\"\"''<")
 _LENGTH_HELP = "type a length, such as 3.2, 120cm or 12'6\""
-_POINT_HELP = "type x and y in metres, such as 3.2 1.5, relative as +0.5 0 or @2<45"
-_SIZE_HELP = "type width and height in metres, such as 3 x 2"
+_POINT_HELP = "type x and y in meters, such as 3.2 1.5, relative as +0.5 0 or @2<45"
+_SIZE_HELP = "type width and height in meters, such as 3 x 2"
 _ANGLE_HELP = "type an angle in degrees, such as 45"
 
 

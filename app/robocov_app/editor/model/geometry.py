@@ -1,4 +1,4 @@
-"""Points, angles and outlines, to a tenth of a millimetre and within the reach of maps."""
+"""Points, angles and outlines, to a tenth of a millimeter and within the reach of maps."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -16,17 +16,17 @@ from robocov_app.editor.model import require
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
 SHIFT_ANGLE_DEG = 15.0  # degrees: with Shift, lines are drawn at multiples of this
-DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimetre
+DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimeter
 distance = math.dist
 
 
 def round_length(length: float) -> float:
-    """Return a length to a tenth of a millimetre, never minus zero."""
+    """Return a length to a tenth of a millimeter, never minus zero."""
     return round(float(length), DECIMALS) + 0.0
 
 
 def round_point(point: Iterable[float]) -> Point:
-    """Return a point to a tenth of a millimetre."""
+    """Return a point to a tenth of a millimeter."""
     x, y = point
     return round_length(x), round_length(y)
 
@@ -37,7 +37,7 @@ def to_array(points: Sequence[Point] | Array) -> Array:
 
 
 def round_ring(points: Sequence[Point] | Array) -> Ring:
-    """Return points to a tenth of a millimetre; raise MapError if any is beyond the reach of maps."""
+    """Return points to a tenth of a millimeter; raise MapError if any is beyond the reach of maps."""
     found = to_array(points)
     limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
     require(
@@ -47,7 +47,7 @@ def round_ring(points: Sequence[Point] | Array) -> Ring:
 
 
 def check_point(point: Point) -> Point:
-    """Return a point to a tenth of a millimetre; raise MapError if it is beyond the reach of maps."""
+    """Return a point to a tenth of a millimeter; raise MapError if it is beyond the reach of maps."""
     return round_ring([point])[0]
 
 
@@ -113,8 +113,8 @@ def build_rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
     return a, (b[0], a[1]), b, (a[0], b[1])
 
 
-def compute_centre(box: Box) -> Point:
-    """Return the centre of a box, m."""
+def compute_center(box: Box) -> Point:
+    """Return the center of a box, m."""
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
 
 
@@ -125,7 +125,7 @@ def enclose_boxes(boxes: Iterable[Box]) -> Box:
 
 
 def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
-    """Return the polygons of a geometry to a tenth of a millimetre, the largest first, without tiny ones."""
+    """Return the polygons of a geometry to a tenth of a millimeter, the largest first, without tiny ones."""
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
@@ -149,11 +149,11 @@ def format_bearing(a: Point, b: Point) -> str:
     return f"{format_length(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
 
 
-def format_length(metres: float) -> str:
+def format_length(meters: float) -> str:
     """Format a length: "2.3 cm", "12.35 m", "1234.5 m"."""
-    if metres < 0.1:
-        return f"{100 * metres:.1f} cm"
-    return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"
+    if meters < 0.1:
+        return f"{100 * meters:.1f} cm"
+    return f"{meters:.2f} m" if meters < 1000 else f"{meters:.1f} m"
 
 
 def format_point(point: Point) -> str:

@@ -52,7 +52,7 @@ def find_owners(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]
 
 
 def _is_near_start(start: StartSpec, point: Point, reach: float) -> bool:
-    """Return whether the centre or rim of a disc, or a position, is within `reach` metres."""
+    """Return whether the center or rim of a disc, or a position, is within `reach` meters."""
     if isinstance(start, DiscStart):
         distance = math.dist(point, start.center)
         return distance <= reach or abs(distance - start.radius) <= reach
@@ -68,7 +68,7 @@ def find_obstacles(sketch: Sketch, point: Point, reach: float) -> list[int]:
 
 
 def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
-    """Return the nearest edge of some objects within `reach` metres of a point."""
+    """Return the nearest edge of some objects within `reach` meters of a point."""
     searched = list(owners)
     if len(searched) > MANY_OBJECTS:
         near = {item.key for item in _list_items_near(sketch, point, reach)}
@@ -148,7 +148,7 @@ def _is_in_box(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray
 
 
 def _list_items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
-    """Return the obstacles whose bounding boxes are within `reach` metres, from the bottom to the top."""
+    """Return the obstacles whose bounding boxes are within `reach` meters, from the bottom to the top."""
     x, y = point
     near = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
     return [sketch.obstacles[index] for index in sorted(near.tolist())]

@@ -10,14 +10,14 @@ from shapely import LineString, MultiPolygon, Polygon
 from robocov.arrays import Array, IntArray
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, find_narrowest_gap
-from robocov_app.editor.model.geometry import compute_centre
+from robocov_app.editor.model.geometry import compute_center
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, find_problems, format_position
 from robocov_app.jobs.messages import Line, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 
-_TOUCHING = 1e-5  # metres within which an edge lies on a wall
-_EXACTLY = 1e-6  # metres by which a gap may be narrower than a robot that passes: it fits where it just fits
+_TOUCHING = 1e-5  # meters within which an edge lies on a wall
+_EXACTLY = 1e-6  # meters by which a gap may be narrower than a robot that passes: it fits where it just fits
 _MOST_GAPS = 20  # gaps that are told of one by one
 
 
@@ -72,8 +72,8 @@ def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geom
     Never touched are passages and niches too narrow for it, but no crumbs in corners, which touch the rest in
     one arc and lie within the radius of it. Right to about a hundredth of the radius.
     """
-    centres = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
-    swept = sorted((part.buffer(radius) & free for part in centres), key=lambda part: -part.area)
+    centers = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
+    swept = sorted((part.buffer(radius) & free for part in centers), key=lambda part: -part.area)
     opened = shapely.union_all(swept)
     left = free - opened.buffer(MAX_SAGITTA_M / 2)
     parts = np.array([part for part in _polygons(left) if part.area > 0.0], dtype=object)
@@ -110,7 +110,7 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
 
 
 def _middle(gap: Gap) -> Point:
-    return compute_centre((*gap.between[0], *gap.between[1]))
+    return compute_center((*gap.between[0], *gap.between[1]))
 
 
 def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:

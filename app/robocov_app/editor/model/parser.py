@@ -103,7 +103,7 @@ class _Reader:
 
     def point(self, value: Any, path: JsonPath) -> Point:
         if not isinstance(value, list | tuple) or len(value) != 2:
-            self.refuse(path, f"expected a point [x, y] in metres, got {quote_json(value)}")
+            self.refuse(path, f"expected a point [x, y] in meters, got {quote_json(value)}")
         x, y = value
         if type(x) is float and type(y) is float:  # most of a large file: no path for each
             return x, y

@@ -23,7 +23,7 @@ class Vertex:
     ring : int
         0 for the outline or a wall's line; 1, 2, ... for the holes of a polygon.
     index : int
-        Index in the ring. Of a circle, 0 is the centre and 1 to 4 its rim in the east, north, west and south.
+        Index in the ring. Of a circle, 0 is the center and 1 to 4 its rim in the east, north, west and south.
     """
 
     owner: Owner

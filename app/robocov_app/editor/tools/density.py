@@ -111,14 +111,14 @@ class DensityTool(Tool):
         self.weight = weight
 
     def build_draw_state(self, context: Workspace) -> DrawState:
-        """Return outlines, centres and corners of all features, and the weight of the chosen one."""
+        """Return outlines, centers and corners of all features, and the weight of the chosen one."""
         sketch = context.sketch if self.change is None else self.change.sketch
         pending = None if self.change is None else sketch
         features = density.list_features(sketch)
         label = self._build_label(features)
         if not features and not label:
             return DrawState(pending=pending)
-        dots = [_find_centre(feature) for feature in features]
+        dots = [_find_center(feature) for feature in features]
         for feature in features:
             if isinstance(feature, WeightedArea):
                 dots += feature.vertices
@@ -166,10 +166,10 @@ class DensityTool(Tool):
 
 
 def _find_feature(features: tuple[density.Feature, ...], event: PointerEvent) -> _Hit:
-    """Return what is under the pointer: centres before rims and corners, then the inside of areas."""
-    centres = [(distance(_find_centre(feature), event.raw), k) for k, feature in enumerate(features)]
-    if centres and min(centres)[0] < event.reach:
-        return _Hit(min(centres)[1])
+    """Return what is under the pointer: centers before rims and corners, then the inside of areas."""
+    centers = [(distance(_find_center(feature), event.raw), k) for k, feature in enumerate(features)]
+    if centers and min(centers)[0] < event.reach:
+        return _Hit(min(centers)[1])
     edges: list[tuple[float, int, int]] = []  # distance in m, feature, corner
     for number, feature in enumerate(features):
         if isinstance(feature, WeightedArea):
@@ -189,8 +189,8 @@ def _find_feature(features: tuple[density.Feature, ...], event: PointerEvent) ->
     return _Hit()
 
 
-def _find_centre(feature: density.Feature) -> Point:
-    """Return the centre of a hot spot, or a point inside an area."""
+def _find_center(feature: density.Feature) -> Point:
+    """Return the center of a hot spot, or a point inside an area."""
     if isinstance(feature, Gaussian):
         return feature.center
     ((x, y),) = feature.polygon.representative_point().coords
@@ -198,7 +198,7 @@ def _find_centre(feature: density.Feature) -> Point:
 
 
 def _build_outline(feature: density.Feature) -> Ring:
-    """Return the outline of an area, or of a hot spot at one standard deviation from its centre."""
+    """Return the outline of an area, or of a hot spot at one standard deviation from its center."""
     if isinstance(feature, WeightedArea):
         return feature.vertices
     angles = np.linspace(0.0, math.tau, _OUTLINE_POINTS, endpoint=False)

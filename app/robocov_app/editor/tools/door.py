@@ -22,7 +22,7 @@ class DoorTool(Tool):
 
     name = "door"
     key = "k"
-    hint = "click a wall where its door is to be, or drag along it; type the door's width in metres"
+    hint = "click a wall where its door is to be, or drag along it; type the door's width in meters"
     starts_with_text = True
 
     def __init__(self) -> None:

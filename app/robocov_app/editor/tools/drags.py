@@ -219,17 +219,17 @@ class VertexDrag(Drag):
 
 
 class TurnDrag(Drag):
-    """Turns objects about the centre of their box; with Shift in steps, with Ctrl without snapping."""
+    """Turns objects about the center of their box; with Shift in steps, with Ctrl without snapping."""
 
     def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
         super().__init__(context, selection, start)
         bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
-        self._centre = geometry.compute_centre(bounds)
-        self._start_angle = geometry.compute_bearing(self._centre, start)
+        self._center = geometry.compute_center(bounds)
+        self._start_angle = geometry.compute_bearing(self._center, start)
 
     def follow(self, event: PointerEvent) -> None:
         """Follow the pointer."""
-        bearing = geometry.compute_bearing(self._centre, event.raw)
+        bearing = geometry.compute_bearing(self._center, event.raw)
         degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
         if event.shift:
             degrees = geometry.SHIFT_ANGLE_DEG * round(degrees / geometry.SHIFT_ANGLE_DEG)
@@ -241,7 +241,7 @@ class TurnDrag(Drag):
         self.label = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
         self.change = None
         if degrees:
-            self.change = transform.rotate(self.context.sketch, self.selection, degrees, self._centre)
+            self.change = transform.rotate(self.context.sketch, self.selection, degrees, self._center)
 
     def enter_text(self, text: str) -> None:
         """Turn by a typed angle."""
@@ -249,7 +249,7 @@ class TurnDrag(Drag):
 
 
 class ScaleDrag(Drag):
-    """Scales objects by a handle of their frame; with Shift in proportion, with Alt about its centre."""
+    """Scales objects by a handle of their frame; with Shift in proportion, with Alt about its center."""
 
     def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
         super().__init__(context, selection, handle.at)
@@ -267,17 +267,17 @@ class ScaleDrag(Drag):
         """Follow the pointer."""
         pointer = (event.raw[0] - self._margin[0], event.raw[1] - self._margin[1])
         position = self._snap(event, pointer)
-        centre = geometry.compute_centre(self._bounds) if event.alt else self._fixed
+        center = geometry.compute_center(self._bounds) if event.alt else self._fixed
         factors = [1.0, 1.0]
         for axis in (0, 1):
-            if self._side[axis] and abs(self._grip[axis] - centre[axis]) > NO_MOVE_M:
-                factors[axis] = (position[axis] - centre[axis]) / (self._grip[axis] - centre[axis])
+            if self._side[axis] and abs(self._grip[axis] - center[axis]) > NO_MOVE_M:
+                factors[axis] = (position[axis] - center[axis]) / (self._grip[axis] - center[axis])
         if event.shift or self._keeps_proportion:
             factor = max(factors, key=lambda factor: abs(factor - 1.0))
             factors = [factor, factor]
-        self._scale(factors[0], factors[1], centre)
+        self._scale(factors[0], factors[1], center)
 
-    def _scale(self, factor_x: float, factor_y: float, centre: Point) -> None:
+    def _scale(self, factor_x: float, factor_y: float, center: Point) -> None:
         width = self._bounds[2] - self._bounds[0]
         height = self._bounds[3] - self._bounds[1]
         factor_x = _limit_factor(factor_x, width)
@@ -285,7 +285,7 @@ class ScaleDrag(Drag):
         is_unchanged = max(abs(factor_x - 1.0), abs(factor_y - 1.0)) < _UNIT_TOLERANCE
         self.change = None
         if not is_unchanged:
-            self.change = transform.scale(self.context.sketch, self.selection, factor_x, factor_y, centre)
+            self.change = transform.scale(self.context.sketch, self.selection, factor_x, factor_y, center)
         percent = f"{100 * factor_x:.0f} %"
         if abs(factor_x - factor_y) >= _FACTOR_TOLERANCE:
             percent += f" x {100 * factor_y:.0f} %"

@@ -296,7 +296,7 @@ class RectangleTool(DrawTool):
 
     name = "rectangle"
     key = "r"
-    hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
+    hint = "drag from corner to corner, or click both; type 3 x 2 for meters; Shift makes a square"
     max_points = 2
     drags = True
 
@@ -329,11 +329,11 @@ class RectangleTool(DrawTool):
 
 
 class CircleTool(DrawTool):
-    """Draws a circle from its centre."""
+    """Draws a circle from its center."""
 
     name = "circle"
     key = "c"
-    hint = "drag from the middle to the rim, or click both; type the radius for metres"
+    hint = "drag from the middle to the rim, or click both; type the radius for meters"
     max_points = 2
     drags = True
 
@@ -342,7 +342,7 @@ class CircleTool(DrawTool):
         return create.add_circle(context.sketch, points[0], distance(*points))
 
     def find_drag_end(self, text: str) -> Point:
-        """Return the point on the rim to the right of the centre for a typed radius."""
+        """Return the point on the rim to the right of the center for a typed radius."""
         return self.points[0][0] + parse_length(text), self.points[0][1]
 
     def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
@@ -358,7 +358,7 @@ class DiscTool(CircleTool):
     name = "disc"
     title = "Start disc"
     key = "s"
-    hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for metres"
+    hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for meters"
 
     def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
         """Return the change that adds the start."""

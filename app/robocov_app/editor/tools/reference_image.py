@@ -66,7 +66,7 @@ class ReferenceImageTool(Tool):
         self.clicked = [*self.clicked[-1:], event.raw]
         if len(self.clicked) == 2:
             context.show_message(
-                "type how many metres apart the points are; Enter alone makes their line level"
+                "type how many meters apart the points are; Enter alone makes their line level"
             )
 
     def finish(self, context: Workspace) -> bool:

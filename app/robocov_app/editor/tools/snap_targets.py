@@ -29,7 +29,7 @@ class _TargetCollector:
         self.dragged = dragged
         self.vertices: list[Point] = []
         self.rim_points: list[Point] = []
-        self.centres: list[Point] = []
+        self.centers: list[Point] = []
         self.edges: list[tuple[Point, Point]] = []
         self.walls: list[shapely.Geometry] = []
         self.circles: list[shapely.Geometry] = []
@@ -38,7 +38,7 @@ class _TargetCollector:
         """Add an object of a map."""
         shape = sketch.find_object(owner)
         if isinstance(shape, CircleObstacle | DiscStart):
-            self.centres.append(shape.center)
+            self.centers.append(shape.center)
             self.rim_points += sketch.list_vertex_rings(owner)[0][1:]
         if isinstance(shape, CircleObstacle):
             self.circles.append(build_geometry(shape))
@@ -46,7 +46,7 @@ class _TargetCollector:
             self.walls.append(build_geometry(shape))
         elif isinstance(shape, PointsStart):
             dragged = self.dragged[owner, 0]
-            self.centres += [point for k, point in enumerate(shape.positions) if k not in dragged]
+            self.centers += [point for k, point in enumerate(shape.positions) if k not in dragged]
         for number, ring, is_closed in sketch.list_rings(owner):
             self._add_ring(ring, is_closed, self.dragged[owner, number])
 
@@ -60,7 +60,7 @@ class _TargetCollector:
 
 
 class SnapTargets:
-    """Snap targets of a map: vertices, centres, middles of edges, edges, and outlines of walls and circles.
+    """Snap targets of a map: vertices, centers, middles of edges, edges, and outlines of walls and circles.
 
     Parameters
     ----------
@@ -88,8 +88,8 @@ class SnapTargets:
         starts, ends = np.array(collector.edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
         wall_corners, _ = _list_outline_edges(collector.walls)
         marks = np.concatenate([to_array([*collector.vertices, *collector.rim_points]), wall_corners])
-        centres = to_array(collector.centres)
-        points_by_kind = {"vertex": marks, "centre": centres, "middle": (starts + ends) / 2}
+        centers = to_array(collector.centers)
+        points_by_kind = {"vertex": marks, "centre": centers, "middle": (starts + ends) / 2}
         self._trees = {
             kind: (cKDTree(points), points) for kind, points in points_by_kind.items() if len(points)
         }
@@ -100,12 +100,12 @@ class SnapTargets:
         low = np.minimum(self.starts, self.ends)
         high = np.maximum(self.starts, self.ends)
         self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
-        # Points align with vertices and centres, sorted along each axis.
-        marks = np.concatenate([marks, centres])
+        # Points align with vertices and centers, sorted along each axis.
+        marks = np.concatenate([marks, centers])
         self._sorted_marks = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def find_nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
-        """Return the nearest target of a kind within `reach` metres, None if there is none."""
+        """Return the nearest target of a kind within `reach` meters, None if there is none."""
         if kind not in self._trees:
             return None
         tree, points = self._trees[kind]
@@ -113,7 +113,7 @@ class SnapTargets:
         return _to_point(points[index]) if gap <= reach else None
 
     def list_edges_near(self, point: Point, reach: float) -> list[tuple[Point, Point]]:
-        """Return the ends of the edges within `reach` metres, the nearest first."""
+        """Return the ends of the edges within `reach` meters, the nearest first."""
         x, y = point
         indices = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
         starts = self.starts[indices]

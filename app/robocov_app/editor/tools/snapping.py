@@ -311,7 +311,7 @@ class _SnapSearch:
                 yield _snap_to_mark(kind, mark)
 
     def list_marks_and_crossings(self) -> Iterator[Snap]:
-        """Yield the snaps to centres, middles of edges and crossings of edges."""
+        """Yield the snaps to centers, middles of edges and crossings of edges."""
         yield from self.list_marks("centre", "middle")
         if "crossing" in self.settings.kinds:
             for edge, other in combinations(self.list_edges(), 2):

@@ -1,4 +1,4 @@
-"""Base class of the tools, the workspace that they act on, and what they show; all lengths in metres."""
+"""Base class of the tools, the workspace that they act on, and what they show; all lengths in meters."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from robocov.errors import MapError
 from robocov_app.editor.edits.transform import compute_bounds, compute_box
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.document import Document
-from robocov_app.editor.model.geometry import Box, compute_centre, constrain_angle, distance
+from robocov_app.editor.model.geometry import Box, compute_center, constrain_angle, distance
 from robocov_app.editor.model.selection import Change, Selection, Vertex, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.tools.snapping import SNAPS, Dragged, Guide, Snap, Snapper, SnapSettings, snap_point
@@ -105,7 +105,7 @@ def _list_frame_handles(frame: Box, pixel: float) -> list[Handle]:
     rows = (-1, 0, 1) if high_y - low_y > min_side else (-1, 1)
     sides = [side for side in product(columns, rows) if side != (0, 0)]
     handles = [Handle("scale", compute_side_position(frame, side), side=side) for side in sides]
-    knob = (compute_centre(frame)[0], high_y + KNOB_HEIGHT_PX * pixel)
+    knob = (compute_center(frame)[0], high_y + KNOB_HEIGHT_PX * pixel)
     handles.append(Handle("turn", knob))
     return handles
 
@@ -127,7 +127,7 @@ def compute_side_position(box: Box, side: tuple[int, int]) -> Point:
 
 
 def find_handle(handles: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
-    """Return the handle within `reach` metres of a point: the nearest, vertices before others."""
+    """Return the handle within `reach` meters of a point: the nearest, vertices before others."""
     near = [handle for handle in handles if distance(handle.at, point) <= reach]
     return min(near, key=lambda handle: (handle.kind != "vertex", distance(handle.at, point)), default=None)
 

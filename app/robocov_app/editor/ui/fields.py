@@ -15,7 +15,7 @@ from robocov_app.editor.settings import SETTING_ATTRIBUTES
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, run_typed_command
 
-DECIMALS = 4  # of numbers in fields: a tenth of a millimetre
+DECIMALS = 4  # of numbers in fields: a tenth of a millimeter
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def format_number(value: float | None) -> str:
 
 
 def _compute_frame(editor: Editor) -> _Frame:
-    """Return the position of a vertex, of a centre, or of the box's lower left corner, and the size."""
+    """Return the position of a vertex, of a center, or of the box's lower left corner, and the size."""
     sketch, selection = editor.displayed
     bounds = transform.compute_bounds(sketch, actions.select_owners(selection))
     x, y, high_x, high_y = require(bounds, "nothing is selected")
@@ -210,8 +210,8 @@ FIELDS: dict[str, Field] = {
     "angle": _build_setting_field("angle", "Lines snap to multiples of this"),
     "name": Field(_read_name, actions.rename, "What people call it"),
     "note": Field(_read_note, TYPED_COMMANDS["note"].action, "Whatever is worth remembering of it"),
-    "x": Field(_read_x, _write_x, "From the left; +0.5 moves by half a metre"),
-    "y": Field(_read_y, _write_y, "From below; +0.5 moves by half a metre"),
+    "x": Field(_read_x, _write_x, "From the left; +0.5 moves by half a meter"),
+    "y": Field(_read_y, _write_y, "From below; +0.5 moves by half a meter"),
     "wide": Field(_read_width, _write_width, "Also *2, 50% or +0.3"),
     "high": Field(_read_height, _write_height, "Also *2, 50% or +0.3"),
     "width": _build_length_field("width", "width", "How thick the wall is"),

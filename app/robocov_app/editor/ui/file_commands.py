@@ -196,7 +196,7 @@ class FileCommands:
 
     def remember(self, path: Path) -> None:
         """Put a path at the top of the recent maps."""
-        # Links are not resolved, so that people recognise the path.
+        # Links are not resolved, so that people recognize the path.
         name = os.path.abspath(path)  # noqa: PTH100
         others = [recent for recent in self.editor.recent if recent != name]
         self.editor.recent = [name, *others][:MAX_RECENT]

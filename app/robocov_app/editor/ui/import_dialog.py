@@ -14,15 +14,15 @@ from robocov.environment import Point
 from robocov.errors import RobocovError
 from robocov_app.editor.ui.import_preview import ImportPreview
 from robocov_app.editor.ui.import_sheet import (
-    ColourSheet,
+    ColorSheet,
     choose_next_role,
     find_role,
-    list_declared_colours,
+    list_declared_colors,
     set_role,
 )
 from robocov_app.editor.ui.importing import Imported, ImportOption, list_options
 from robocov_app.formats import Importer, ReadOptions, Shaping
-from robocov_app.formats.colours import Colour, name_colour
+from robocov_app.formats.colors import Color, name_color
 from robocov_app.jobs.workers import Worker
 from robocov_app.render.fonts import label
 from robocov_app.toolkit.dialogs import Dialog
@@ -38,7 +38,7 @@ REPORT_LINE_PX = 17
 MAX_ROW_PX = 28.0  # of an option
 HELP_MARGIN_PX = 40  # below the options, for the buttons
 BUTTONS_HEIGHT_PX = 30
-CHIP_WIDTH_PX = 78  # of a colour with its role
+CHIP_WIDTH_PX = 78  # of a color with its role
 CHIP_GAP_PX = 6
 SWATCH_PX = 12
 MAPS_GAP_PX = 14  # between maps and report
@@ -47,10 +47,10 @@ MIN_REPORT_LINES = 7
 MAX_ENTRY_CHARACTERS = 200
 DEFAULT_TEXT = "default"
 KEEP_PART = "part"
-SET_COLOUR = "colour"
+SET_COLOR = "color"
 HINTS = {
     KEEP_PART: "click into the map: keep that part · Tab option · Enter imports · Esc leaves",
-    SET_COLOUR: "click into the left map, or Space on a colour: free, solid, ignored · Enter imports",
+    SET_COLOR: "click into the left map, or Space on a color: free, solid, ignored · Enter imports",
 }
 _ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ignore"}
 
@@ -80,7 +80,7 @@ class ImportDialog(Dialog):
     accepted : bool
         Whether the user has accepted the map, as soon as it is ready.
     click_action : str
-        What a click into a map does: keep a part, or set the role of a colour.
+        What a click into a map does: keep a part, or set the role of a color.
     """
 
     width = 10_000.0  # as wide as the window
@@ -120,20 +120,20 @@ class ImportDialog(Dialog):
         self.set("inside", f"{position[0]:.10g} {position[1]:.10g}")
 
     @property
-    def sheet(self) -> ColourSheet | None:
-        """The file in its own colours, if these can be given roles."""
-        if self.imported is None or "free_colour" not in self.importer.options:
+    def sheet(self) -> ColorSheet | None:
+        """The file in its own colors, if these can be given roles."""
+        if self.imported is None or "free_color" not in self.importer.options:
             return None
         return self.imported.sheet
 
     @property
-    def _shown_sheet(self) -> ColourSheet | None:
-        """The file in its own colours, if a click sets the role of a colour."""
-        return self.sheet if self.click_action == SET_COLOUR else None
+    def _shown_sheet(self) -> ColorSheet | None:
+        """The file in its own colors, if a click sets the role of a color."""
+        return self.sheet if self.click_action == SET_COLOR else None
 
-    def cycle_colour(self, colour: Colour) -> None:
-        """Give a colour the next role: free, solid, ignored, and none."""
-        set_role(self.entries, colour, choose_next_role(find_role(self.entries, colour)))
+    def cycle_color(self, color: Color) -> None:
+        """Give a color the next role: free, solid, ignored, and none."""
+        set_role(self.entries, color, choose_next_role(find_role(self.entries, color)))
         self._request()
 
     def build_settings(self) -> tuple[ReadOptions, Shaping]:
@@ -189,7 +189,7 @@ class ImportDialog(Dialog):
             self.accepted = True
         return is_accepting
 
-    def cancelled(self) -> None:
+    def canceled(self) -> None:
         """End the import."""
         self._worker.close()
 
@@ -243,29 +243,29 @@ class ImportDialog(Dialog):
             self.preview.mark(surface, position, ui.scale, ui.theme)
 
     def _click(self, pixel: tuple[int, int]) -> None:
-        """Keep the part under a pixel, or change the role of its colour."""
+        """Keep the part under a pixel, or change the role of its color."""
         for number, camera in enumerate(self.preview.cameras):
             if not Rect(camera.view).collidepoint(pixel):
                 continue
             x, y = camera.to_world(np.array(pixel, dtype=float)).tolist()
             sheet = self._shown_sheet
             if sheet is not None and number == 0:
-                colour = sheet.find_colour(x, y)
-                if colour is not None:
-                    self.cycle_colour(colour)
+                color = sheet.find_color(x, y)
+                if color is not None:
+                    self.cycle_color(color)
             else:
                 # No finer than a pixel.
                 digits = max(0, math.ceil(math.log10(camera.zoom)))
                 self.keep_inside((round(x, digits), round(y, digits)))
 
     def _draw_click_actions(self, ui: Ui) -> None:
-        """Draw what a click does, and the colours with their roles."""
+        """Draw what a click does, and the colors with their roles."""
         ui.row(56, 84, 84, 0, height=24, below=6)
         ui.label("A click", style="unit")
         part_tip = "A click into a map keeps that part of the free space"
-        colour_tip = "A click into the left map makes its colour free, solid or ignored"
+        color_tip = "A click into the left map makes its color free, solid or ignored"
         self._draw_click_action(ui, KEEP_PART, "keeps a part", part_tip)
-        self._draw_click_action(ui, SET_COLOUR, "sets a colour", colour_tip)
+        self._draw_click_action(ui, SET_COLOR, "sets a color", color_tip)
         ui.end_row()
         if self._shown_sheet is not None:
             self._draw_chips(ui, self._shown_sheet)
@@ -275,28 +275,28 @@ class ImportDialog(Dialog):
         if ui.button(text, key=f"clicks:{action}", chosen=is_chosen, small=True, tip=tip):
             self.click_action = action
 
-    def _draw_chips(self, ui: Ui, sheet: ColourSheet) -> None:
-        colours = list(dict.fromkeys([*list_declared_colours(self.entries), *sheet.colours]))
+    def _draw_chips(self, ui: Ui, sheet: ColorSheet) -> None:
+        colors = list(dict.fromkeys([*list_declared_colors(self.entries), *sheet.colors]))
         columns = int((ui.wide + CHIP_GAP_PX) // (CHIP_WIDTH_PX + CHIP_GAP_PX))
-        colours = colours[: max(columns, 1)]
-        ui.row(*[CHIP_WIDTH_PX] * len(colours), 0, height=24, below=8)
-        for colour in colours:
-            self._draw_chip(ui, colour)
+        colors = colors[: max(columns, 1)]
+        ui.row(*[CHIP_WIDTH_PX] * len(colors), 0, height=24, below=8)
+        for color in colors:
+            self._draw_chip(ui, color)
         ui.end_row()
 
-    def _draw_chip(self, ui: Ui, colour: Colour) -> None:
-        role = find_role(self.entries, colour)
-        name = name_colour(colour)
-        key = f"colour:{name}"
+    def _draw_chip(self, ui: Ui, color: Color) -> None:
+        role = find_role(self.entries, color)
+        name = name_color(color)
+        key = f"color:{name}"
         text = f"     {_ROLE_LABELS[role]}"
         tip = f"{name}: a click changes it"
         if ui.button(text, key=key, chosen=role is not None, small=True, tip=tip):
-            self.cycle_colour(colour)
+            self.cycle_color(color)
         button = ui.find("button", key)
         if ui.surface is not None and button is not None:
             side = ui.px(SWATCH_PX)
             swatch = Rect(button.rect.left + ui.px(7), button.rect.centery - side // 2, side, side)
-            pygame.draw.rect(ui.surface, colour, swatch)
+            pygame.draw.rect(ui.surface, color, swatch)
             pygame.draw.rect(ui.surface, ui.theme.faint, swatch, 1)
 
     def _draw_options(self, ui: Ui, foot: float) -> None:
@@ -319,7 +319,7 @@ class ImportDialog(Dialog):
             self.accepted = True
         if ui.button("Cancel", key="cancel"):
             self.done = True
-            self.cancelled()
+            self.canceled()
         ui.end_row()
 
     def _focus_first_field(self, ui: Ui) -> None:
@@ -344,7 +344,7 @@ class ImportDialog(Dialog):
         text = next((option.help for option in self.options if option.name == ui.focus), "")
         max_lines = max(int((foot - HELP_MARGIN_PX - ui.y) / (SMALL + 5)), 0)
         lines = wrapped(text, ui.px(SMALL), ui.px(ui.wide))[:max_lines]
-        ui.words(" ".join(lines), size=SMALL, colour=ui.theme.faint)
+        ui.words(" ".join(lines), size=SMALL, color=ui.theme.faint)
 
     def _list_report_lines(self) -> list[str]:
         if self.trouble:
@@ -360,12 +360,12 @@ class ImportDialog(Dialog):
             lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
         ui.row(height=REPORT_LINE_PX, below=0)
         if ui.surface is not None:
-            colour = ui.theme.trajectory if self.trouble else ui.theme.ink
+            color = ui.theme.trajectory if self.trouble else ui.theme.ink
             for line in lines:
-                ui.surface.blit(label(line, ui.px(SMALL), colour), ui.cell())
+                ui.surface.blit(label(line, ui.px(SMALL), color), ui.cell())
         ui.end_row()
         ui.y = foot - REPORT_LINE_PX
-        hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOUR]
+        hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOR]
         is_importing_again = self.busy and self.imported is not None
         ui.label("importing…" if is_importing_again else hint, style="unit")
         ui.end_row()

@@ -10,7 +10,7 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov.environment import Point
-from robocov_app.editor.ui.import_sheet import ColourSheet
+from robocov_app.editor.ui.import_sheet import ColorSheet
 from robocov_app.editor.ui.importing import Imported
 from robocov_app.formats.geometry.comparison import ImportComparison
 from robocov_app.formats.reports import format_area
@@ -18,7 +18,7 @@ from robocov_app.render import layout
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Color, Theme
 from robocov_app.toolkit.ui import SMALL
 
 # Lengths in pixels at scale 1.
@@ -38,7 +38,7 @@ class _Caption(NamedTuple):
     title: str
     facts: str
     mark: str
-    mark_colour: Colour
+    mark_color: Color
 
 
 class ImportPreview:
@@ -93,9 +93,9 @@ class ImportPreview:
         return second_top + caption_height + height - box.top
 
     def draw(
-        self, screen: Surface, imported: Imported, scale: float, theme: Theme, sheet: ColourSheet | None
+        self, screen: Surface, imported: Imported, scale: float, theme: Theme, sheet: ColorSheet | None
     ) -> None:
-        """Draw both maps with their captions; with a sheet, the first one in its own colours."""
+        """Draw both maps with their captions; with a sheet, the first one in its own colors."""
         look = (*(camera.view for camera in self.cameras), scale, theme, sheet is not None)
 
         def draw_maps() -> Surface:
@@ -105,7 +105,7 @@ class ImportPreview:
             return picture
 
         screen.blit(self._picture.of(imported, look, draw_maps), (0, 0))
-        captions = _list_captions(imported, theme, has_own_colours=sheet is not None)
+        captions = _list_captions(imported, theme, has_own_colors=sheet is not None)
         for camera, caption in zip(self.cameras, captions, strict=True):
             self._draw_caption(screen, camera, caption, scale, theme)
 
@@ -120,7 +120,7 @@ class ImportPreview:
         if caption.mark:
             left = x + text_width(caption.title, title_size, True) + round(10 * scale)
             square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
-            pygame.draw.rect(screen, caption.mark_colour, square)
+            pygame.draw.rect(screen, caption.mark_color, square)
             mark = label(caption.mark, text_size, theme.ink)
             screen.blit(mark, (left + round(14 * scale), y + round(2 * scale)))
         facts = shortened(caption.facts, text_size, self._width)
@@ -130,11 +130,11 @@ class ImportPreview:
         """Draw a cross at a position, m, of both maps."""
         for camera in self.cameras:
             x, y = camera.to_pixels(np.array(position)).tolist()
-            for line_width, colour in ((5, theme.background), (2, theme.final)):
+            for line_width, color in ((5, theme.background), (2, theme.final)):
                 arm = MARK_ARM_PX * scale + line_width / 2
                 width = round(line_width * scale)
-                pygame.draw.line(screen, colour, (x - arm, y), (x + arm, y), width)
-                pygame.draw.line(screen, colour, (x, y - arm), (x, y + arm), width)
+                pygame.draw.line(screen, color, (x - arm, y), (x + arm, y), width)
+                pygame.draw.line(screen, color, (x, y - arm), (x, y + arm), width)
 
     def veil(self, screen: Surface, theme: Theme) -> None:
         """Draw a veil over both maps, which are outdated."""
@@ -145,7 +145,7 @@ class ImportPreview:
             screen.blit(veil, (left, top))
 
 
-def _list_captions(imported: Imported, theme: Theme, *, has_own_colours: bool) -> list[_Caption]:
+def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) -> list[_Caption]:
     comparison = imported.comparison
     report = imported.report
     lost = "" if comparison.lost.is_empty else f"{format_area(comparison.lost.area, 3)} left out"
@@ -154,8 +154,8 @@ def _list_captions(imported: Imported, theme: Theme, *, has_own_colours: bool) -
     facts_after = f"{report.vertices_kept} vertices, {format_area(comparison.after.area)} free"
     if comparison.gap is not None:
         facts_after += f", narrowest passage {comparison.gap.width:.3g} m"
-    if has_own_colours:
-        before = _Caption("in its colours", facts_before, "", theme.trajectory)
+    if has_own_colors:
+        before = _Caption("in its colors", facts_before, "", theme.trajectory)
     else:
         before = _Caption("as read", facts_before, lost, theme.trajectory)
     return [before, _Caption("as imported", facts_after, opened, theme.start)]
@@ -190,9 +190,9 @@ def _draw_map(
         pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
 
 
-def _draw_marked_area(picture: Surface, camera: Camera, area: shapely.Geometry, colour: Colour) -> None:
+def _draw_marked_area(picture: Surface, camera: Camera, area: shapely.Geometry, color: Color) -> None:
     layer = Surface(picture.get_size(), pygame.SRCALPHA)
-    _fill_polygons(layer, camera, area, (*colour, MARK_OPACITY), _CLEAR)
+    _fill_polygons(layer, camera, area, (*color, MARK_OPACITY), _CLEAR)
     picture.blit(layer, (0, 0))
 
 
@@ -208,6 +208,6 @@ def _fill_polygons(
             _fill_ring(surface, camera, hole, holes)
 
 
-def _fill_ring(surface: Surface, camera: Camera, ring: shapely.LinearRing, colour: Sequence[int]) -> None:
+def _fill_ring(surface: Surface, camera: Camera, ring: shapely.LinearRing, color: Sequence[int]) -> None:
     points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
-    pygame.draw.polygon(surface, colour, points)
+    pygame.draw.polygon(surface, color, points)

@@ -1,4 +1,4 @@
-"""A file in its own colours as the import dialog shows it, and the roles of its colours."""
+"""A file in its own colors as the import dialog shows it, and the roles of its colors."""
 
 from collections import defaultdict
 from collections.abc import MutableMapping, Sequence
@@ -10,27 +10,27 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov_app.formats import ForeignMap
-from robocov_app.formats.colours import (
+from robocov_app.formats.colors import (
     ROLES,
     WHITE,
-    Colour,
-    ColourKey,
+    Color,
+    ColorKey,
     Role,
-    name_colour,
-    parse_css_colour_on_white,
+    name_color,
+    parse_css_color_on_white,
 )
 from robocov_app.formats.foreign_map import Painted, Thumbnail
 from robocov_app.render.camera import Camera
 
-MAX_COLOURS = 12  # that are listed; others are chosen by a click on the picture
-COLOUR_TOLERANCE = 24.0  # levels in each channel within which colours of a picture count as one
-MIN_LISTED_SHARE = 0.001  # of a picture, from which on a colour is listed
+MAX_COLORS = 12  # that are listed; others are chosen by a click on the picture
+COLOR_TOLERANCE = 24.0  # levels in each channel within which colors of a picture count as one
+MIN_LISTED_SHARE = 0.001  # of a picture, from which on a color is listed
 _ROLE_CYCLE: tuple[Role | None, ...] = (None, "free", "solid", "ignore")
 
 
 @dataclass(frozen=True, eq=False)
-class ColourSheet:
-    """A file in its own colours.
+class ColorSheet:
+    """A file in its own colors.
 
     Attributes
     ----------
@@ -38,25 +38,25 @@ class ColourSheet:
         Shapes of a drawing, from the bottom to the top.
     thumbnail : Thumbnail or None
         A picture.
-    colours : tuple of Colour
-        Its colours, the most frequent first.
+    colors : tuple of Color
+        Its colors, the most frequent first.
     """
 
     painted: tuple[Painted, ...]
     thumbnail: Thumbnail | None
-    colours: tuple[Colour, ...]
+    colors: tuple[Color, ...]
 
-    def find_colour(self, x: float, y: float) -> Colour | None:
-        """Return the colour at a position, m; None where there is none."""
+    def find_color(self, x: float, y: float) -> Color | None:
+        """Return the color at a position, m; None where there is none."""
         if self.thumbnail is not None:
             return self._find_pixel(self.thumbnail, x, y)
         point = shapely.Point(x, y)
         for shape in reversed(self.painted):
             if shapely.intersects(shape.area, point):
-                return shape.colour
+                return shape.color
         return None
 
-    def _find_pixel(self, thumbnail: Thumbnail, x: float, y: float) -> Colour | None:
+    def _find_pixel(self, thumbnail: Thumbnail, x: float, y: float) -> Color | None:
         left, bottom, right, top = thumbnail.bounds
         rows, columns = thumbnail.pixels.shape[:2]
         column = int((x - left) / (right - left) * columns // 1)
@@ -64,8 +64,8 @@ class ColourSheet:
         if not (0 <= row < rows and 0 <= column < columns):
             return None
         red, green, blue = thumbnail.pixels[row, column].tolist()
-        # Because of soft edges and noise, the frequent colour that is nearest is meant.
-        key = ColourKey(tuple((colour, "free") for colour in self.colours), COLOUR_TOLERANCE)
+        # Because of soft edges and noise, the frequent color that is nearest is meant.
+        key = ColorKey(tuple((color, "free") for color in self.colors), COLOR_TOLERANCE)
         nearest = key.find_nearest((red, green, blue))
         return (red, green, blue) if nearest is None else nearest
 
@@ -80,44 +80,44 @@ class ColourSheet:
         for shape in self.painted:
             for part in shapely.get_parts(shape.area).tolist():
                 if part.geom_type == "Polygon":
-                    _fill_polygon(surface, camera, part, shape.colour)
+                    _fill_polygon(surface, camera, part, shape.color)
         surface.set_clip(clip)
 
 
-def build_colour_sheet(foreign: ForeignMap) -> ColourSheet | None:
-    """Return a foreign map in its own colours, None if it has none."""
+def build_color_sheet(foreign: ForeignMap) -> ColorSheet | None:
+    """Return a foreign map in its own colors, None if it has none."""
     if foreign.thumbnail is not None:
-        return ColourSheet((), foreign.thumbnail, _list_pixel_colours(foreign.thumbnail))
+        return ColorSheet((), foreign.thumbnail, _list_pixel_colors(foreign.thumbnail))
     if not foreign.painted:
         return None
-    areas: defaultdict[Colour, float] = defaultdict(float)
+    areas: defaultdict[Color, float] = defaultdict(float)
     for shape in foreign.painted:
-        areas[shape.colour] += shape.area.area
-    colours = sorted(areas, key=lambda colour: -areas[colour])
-    return ColourSheet(foreign.painted, None, tuple(colours[:MAX_COLOURS]))
+        areas[shape.color] += shape.area.area
+    colors = sorted(areas, key=lambda color: -areas[color])
+    return ColorSheet(foreign.painted, None, tuple(colors[:MAX_COLORS]))
 
 
-def _list_pixel_colours(thumbnail: Thumbnail) -> tuple[Colour, ...]:
-    """Return the frequent colours of a picture, without mixtures of two others."""
+def _list_pixel_colors(thumbnail: Thumbnail) -> tuple[Color, ...]:
+    """Return the frequent colors of a picture, without mixtures of two others."""
     pixels = thumbnail.pixels.reshape(-1, 3)
     values, counts = np.unique(pixels, axis=0, return_counts=True)
     min_count = MIN_LISTED_SHARE * len(pixels)
-    colours: list[Colour] = []
+    colors: list[Color] = []
     for k in np.argsort(-counts, kind="stable").tolist():
-        if counts[k] < min_count or len(colours) == MAX_COLOURS:
+        if counts[k] < min_count or len(colors) == MAX_COLORS:
             break
         red, green, blue = values[k].tolist()
-        colour = (red, green, blue)
-        if not _is_mixture(colour, colours):
-            colours.append(colour)
-    return tuple(colours)
+        color = (red, green, blue)
+        if not _is_mixture(color, colors):
+            colors.append(color)
+    return tuple(colors)
 
 
-def _is_mixture(colour: Colour, others: Sequence[Colour]) -> bool:
-    """Return whether a colour is near another, or between two others, as on soft edges."""
+def _is_mixture(color: Color, others: Sequence[Color]) -> bool:
+    """Return whether a color is near another, or between two others, as on soft edges."""
     points = np.array(others, dtype=float).reshape(-1, 3)
-    offsets = np.array(colour, dtype=float) - points
-    if (np.abs(offsets).max(axis=1) <= COLOUR_TOLERANCE).any():
+    offsets = np.array(color, dtype=float) - points
+    if (np.abs(offsets).max(axis=1) <= COLOR_TOLERANCE).any():
         return True
     for start, offset in zip(points, offsets, strict=True):
         directions = points - start
@@ -125,8 +125,8 @@ def _is_mixture(colour: Colour, others: Sequence[Colour]) -> bool:
         has_length = squared_lengths > 0.0
         shares = np.divide(directions @ offset, squared_lengths, out=np.zeros(len(points)), where=has_length)
         between = start + np.clip(shares, 0.0, 1.0)[:, None] * directions
-        differences = np.abs(between - np.array(colour)).max(axis=1)
-        if (differences <= COLOUR_TOLERANCE / 2).any():
+        differences = np.abs(between - np.array(color)).max(axis=1)
+        if (differences <= COLOR_TOLERANCE / 2).any():
             return True
     return False
 
@@ -140,10 +140,10 @@ def _draw_thumbnail(surface: Surface, camera: Camera, thumbnail: Thumbnail) -> N
     surface.blit(pygame.transform.smoothscale(picture, size), (round(low_x), round(low_y)))
 
 
-def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, colour: Colour) -> None:
+def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, color: Color) -> None:
     outline = camera.to_pixels(shapely.get_coordinates(polygon.exterior))
     if not len(polygon.interiors):
-        pygame.draw.polygon(surface, colour, outline.tolist())
+        pygame.draw.polygon(surface, color, outline.tolist())
         return
     # A layer of its own, so that what lies below is visible through the holes.
     low = np.floor(outline.min(axis=0))
@@ -153,30 +153,30 @@ def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, co
         return
     layer = Surface(box.size, pygame.SRCALPHA)
     corner = np.array(box.topleft)
-    pygame.draw.polygon(layer, colour, (outline - corner).tolist())
+    pygame.draw.polygon(layer, color, (outline - corner).tolist())
     for hole in polygon.interiors:
         points = camera.to_pixels(shapely.get_coordinates(hole)) - corner
         pygame.draw.polygon(layer, (0, 0, 0, 0), points.tolist())
     surface.blit(layer, box)
 
 
-def find_role(entries: MutableMapping[str, str], colour: Colour) -> Role | None:
-    """Return the role that the typed options give to exactly this colour."""
+def find_role(entries: MutableMapping[str, str], color: Color) -> Role | None:
+    """Return the role that the typed options give to exactly this color."""
     for role in ROLES:
-        if colour in map(parse_css_colour_on_white, _list_words(entries, role)):
+        if color in map(parse_css_color_on_white, _list_words(entries, role)):
             return role
     return None
 
 
-def list_declared_colours(entries: MutableMapping[str, str]) -> list[Colour]:
-    """Return the colours that have a role in the typed options."""
-    colours: list[Colour] = []
+def list_declared_colors(entries: MutableMapping[str, str]) -> list[Color]:
+    """Return the colors that have a role in the typed options."""
+    colors: list[Color] = []
     for role in ROLES:
         for word in _list_words(entries, role):
-            colour = parse_css_colour_on_white(word)
-            if colour is not None and colour not in colours:
-                colours.append(colour)
-    return colours
+            color = parse_css_color_on_white(word)
+            if color is not None and color not in colors:
+                colors.append(color)
+    return colors
 
 
 def choose_next_role(role: Role | None) -> Role | None:
@@ -184,15 +184,15 @@ def choose_next_role(role: Role | None) -> Role | None:
     return _ROLE_CYCLE[(_ROLE_CYCLE.index(role) + 1) % len(_ROLE_CYCLE)]
 
 
-def set_role(entries: MutableMapping[str, str], colour: Colour, role: Role | None) -> None:
-    """Change the typed options so that a colour has a role, or none."""
+def set_role(entries: MutableMapping[str, str], color: Color, role: Role | None) -> None:
+    """Change the typed options so that a color has a role, or none."""
     for option_role in ROLES:
         words = [
-            word for word in _list_words(entries, option_role) if parse_css_colour_on_white(word) != colour
+            word for word in _list_words(entries, option_role) if parse_css_color_on_white(word) != color
         ]
         if option_role == role:
-            words.append(name_colour(colour))
-        name = f"{option_role}_colour"
+            words.append(name_color(color))
+        name = f"{option_role}_color"
         if words:
             entries[name] = ", ".join(words)
         else:
@@ -200,5 +200,5 @@ def set_role(entries: MutableMapping[str, str], colour: Colour, role: Role | Non
 
 
 def _list_words(entries: MutableMapping[str, str], role: Role) -> Sequence[str]:
-    words = entries.get(f"{role}_colour", "").split(",")
+    words = entries.get(f"{role}_color", "").split(",")
     return [word.strip() for word in words if word.strip()]

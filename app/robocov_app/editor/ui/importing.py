@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args, get_origin, ge
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote, to_one_line
-from robocov_app.editor.ui.import_sheet import ColourSheet, build_colour_sheet
+from robocov_app.editor.ui.import_sheet import ColorSheet, build_color_sheet
 from robocov_app.formats import (
     ForeignMap,
     Importer,
@@ -22,7 +22,7 @@ from robocov_app.formats import (
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
 from robocov_app.jobs.messages import Line
 
-OptionKind = Literal["number", "place", "words", "colours", "width", "text", "choice"]
+OptionKind = Literal["number", "place", "words", "colors", "width", "text", "choice"]
 ImportSettings: TypeAlias = type[ReadOptions] | type[Shaping]
 ImportRequest: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
 """A file, its format, and how it is to be read and shaped."""
@@ -41,7 +41,7 @@ class ImportOption:
     name : str
         Name of the field of `ReadOptions` or `Shaping`.
     kind : str
-        A number; a position; words or colours between commas; a width in m or px; a text; or a choice.
+        A number; a position; words or colors between commas; a width in m or px; a text; or a choice.
     choices : tuple of str
         Possible values of a choice, the default first.
     default : str
@@ -60,7 +60,7 @@ class ImportOption:
         """Return the value of a typed or chosen text; raise ParameterError if it means nothing."""
         if self.kind == "choice":
             return True if text == ON else text
-        if self.kind in ("words", "colours"):
+        if self.kind in ("words", "colors"):
             return tuple(word.strip() for word in text.split(",") if word.strip())
         if self.kind in ("text", "width"):
             return text.strip()
@@ -116,7 +116,7 @@ def _choose_kind(name: str, hint: Any) -> OptionKind:
     if get_origin(hint) is tuple:
         if ... not in get_args(hint):
             return "place"
-        return "colours" if name.endswith("_colour") else "words"
+        return "colors" if name.endswith("_color") else "words"
     if name == "min_stroke":
         return "width"
     return "number" if hint is float else "text"
@@ -134,14 +134,14 @@ class Imported:
         What was read, changed and left out.
     comparison : ImportComparison
         The free space before and after.
-    sheet : ColourSheet or None
-        The file in its own colours.
+    sheet : ColorSheet or None
+        The file in its own colors.
     """
 
     environment: Environment
     report: ImportReport
     comparison: ImportComparison
-    sheet: ColourSheet | None = None
+    sheet: ColorSheet | None = None
 
 
 class _ReadKey(NamedTuple):
@@ -159,7 +159,7 @@ class ImportJob:
 
     def __init__(self) -> None:
         self._read: tuple[_ReadKey, ForeignMap] | None = None
-        self._sheet: tuple[_ReadKey, ColourSheet | None] | None = None
+        self._sheet: tuple[_ReadKey, ColorSheet | None] | None = None
 
     def __call__(self, questions: list[ImportRequest], line: Line) -> Imported:
         """Import the newest request."""
@@ -177,14 +177,14 @@ class ImportJob:
             self._read = (key, read_map(key.path, format=key.format, options=key.options))
         return self._read[1]
 
-    def _build_sheet(self, key: _ReadKey, foreign: ForeignMap) -> ColourSheet | None:
-        """Return the file in its own colours, including those that its options leave out."""
+    def _build_sheet(self, key: _ReadKey, foreign: ForeignMap) -> ColorSheet | None:
+        """Return the file in its own colors, including those that its options leave out."""
         options = replace(
             key.options,
-            free_colour=None,
-            solid_colour=None,
-            ignore_colour=None,
-            colour_tolerance=None,
+            free_color=None,
+            solid_color=None,
+            ignore_color=None,
+            color_tolerance=None,
             min_stroke=None,
         )
         plain_key = key._replace(options=options)
@@ -192,5 +192,5 @@ class ImportJob:
             source = foreign
             if plain_key != key:
                 source = read_map(key.path, format=key.format, options=options)
-            self._sheet = (plain_key, build_colour_sheet(source))
+            self._sheet = (plain_key, build_color_sheet(source))
         return self._sheet[1]

@@ -58,7 +58,7 @@ def editor_window(
     background : Path, optional
         Picture to put under the map.
     theme : str, optional
-        Colours: "light" or "dark".
+        Colors: "light" or "dark".
     size : tuple of int, optional
         Width and height of the window, px.
     scale : float, optional

@@ -326,7 +326,7 @@ class Panel(SidePanel):
         editor = self.editor
         kind = find_object_kind(editor)
         if kind == "nothing":
-            ui.words(NOTHING_SELECTED, size=SMALL + 1, colour=ui.theme.faint)
+            ui.words(NOTHING_SELECTED, size=SMALL + 1, color=ui.theme.faint)
             ui.space(6)
             self._draw_object_list(ui)
             return
@@ -395,14 +395,14 @@ class Panel(SidePanel):
             if not problems:
                 is_measured = self.editor.measurement is not None
                 text = "Nothing is wrong with the map." if is_measured else "Checking the map …"
-                ui.words(text, colour=ui.theme.faint)
+                ui.words(text, color=ui.theme.faint)
             for number, problem in enumerate(problems[:MAX_PROBLEMS]):
                 is_fixed = self._draw_problem(ui, number, problem)
                 if is_fixed:
                     # The remaining problems are those of the map before.
                     return
             if len(problems) > MAX_PROBLEMS:
-                ui.words(f"… and {len(problems) - MAX_PROBLEMS} more", colour=ui.theme.faint)
+                ui.words(f"… and {len(problems) - MAX_PROBLEMS} more", color=ui.theme.faint)
 
     def _draw_problem(self, ui: Ui, number: int, problem: Problem) -> bool:
         """Draw a problem; return whether its fix has been applied."""

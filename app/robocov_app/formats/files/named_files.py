@@ -90,16 +90,16 @@ def find_named_file(
     if len(name) > _MAX_PATH_CHARACTERS:
         raise MapError(f"{at}: {quote(name)}: expected a shorter name, got {len(name)} characters")
     named = path.parent / name
-    neighbour = path.parent / PureWindowsPath(name).name
+    neighbor = path.parent / PureWindowsPath(name).name
     try:
         is_allowed = allow_anywhere or _is_inside(named, path.parent)
         is_usable = is_allowed and _exists(named)
-        if not is_usable and neighbour.is_file() and _is_inside(neighbour, path.parent):
+        if not is_usable and neighbor.is_file() and _is_inside(neighbor, path.parent):
             key = at.rpartition(": ")[2]
-            note = f"{key}: {quote(name)} not found, {quote(neighbour.name)} next to the file taken"
+            note = f"{key}: {quote(name)} not found, {quote(neighbor.name)} next to the file taken"
             if note not in notes:
                 notes.append(note)
-            return neighbour
+            return neighbor
     except (OSError, ValueError, RuntimeError) as error:
         raise MapError(f"{at}: {quote(name)}: {_describe_name_error(error)}") from None
     if not is_allowed:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov_app.formats.colours import WHITE, count_colours
+from robocov_app.formats.colors import WHITE, count_colors
 from robocov_app.formats.geometry.drawings import Boundary, Drawing, InterpretationReport
 from robocov_app.formats.geometry.painting import (
     PaintLayer,
@@ -71,11 +71,9 @@ def find_floors(
     chosen = {outline for outline in others if outline.role == "free"}
     is_slab = are_solid and boundary is not None and _is_slab(drawing, boundary)
     if are_solid and drawing.options.outlines is None:
-        undecided = [each for each in others if each.role is None and each.colour is not None]
+        undecided = [each for each in others if each.role is None and each.color is not None]
         if is_slab:
-            pale_floors = _PaleFloors(
-                [each for each in undecided if is_pale(each.colour)], "on a dark ground"
-            )
+            pale_floors = _PaleFloors([each for each in undecided if is_pale(each.color)], "on a dark ground")
         else:
             pale_floors = _find_pale_floors(drawing, boundary, others, undecided)
         _report_pale(drawing, undecided, pale_floors, report)
@@ -127,7 +125,7 @@ def is_background(drawing: Drawing, boundary: Boundary | None) -> bool:
     if drawing.page is None or boundary is None or boundary.is_named or len(boundary.outlines) != 1:
         return False
     (outline,) = boundary.outlines
-    is_plain = not outline.edges and outline.role is None and not is_dark(outline.colour)
+    is_plain = not outline.edges and outline.role is None and not is_dark(outline.color)
     covered = shapely.intersection(outline.area, drawing.page).area
     return is_plain and covered > _MIN_BACKGROUND_SHARE * drawing.page.area
 
@@ -140,7 +138,7 @@ def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
     if outline.role is not None:
         return outline.role == "solid"
     later = [each for each in drawing.outlines if each.order > outline.order and each.role != "solid"]
-    return is_dark(outline.colour) and any(is_pale(each.colour) for each in later)
+    return is_dark(outline.color) and any(is_pale(each.color) for each in later)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,18 +158,18 @@ def _find_pale_floors(
     """Return undecided outlines with something darker on them, those like these, and unseen ones."""
     marks = [outline.paint_layer for outline in outlines]
     lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
-    marks += [PaintLayer(LineString(line.points), line.order, line.colour) for line in lines]
+    marks += [PaintLayer(LineString(line.points), line.order, line.color) for line in lines]
     is_evident = find_evident_floors([outline.paint_layer for outline in undecided], marks)
     chosen = [outline for outline, evident in zip(undecided, is_evident, strict=True) if evident]
     chosen += [each for each in undecided if each not in chosen and _is_unseen(each, boundary)]
-    reason = "as darker paint lies on such" if any(is_evident) else "in the colour of the ground"
+    reason = "as darker paint lies on such" if any(is_evident) else "in the color of the ground"
     return _PaleFloors(chosen, reason)
 
 
 def _is_unseen(outline: ClosedOutline, boundary: Boundary | None) -> bool:
     """Return whether an outline has the pale color of the ground and no stroke: it only covers others."""
-    ground = [] if boundary is None else [each.colour for each in boundary.outlines]
-    return is_pale(outline.colour) and not outline.edges and outline.colour in (ground or [WHITE])
+    ground = [] if boundary is None else [each.color for each in boundary.outlines]
+    return is_pale(outline.color) and not outline.edges and outline.color in (ground or [WHITE])
 
 
 def _report_pale(
@@ -182,12 +180,12 @@ def _report_pale(
 ) -> None:
     """Report which pale paint was taken as floor, and which as solid."""
     rest = [outline for outline in undecided if outline not in floors.outlines]
-    pale = [outline.colour for outline in rest if is_pale(outline.colour)]
-    pale += [line.colour for line in drawing.lines if line.role is None and is_pale(line.colour)]
+    pale = [outline.color for outline in rest if is_pale(outline.color)]
+    pale += [line.color for line in drawing.lines if line.role is None and is_pale(line.color)]
     if floors.outlines:
-        counts = count_colours(outline.colour for outline in floors.outlines)
-        hint = "(--solid-colour: as obstacles)"
+        counts = count_colors(outline.color for outline in floors.outlines)
+        hint = "(--solid-color: as obstacles)"
         report.notes.append(f"pale fills taken as floor: {counts} {floors.reason} {hint}")
     if pale:
-        counts = count_colours(pale)
-        report.notes.append(f"pale paint taken as solid: {counts} (--free-colour: as free space)")
+        counts = count_colors(pale)
+        report.notes.append(f"pale paint taken as solid: {counts} (--free-color: as free space)")

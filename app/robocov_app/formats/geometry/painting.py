@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import BoolArray
 from robocov.environment import GRID_M
-from robocov_app.formats.colours import MAX_DARK_LUMINANCE, MIN_PALE_LUMINANCE, Colour, compute_luminance
+from robocov_app.formats.colors import MAX_DARK_LUMINANCE, MIN_PALE_LUMINANCE, Color, compute_luminance
 from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 
@@ -27,23 +27,23 @@ class PaintLayer:
     area : shapely geometry, m
     order : float
         Layers of a higher order are painted later, on top of lower ones.
-    colour : Colour or None
+    color : Color or None
         Color as it is seen on white; None where it is not known.
     """
 
     area: BaseGeometry
     order: float
-    colour: Colour | None = None
+    color: Color | None = None
 
 
-def is_dark(colour: Colour | None) -> bool:
+def is_dark(color: Color | None) -> bool:
     """Return whether a color is known and dark."""
-    return colour is not None and compute_luminance(colour) < MAX_DARK_LUMINANCE
+    return color is not None and compute_luminance(color) < MAX_DARK_LUMINANCE
 
 
-def is_pale(colour: Colour | None) -> bool:
+def is_pale(color: Color | None) -> bool:
     """Return whether a color is known and pale."""
-    return colour is not None and compute_luminance(colour) >= MIN_PALE_LUMINANCE
+    return color is not None and compute_luminance(color) >= MIN_PALE_LUMINANCE
 
 
 def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
@@ -67,11 +67,11 @@ def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]
     is_marked = _find_marked(fills, marks)
     if not is_marked.any():
         return [False] * len(fills)
-    colours = {fills[k].colour for k in np.flatnonzero(is_marked).tolist()}
+    colors = {fills[k].color for k in np.flatnonzero(is_marked).tolist()}
     sizes = shapely.area([fill.area for fill in fills])
     min_size = _MIN_ROOM_SHARE * sizes[is_marked].min()
     return [
-        is_pale(fill.colour) and (fill.colour in colours or size >= min_size)
+        is_pale(fill.color) and (fill.color in colors or size >= min_size)
         for fill, size in zip(fills, sizes.tolist(), strict=True)
     ]
 
@@ -79,13 +79,13 @@ def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]
 def _find_marked(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
     """Return which fills are pale and have something on them that is not."""
     is_marked = np.zeros(len(fills), dtype=bool)
-    darker = [mark for mark in marks if mark.colour is not None and not is_pale(mark.colour)]
+    darker = [mark for mark in marks if mark.color is not None and not is_pale(mark.color)]
     if not darker:
         return is_marked
     tree = shapely.STRtree([mark.area for mark in darker])
     order = np.array([mark.order for mark in darker])
     for k, fill in enumerate(fills):
-        if is_pale(fill.colour):
+        if is_pale(fill.color):
             on_fill = tree.query(fill.area, "covers")
             is_marked[k] = (order[on_fill] > fill.order).any()
     return is_marked

@@ -14,7 +14,7 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import to_one_line
 from robocov.mapfile.models import MAX_LABEL_CHARACTERS
-from robocov_app.formats.colours import Colour, Role
+from robocov_app.formats.colors import Color, Role
 from robocov_app.formats.geometry.enclosed_area import Rule
 from robocov_app.formats.geometry.painting import PaintLayer
 
@@ -65,7 +65,7 @@ class ClosedOutline:
         The disc that the outline is, if it is one.
     whole : str
         See `SourceGeometry`.
-    colour : Colour or None
+    color : Color or None
         Color of the fill as it is seen on white, if known.
     role : str or None
         Role that the user has declared for this color.
@@ -79,7 +79,7 @@ class ClosedOutline:
     labels: tuple[str, ...] = ()
     circle: CircleObstacle | None = None
     whole: str = ""
-    colour: Colour | None = None
+    color: Color | None = None
     role: Role | None = None
     order: int = 0
     edges: tuple["WallLine", ...] = ()
@@ -87,7 +87,7 @@ class ClosedOutline:
     @property
     def paint_layer(self) -> PaintLayer:
         """The fill."""
-        return PaintLayer(self.area, self.order, self.colour)
+        return PaintLayer(self.area, self.order, self.color)
 
     @property
     def filled_area(self) -> float:
@@ -128,7 +128,7 @@ class WallLine:
         See `robocov.environment.WallObstacle`.
     stretched : PenStroke or None
         Where the width depends on the direction.
-    colour, role, order
+    color, role, order
         See `ClosedOutline`.
     """
 
@@ -139,7 +139,7 @@ class WallLine:
     join: Literal["mitre", "bevel", "round"] = "mitre"
     mitre_limit: float = 4.0
     stretched: PenStroke | None = None
-    colour: Colour | None = None
+    color: Color | None = None
     role: Role | None = None
     order: int = 0
 
@@ -163,7 +163,7 @@ class WallLine:
     @property
     def paint_layer(self) -> PaintLayer:
         """The stroke."""
-        return PaintLayer(self.solid, self.order, self.colour)
+        return PaintLayer(self.solid, self.order, self.color)
 
     @property
     def wall(self) -> WallObstacle | None:

@@ -13,7 +13,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.formats import files
-from robocov_app.formats.colours import UNPAINTED, ColourKey, Paint, count_colours, name_colour
+from robocov_app.formats.colors import UNPAINTED, ColorKey, Paint, count_colors, name_color
 from robocov_app.formats.foreign_map import ForeignMap, Painted
 from robocov_app.formats.geometry.boundary_search import find_surrounding
 from robocov_app.formats.geometry.crossings import CrossingCounter
@@ -175,7 +175,7 @@ class Shapes:
 
     def _store_outline(self, outline: ClosedOutline, paint: Paint) -> None:
         self.outlines.append(
-            replace(outline, colour=paint.colour, role=paint.role, order=self._get_next_order())
+            replace(outline, color=paint.color, role=paint.role, order=self._get_next_order())
         )
 
     def _get_next_order(self) -> int:
@@ -347,20 +347,20 @@ class Shapes:
         )
 
 
-def note_colours(shapes: Shapes, key: ColourKey) -> None:
+def note_colors(shapes: Shapes, key: ColorKey) -> None:
     """Note how often colors with a declared role occur, and which colors there are if none of them does."""
     painted: list[ClosedOutline | WallLine] = [*shapes.outlines, *shapes.lines, *_list_edges(shapes)]
     for role in ("free", "solid"):
-        declared = [colour for colour, its_role in key.entries if its_role == role]
+        declared = [color for color, its_role in key.entries if its_role == role]
         matches = [shape for shape in painted if shape.role == role]
         if matches:
-            counts = count_colours(shape.colour for shape in matches)
-            shapes.notes.append(f"painted as {role}: {counts} (--{role}-colour)")
+            counts = count_colors(shape.color for shape in matches)
+            shapes.notes.append(f"painted as {role}: {counts} (--{role}-color)")
         elif declared:
-            known = count_colours(shape.colour for shape in painted)
+            known = count_colors(shape.color for shape in painted)
             others = f"; there are {known}" if known else ""
-            names = ", ".join(map(name_colour, declared))
-            shapes.notes.append(f"nothing is painted {names} (--{role}-colour){others}")
+            names = ", ".join(map(name_color, declared))
+            shapes.notes.append(f"nothing is painted {names} (--{role}-color){others}")
 
 
 def _list_edges(shapes: Shapes) -> list[WallLine]:
@@ -369,9 +369,9 @@ def _list_edges(shapes: Shapes) -> list[WallLine]:
 
 def _list_painted(shapes: Shapes) -> tuple[Painted, ...]:
     """Return everything that has a color, the lowest first."""
-    layers = [outline.paint_layer for outline in shapes.outlines if outline.colour is not None]
+    layers = [outline.paint_layer for outline in shapes.outlines if outline.color is not None]
     lines = [*shapes.lines, *_list_edges(shapes)]
-    layers += [line.paint_layer for line in lines if line.colour is not None]
+    layers += [line.paint_layer for line in lines if line.color is not None]
     # A fill and its own stroke, which is on top, have the same order; the sort keeps theirs.
     layers.sort(key=lambda layer: layer.order)
-    return tuple(Painted(layer.area, layer.colour) for layer in layers if layer.colour is not None)
+    return tuple(Painted(layer.area, layer.color) for layer in layers if layer.color is not None)

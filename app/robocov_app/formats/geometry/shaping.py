@@ -25,7 +25,7 @@ class Shaping(Options):
     """Parameters of the conversion of a foreign map to an environment."""
 
     simplify: float | None = None
-    """Walls may move by so many metres where that saves vertices; 0 keeps all. By default one cell of a
+    """Walls may move by so many meters where that saves vertices; 0 keeps all. By default one cell of a
     grid, 0.02 of the rest."""
     specks: float | None = None
     """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
@@ -34,14 +34,14 @@ class Shaping(Options):
     """Which connected parts of the free space stay; where the file places robots, the one with most of them
     counts as the largest."""
     inside: tuple[float, float] | None = None
-    """The part of the free space that holds this place, x and y in the map's metres, stays instead of the
+    """The part of the free space that holds this place, x and y in the map's meters, stays instead of the
     largest."""
     hull: bool = False
     """The boundary is the convex hull of the free space, not its outline."""
     margin: float = 0.0
-    """So many metres around the free space are solid."""
+    """So many meters around the free space are solid."""
     radius: float = DEFAULT_RADIUS_M
-    """Radius of a robot in metres: where it passes in the file, it passes in the map."""
+    """Radius of a robot in meters: where it passes in the file, it passes in the map."""
     default_start: Literal["room", "uniform"] = "room"
     """The map's default start: a disc at the roomiest place, or anywhere."""
 
@@ -125,5 +125,5 @@ class Conversion:
     def require_at_most(self, maximum: int, count: int, what: str) -> None:
         """Raise MapError if there are more than `maximum` obstacles or vertices."""
         if count > maximum:
-            hint = "--specks AREA drops small obstacles, --simplify METRES draws walls with fewer vertices"
+            hint = "--specks AREA drops small obstacles, --simplify METERS draws walls with fewer vertices"
             raise MapError(f"{self.where}: expected at most {maximum}, got {count} {what}: {hint}")

@@ -1,4 +1,4 @@
-"""OpenStreetMap extracts, in metres east and north of their middle.
+"""OpenStreetMap extracts, in meters east and north of their middle.
 
 Outdoors, buildings (including relations of several ways) and water (unless the option ``water`` makes it
 free) are solid; walls, fences, hedges and the like are walls with the width of their tag ``width`` or of the

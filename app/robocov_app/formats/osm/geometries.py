@@ -42,6 +42,6 @@ def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeom
 
 
 def parse_width(tags: dict[str, str]) -> float | None:
-    """Return the tag ``width`` in metres, or None."""
+    """Return the tag ``width`` in meters, or None."""
     match = _WIDTH.fullmatch(tags.get("width", "").strip())
     return float(match[1]) if match else None

@@ -7,7 +7,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov_app.formats.building_floor import DEFAULT_DOOR_WIDTH_M, MAX_FLOORS, FloorElement, Role
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import DEGREES, convert_to_metres
+from robocov_app.formats.georeference import DEGREES, convert_to_meters
 from robocov_app.formats.osm.data import OsmData, OsmElement
 from robocov_app.formats.osm.geometries import parse_width, to_line, to_point, to_polygon
 
@@ -97,7 +97,7 @@ def is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
 
 
 def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[FloorElement]:
-    """Return the elements of a level, in metres; those that are left out are counted in `shapes`."""
+    """Return the elements of a level, in meters; those that are left out are counted in `shapes`."""
     roles: list[Role] = []
     geometries: list[SourceGeometry] = []
     doors: list[OsmElement] = []
@@ -124,7 +124,7 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
     lost_doors = len(doors) - len(door_lines)
     if lost_doors:
         shapes.leave_out("door", "in no wall of this level", lost_doors)
-    projected = convert_to_metres([*geometries, *door_lines], shapes, DEGREES)
+    projected = convert_to_meters([*geometries, *door_lines], shapes, DEGREES)
     elements = [FloorElement(role, geometry) for role, geometry in zip(roles, projected, strict=False)]
     openings = [_build_opening(door_line) for door_line in projected[len(geometries) :]]
     return elements + [FloorElement("opening", opening) for opening in openings]
@@ -140,12 +140,12 @@ def _build_geometry(data: OsmData, element: OsmElement, role: Role, shapes: Shap
 
 def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[SourceGeometry]:
     """Return doors as lines of three points, in degrees: the node before in its wall, its own, the next."""
-    neighbours = _find_neighbours({door.number for door in doors}, data, walls)
+    neighbors = _find_neighbors({door.number for door in doors}, data, walls)
     lines = []
     for door in doors:
-        if door.number not in neighbours:
+        if door.number not in neighbors:
             continue
-        before, after = neighbours[door.number]
+        before, after = neighbors[door.number]
         line = data.get_lines(OsmElement("way", door.number, members=[before, door.number, after]))
         if line is not None:
             width = parse_width(door.tags)
@@ -153,16 +153,16 @@ def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement])
     return lines
 
 
-def _find_neighbours(doors: set[int], data: OsmData, walls: list[OsmElement]) -> dict[int, tuple[int, int]]:
+def _find_neighbors(doors: set[int], data: OsmData, walls: list[OsmElement]) -> dict[int, tuple[int, int]]:
     """Return the nodes before and after each door in the first wall that contains it."""
-    neighbours: dict[int, tuple[int, int]] = {}
+    neighbors: dict[int, tuple[int, int]] = {}
     for wall in walls:
         for way in data.get_ways(wall):
             nodes = [] if way is None else way.members
             for k, number in enumerate(nodes):
-                if number in doors and number not in neighbours:
-                    neighbours[number] = _get_adjacent_nodes(nodes, k)
-    return neighbours
+                if number in doors and number not in neighbors:
+                    neighbors[number] = _get_adjacent_nodes(nodes, k)
+    return neighbors
 
 
 def _get_adjacent_nodes(nodes: list[int], k: int) -> tuple[int, int]:
@@ -178,7 +178,7 @@ def _get_adjacent_nodes(nodes: list[int], k: int) -> tuple[int, int]:
 
 
 def _build_opening(door: SourceGeometry) -> SourceGeometry:
-    """Return the line across an opening, in metres, of a door as of `_find_doors`."""
+    """Return the line across an opening, in meters, of a door as of `_find_doors`."""
     before, middle, after = door.rings[0]
     direction = after - before if (after != before).any() else after - middle
     length = float(np.hypot(*direction))

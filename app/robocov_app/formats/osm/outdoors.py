@@ -5,7 +5,7 @@ import numpy as np
 from robocov.environment import Point
 from robocov.errors import format_count
 from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
-from robocov_app.formats.georeference import DEGREES, convert_to_metres
+from robocov_app.formats.georeference import DEGREES, convert_to_meters
 from robocov_app.formats.osm.data import OsmData, OsmElement
 from robocov_app.formats.osm.geometries import to_line, to_point, to_polygon
 
@@ -26,7 +26,7 @@ def add_outdoors(data: OsmData, shapes: Shapes) -> None:
         origin = ((west + east) / 2, (south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
         geometries.append(SourceGeometry("polygon", (corners,), (BOUNDARY,), "bounds"))
-    shapes.add_all(convert_to_metres(geometries, shapes, DEGREES, origin=origin))
+    shapes.add_all(convert_to_meters(geometries, shapes, DEGREES, origin=origin))
     gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
     if gates:
         shapes.notes.append(f"{format_count(gates, 'gate')} taken as closed")

@@ -1,7 +1,7 @@
 """Pictures: dark is an obstacle.
 
 `decoding` reads every kind of picture, and `classification` turns its pixels into cells. A picture that
-`robocov export` wrote has a text chunk with the side of a pixel in metres and the lower left corner, so that
+`robocov export` wrote has a text chunk with the side of a pixel in meters and the lower left corner, so that
 it is imported at the same position.
 """
 
@@ -16,7 +16,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, to_one_line
 from robocov.files.writing import replace_file
 from robocov.mapfile.models import MAX_COORDINATE_M
-from robocov_app.formats.colours import PICTURE_TOLERANCE
+from robocov_app.formats.colors import PICTURE_TOLERANCE
 from robocov_app.formats.foreign_map import ForeignMap, Thumbnail
 from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
 from robocov_app.formats.geometry.vectorize import build_grid_map
@@ -67,7 +67,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         If the picture is broken, its scale is unknown, or no cell is free.
     """
     where = to_one_line(path)
-    picture = read_picture(path, where, options.build_colour_key(PICTURE_TOLERANCE))
+    picture = read_picture(path, where, options.build_color_key(PICTURE_TOLERANCE))
     cell, origin = _parse_georeference(picture)
     if options.cell is not None:
         cell = options.cell
@@ -122,7 +122,7 @@ def _parse_georeference(picture: Brightness) -> tuple[float | None, tuple[float,
 def _describe_missing_scale(path: Path) -> str:
     metadata = path.with_suffix(".yaml")
     hint = f" (or import {to_one_line(metadata.name)} beside it)" if metadata.is_file() else ""
-    return f"expected --cell, the metres per pixel{hint}"
+    return f"expected --cell, the meters per pixel{hint}"
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

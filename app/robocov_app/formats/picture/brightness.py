@@ -17,7 +17,7 @@ _MAX_THUMBNAIL_PX = 640
 
 @dataclass(frozen=True, eq=False)
 class Brightness:
-    """A picture without its colours, the top row first.
+    """A picture without its colors, the top row first.
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class Brightness:
     lossy : bool
         Whether saving may change pixels, as in a JPEG.
     roles : (rows, columns) array of uint8 or None
-        Roles of declared colours, as of `ColourKey.classify`.
+        Roles of declared colors, as of `ColorKey.classify`.
     thumbnail : (h, w, 3) array of uint8 or None
-        The picture in its colours, reduced.
+        The picture in its colors, reduced.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
@@ -73,4 +73,4 @@ def describe_transparency(picture: Brightness) -> str:
     percentage = 100 * np.count_nonzero(picture.alpha < OPAQUE_ALPHA) / picture.alpha.size
     if percentage == 0.0:
         return ""
-    return f"{percentage:.3g} % of the pixels are transparent, and count by the colour that is hidden in them"
+    return f"{percentage:.3g} % of the pixels are transparent, and count by the color that is hidden in them"

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
-from robocov_app.formats.colours import NO_ROLE, ROLES, Role
+from robocov_app.formats.colors import NO_ROLE, ROLES, Role
 from robocov_app.formats.geometry.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
 from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.options import ReadOptions
@@ -22,12 +22,12 @@ _MAX_LINE_FRACTION = 0.25
 _LINE_WIDTH_FRACTION = 0.05
 """Width of a line, of the shorter side of a picture: no line is as wide."""
 _SOFT_EDGE_PX = 2
-"""Number of pixels from one colour to the next."""
+"""Number of pixels from one color to the next."""
 _ROLE_LABELS: dict[Role, str] = {"free": "free", "solid": "obstacles", "ignore": "left out"}
 
 
 def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, list[str]]:
-    """Return the pixels as cells, and notes on the declared colours.
+    """Return the pixels as cells, and notes on the declared colors.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, l
     notes: list[str] = []
     if roles is not None:
         if is_transparent is not None:
-            roles[is_transparent] = NO_ROLE  # a transparent pixel has no colour
+            roles[is_transparent] = NO_ROLE  # a transparent pixel has no color
         notes = _describe_roles(roles, options)
         cells[roles == _get_role_code("free")] = FREE
         cells[roles == _get_role_code("solid")] = BLOCKED
@@ -49,7 +49,7 @@ def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, l
             _free_soft_edges(cells, picture, roles, options)
     if is_transparent is not None:
         cells[is_transparent] = UNKNOWN
-    if roles is not None and options.ignore_colour:
+    if roles is not None and options.ignore_color:
         _fill_from_around(cells, roles == _get_role_code("ignore"))
     return cells, notes
 
@@ -71,22 +71,22 @@ def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]
     """Return how much of the picture each declared role covers."""
     notes = []
     for role in ROLES:
-        names = getattr(options, f"{role}_colour")
+        names = getattr(options, f"{role}_color")
         if names:
             fraction = np.count_nonzero(roles == _get_role_code(role)) / roles.size
-            colours = ", ".join(names)
-            notes.append(f"{100 * fraction:.3g} % of the pixels are {colours}, taken as {_ROLE_LABELS[role]}")
+            colors = ", ".join(names)
+            notes.append(f"{100 * fraction:.3g} % of the pixels are {colors}, taken as {_ROLE_LABELS[role]}")
     return notes
 
 
 def _free_soft_edges(
     cells: Cells, picture: Brightness, roles: NDArray[np.uint8], options: ReadOptions
 ) -> None:
-    """Make soft edges between a dark declared colour and light paint free.
+    """Make soft edges between a dark declared color and light paint free.
 
-    Their mixed colours are neither; without this, they would become walls around such colours.
+    Their mixed colors are neither; without this, they would become walls around such colors.
     """
-    declared = [sum(colour) / 765 for colour, role in options.build_colour_key().entries if role != "solid"]
+    declared = [sum(color) / 765 for color, role in options.build_color_key().entries if role != "solid"]
     if not declared or min(declared) >= 0.5:
         return
     mixed = (cells == BLOCKED) & (roles == NO_ROLE) & (picture.level > min(declared) * picture.full)
@@ -163,7 +163,7 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: s
         darkest = picture.level.min() / picture.full
         lightest = picture.level.max() / picture.full
         cause = f"its brightness is from {darkest:.2g} to {lightest:.2g}"
-        advice = "--threshold, --invert or --free-colour choose otherwise"
+        advice = "--threshold, --invert or --free-color choose otherwise"
     raise MapError(f"{where}: no cell is free: {cause} ({advice})")
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from robocov.errors import MapError, quote
 from robocov_app.formats import files
-from robocov_app.formats.colours import ColourKey
+from robocov_app.formats.colors import ColorKey
 from robocov_app.formats.picture.brightness import Brightness
 from robocov_app.formats.picture.netpbm import decode_netpbm
 from robocov_app.formats.picture.pillow import MAGIC_NUMBERS, decode_with_pillow
 
 _NETPBM = re.compile(rb"P[2356][\s#]")
-_NO_KEY = ColourKey()
+_NO_KEY = ColorKey()
 
 
 def is_picture(head: bytes) -> bool:
@@ -19,7 +19,7 @@ def is_picture(head: bytes) -> bool:
     return any(start.match(head) for start in (_NETPBM, *MAGIC_NUMBERS.values()))
 
 
-def read_picture(path: Path, where: str, key: ColourKey = _NO_KEY) -> Brightness:
+def read_picture(path: Path, where: str, key: ColorKey = _NO_KEY) -> Brightness:
     """Read a picture.
 
     Parameters
@@ -27,8 +27,8 @@ def read_picture(path: Path, where: str, key: ColourKey = _NO_KEY) -> Brightness
     path : Path
     where : str
         Name of the file for messages.
-    key : ColourKey
-        Colours whose roles are needed.
+    key : ColorKey
+        Colors whose roles are needed.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from robocov.errors import MapError, quote
 from robocov_app.formats import files
-from robocov_app.formats.colours import ColourKey
+from robocov_app.formats.colors import ColorKey
 from robocov_app.formats.picture.brightness import STRIP_ROWS, Brightness, choose_thumbnail_step, to_rgb
 
 _PIECE_BYTES = 1 << 20
@@ -24,7 +24,7 @@ _MAX_NUMBER_DIGITS = 9
 _MAX_LEVEL = 65535
 
 
-def decode_netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
+def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
     """Decode a PGM or PPM, raw or plain.
 
     Parameters
@@ -32,8 +32,8 @@ def decode_netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
     data : bytes
     where : str
         Name of the file for messages.
-    key : ColourKey
-        Colours whose roles are needed.
+    key : ColorKey
+        Colors whose roles are needed.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from PIL.Image import Image
 
 from robocov.errors import MapError, to_one_line
 from robocov_app.formats import files
-from robocov_app.formats.colours import ColourKey
+from robocov_app.formats.colors import ColorKey
 from robocov_app.formats.picture.brightness import STRIP_ROWS, Brightness, choose_thumbnail_step, to_rgb
 
 MAGIC_NUMBERS = {
@@ -23,11 +23,11 @@ MAGIC_NUMBERS = {
 }
 """First bytes of the formats that Pillow reads, by its names for them."""
 _MAX_JPEG_PIXELS_PER_BYTE = 512
-"""8 x 8 pixels take at least a bit; Pillow would fill missing ones with grey."""
+"""8 x 8 pixels take at least a bit; Pillow would fill missing ones with gray."""
 _MODES_WITH_ALPHA = ("LA", "PA", "RGBA", "La", "RGBa")
 
 
-def decode_with_pillow(data: bytes, name: str, where: str, key: ColourKey) -> Brightness:
+def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Brightness:
     """Decode a picture of one of the formats in `MAGIC_NUMBERS`.
 
     Parameters
@@ -37,8 +37,8 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColourKey) -> Br
         Name of the format in Pillow.
     where : str
         Name of the file for messages.
-    key : ColourKey
-        Colours whose roles are needed.
+    key : ColorKey
+        Colors whose roles are needed.
 
     Raises
     ------
@@ -72,7 +72,7 @@ class _UnclearSamplesError(ValueError):
     """Samples of a TIFF do not define black and white."""
 
 
-def _convert_float_samples(image: Image, key: ColourKey) -> Brightness:
+def _convert_float_samples(image: Image, key: ColorKey) -> Brightness:
     """Convert a TIFF of floating-point samples from 0 (black) to 1 (white); nan is transparent.
 
     Raises
@@ -115,8 +115,8 @@ def _convert_float_samples(image: Image, key: ColourKey) -> Brightness:
     )
 
 
-def _convert(image: Image, key: ColourKey) -> Brightness:
-    """Return a picture without its colours, turned as its metadata says."""
+def _convert(image: Image, key: ColorKey) -> Brightness:
+    """Return a picture without its colors, turned as its metadata says."""
     import PIL.ImageOps
     from PIL.ExifTags import Base
 
@@ -134,12 +134,12 @@ def _convert(image: Image, key: ColourKey) -> Brightness:
     if image.mode.startswith("I") and not is_transparent:
         return _convert_deep_samples(image, tiff_tags, key)
     has_alpha = is_transparent or image.mode in _MODES_WITH_ALPHA
-    is_grey = image.mode in ("1", "L", "LA") and not is_transparent
-    return _convert_bytes(image, key, texts, is_lossy=is_lossy, is_grey=is_grey, has_alpha=has_alpha)
+    is_gray = image.mode in ("1", "L", "LA") and not is_transparent
+    return _convert_bytes(image, key, texts, is_lossy=is_lossy, is_gray=is_gray, has_alpha=has_alpha)
 
 
-def _convert_deep_samples(image: Image, tiff_tags: Any, key: ColourKey) -> Brightness:
-    """Convert a grey picture of more than 8 bits."""
+def _convert_deep_samples(image: Image, tiff_tags: Any, key: ColorKey) -> Brightness:
+    """Convert a gray picture of more than 8 bits."""
     from PIL.ExifTags import Base
 
     full = 65535
@@ -156,20 +156,20 @@ def _convert_deep_samples(image: Image, tiff_tags: Any, key: ColourKey) -> Brigh
 
 def _convert_bytes(
     image: Image,
-    key: ColourKey,
+    key: ColorKey,
     texts: dict[str, str],
     *,
     is_lossy: bool,
-    is_grey: bool,
+    is_gray: bool,
     has_alpha: bool,
 ) -> Brightness:
     """Convert a picture of 8 bits; only a strip of it is copied at a time."""
-    mode = "L" if is_grey else "RGB"
+    mode = "L" if is_gray else "RGB"
     if has_alpha:
         mode += "A"
-    channels = 1 if is_grey else 3
+    channels = 1 if is_gray else 3
     shape = (image.height, image.width)
-    level: Any = np.empty(shape, np.uint8 if is_grey else np.uint16)
+    level: Any = np.empty(shape, np.uint8 if is_gray else np.uint16)
     alpha = np.empty(shape, np.uint8) if has_alpha else None
     roles = np.empty(shape, np.uint8) if key else None
     step = choose_thumbnail_step(image.width, image.height)
@@ -179,12 +179,12 @@ def _convert_bytes(
         strip = image.crop((0, rows.start, image.width, rows.stop)).convert(mode)
         pixels = np.asarray(strip)
         pixels = pixels.reshape(pixels.shape[0], pixels.shape[1], -1)
-        colours = pixels[:, :, :channels]
-        level[rows] = colours.sum(axis=2, dtype=level.dtype)
+        colors = pixels[:, :, :channels]
+        level[rows] = colors.sum(axis=2, dtype=level.dtype)
         if alpha is not None:
             alpha[rows] = pixels[:, :, channels]
         if roles is not None:
-            roles[rows] = key.classify(to_rgb(colours, 255))
+            roles[rows] = key.classify(to_rgb(colors, 255))
         pieces.append(_shrink(strip, step))
     return Brightness(
         level,
@@ -198,7 +198,7 @@ def _convert_bytes(
 
 
 def _shrink(strip: Image, step: int) -> NDArray[np.uint8]:
-    """Return a strip of a picture in its colours on white, `step` times smaller, (rows, columns, 3)."""
+    """Return a strip of a picture in its colors on white, `step` times smaller, (rows, columns, 3)."""
     import PIL.Image
 
     small = strip.reduce(step) if step > 1 else strip

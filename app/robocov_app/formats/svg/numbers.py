@@ -7,7 +7,7 @@ DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
 NUMBER = re.compile(rf"[\s,]*+({DECIMAL})", re.ASCII)
 MAX_NUMBER = 1e30
 """Numbers of a larger absolute value are rejected; those below its inverse are 0."""
-METRES_PER_UNIT = 0.0254 / 96
+METERS_PER_UNIT = 0.0254 / 96
 """Length of a user unit without the option ``scale``."""
 _LENGTH = re.compile(rf"\s*+({DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _USER_UNITS = {

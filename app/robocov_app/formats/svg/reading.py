@@ -26,10 +26,10 @@ from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, MAX_NESTING, Elemen
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M
 from robocov_app.formats.geometry.frames import transform_points
-from robocov_app.formats.geometry.shapes import Shapes, note_colours
+from robocov_app.formats.geometry.shapes import Shapes, note_colors
 from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.svg.element_state import ElementState, list_labels, parse_view_box
-from robocov_app.formats.svg.numbers import METRES_PER_UNIT, parse_length, parse_numbers
+from robocov_app.formats.svg.numbers import METERS_PER_UNIT, parse_length, parse_numbers
 from robocov_app.formats.svg.shape_reader import SHAPE_TAGS, ShapeReader
 from robocov_app.formats.svg.style import INHERITED, StyleSheet, inherit_style, is_hidden
 from robocov_app.formats.svg.transforms import build_affine, compose, fit_view_box
@@ -60,7 +60,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     _require_size(shapes)
     scale = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [scale, *drawing.describe()]
-    note_colours(shapes, drawing.shape_reader.key)
+    note_colors(shapes, drawing.shape_reader.key)
     texts = {
         child.tag: to_one_line(" ".join(child.text.split())) for child in root.children if child.text.strip()
     }
@@ -76,7 +76,7 @@ def _require_size(shapes: Shapes) -> None:
         return
     x, y, right, top = shapely.total_bounds(geometries)
     if max(right - x, top - y) < _MIN_SIZE_M:
-        hint = "--scale METRES says what a unit is, as in --scale 0.01"
+        hint = "--scale METERS says what a unit is, as in --scale 0.01"
         got = f"{right - x:.3g} x {top - y:.3g} m at its own scale"
         raise MapError(f"{shapes.where}: expected at least {_MIN_SIZE_M:g} m, got {got}: {hint}")
 
@@ -97,8 +97,8 @@ def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[Arra
         raise ValueError(f"expected a size, got {width:g} x {height:g} px")
     if scale is None:
         inside = fit_view_box(box, width, height, attributes.get("preserveAspectRatio", ""))
-        fit = compose(build_affine(METRES_PER_UNIT, d=METRES_PER_UNIT), inside)
-        bottom = METRES_PER_UNIT * height
+        fit = compose(build_affine(METERS_PER_UNIT, d=METERS_PER_UNIT), inside)
+        bottom = METERS_PER_UNIT * height
     else:
         fit = compose(build_affine(scale, d=scale), build_affine(e=-box[0], f=-box[1]))
         bottom = scale * box[3]

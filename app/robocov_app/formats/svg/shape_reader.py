@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
-from robocov_app.formats.colours import Paint, parse_css_colour_on_white
+from robocov_app.formats.colors import Paint, parse_css_color_on_white
 from robocov_app.formats.files import MAX_VERTICES
 from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
@@ -21,9 +21,9 @@ from robocov_app.formats.geometry.frames import transform_points
 from robocov_app.formats.geometry.shape_types import PenStroke
 from robocov_app.formats.geometry.shapes import Shapes, WallLine
 from robocov_app.formats.svg.element_state import ElementState
-from robocov_app.formats.svg.numbers import METRES_PER_UNIT, parse_length, parse_numbers
+from robocov_app.formats.svg.numbers import METERS_PER_UNIT, parse_length, parse_numbers
 from robocov_app.formats.svg.path_data import MAX_COMMANDS, Subpath, parse_path
-from robocov_app.formats.svg.style import StyleSheet, compute_visible_colour, is_painted
+from robocov_app.formats.svg.style import StyleSheet, compute_visible_color, is_painted
 from robocov_app.formats.svg.transforms import compute_stretch
 
 SHAPE_TAGS = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
@@ -50,7 +50,7 @@ class ShapeReader:
     ----------
     unit : float, m
         Length of a unit of the root.
-    key : ColourKey
+    key : ColorKey
         Colors with a declared role.
     dashed : int
         Number of dashed strokes.
@@ -58,8 +58,8 @@ class ShapeReader:
 
     def __init__(self, shapes: Shapes, sheet: StyleSheet, elements_by_id: dict[str, Element]) -> None:
         self.shapes = shapes
-        self.unit = METRES_PER_UNIT if shapes.options.scale is None else shapes.options.scale
-        self.key = shapes.options.build_colour_key()
+        self.unit = METERS_PER_UNIT if shapes.options.scale is None else shapes.options.scale
+        self.key = shapes.options.build_color_key()
         self.dashed = 0
         self._sheet = sheet
         self._elements_by_id = elements_by_id
@@ -105,16 +105,16 @@ class ShapeReader:
         """Return whether a color is declared to be ignored; then the fill or stroke is counted."""
         if paint.role != "ignore":
             return False
-        self.shapes.leave_out(what, "of a colour that is left out (--ignore-colour)")
+        self.shapes.leave_out(what, "of a color that is left out (--ignore-color)")
         return True
 
     def _find_paint(self, state: ElementState, what: Literal["fill", "stroke"]) -> Paint:
         """Return the color of a fill or a stroke; of a gradient, the first one."""
-        visible = compute_visible_colour(state.style, what, state.opacity, self._get_gradient_colour)
-        written = parse_css_colour_on_white(state.style[what])
+        visible = compute_visible_color(state.style, what, state.opacity, self._get_gradient_color)
+        written = parse_css_color_on_white(state.style[what])
         return Paint(visible, self.key.find_role(written) or self.key.find_role(visible))
 
-    def _get_gradient_colour(self, name: str) -> str | None:
+    def _get_gradient_color(self, name: str) -> str | None:
         """Return the first color of the gradient of that name, or of the one that it refers to."""
         for _ in range(_MAX_REFERENCES):
             gradient = self._elements_by_id.get(name)
@@ -201,7 +201,7 @@ class ShapeReader:
                 join=_JOINS.get(style["stroke-linejoin"].lower(), "mitre"),
                 mitre_limit=limit[0] if limit and limit[0] >= 1.0 else _DEFAULT_MITRE_LIMIT,
                 stretched=PenStroke(path, pen_width, state.matrix) if is_stretched else None,
-                colour=paint.colour,
+                color=paint.color,
                 role=paint.role,
             )
             lines.append(line)

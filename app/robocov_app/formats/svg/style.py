@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Literal, NamedTuple, TypeAlias
 
 from robocov.errors import MapError
-from robocov_app.formats.colours import Colour, mix_with_white, parse_css_colour
+from robocov_app.formats.colors import Color, mix_with_white, parse_css_color
 from robocov_app.formats.files.xml_tree import Element
 
 Style: TypeAlias = Mapping[str, str]
@@ -196,16 +196,16 @@ def is_painted(style: Style, what: Literal["fill", "stroke"]) -> bool:
     """Return whether a fill or a stroke is visible."""
     if style[what].lower() in ("none", "transparent") or _is_zero(style[f"{what}-opacity"]):
         return False
-    paint = parse_css_colour(style[what])
+    paint = parse_css_color(style[what])
     return paint is None or paint[1] > 0.0
 
 
-def compute_visible_colour(
+def compute_visible_color(
     style: Style,
     what: Literal["fill", "stroke"],
     opacity: float,
-    get_gradient_colour: Callable[[str], str | None],
-) -> Colour | None:
+    get_gradient_color: Callable[[str], str | None],
+) -> Color | None:
     """Return the color of a fill or a stroke, mixed with white where it is translucent.
 
     Parameters
@@ -214,25 +214,25 @@ def compute_visible_colour(
     what : "fill" or "stroke"
     opacity : float
         Opacity of the element and of the groups around it.
-    get_gradient_colour : callable
+    get_gradient_color : callable
         Returns the color of the gradient with a name, as it is written, or None.
 
     Returns
     -------
-    Colour or None
+    Color or None
         None where it is not known, as of a pattern.
     """
     written = style[what]
     match = _REFERENCE.match(written)
     if match:
-        written = get_gradient_colour(match[1]) or written[match.end() :].strip()
+        written = get_gradient_color(match[1]) or written[match.end() :].strip()
     if written.casefold() == "currentcolor":
         written = style["color"]
-    paint = parse_css_colour(written)
+    paint = parse_css_color(written)
     if paint is None:
         return None
-    colour, alpha = paint
-    return mix_with_white(colour, alpha * opacity * parse_opacity(style[f"{what}-opacity"]))
+    color, alpha = paint
+    return mix_with_white(color, alpha * opacity * parse_opacity(style[f"{what}-opacity"]))
 
 
 def parse_opacity(text: str) -> float:

@@ -145,18 +145,18 @@ def _build_page(environment: Environment, writer: _ShapeWriter, low: np.ndarray,
 
 def _build_rules(theme: Theme) -> str:
     """Return the style rules for a theme."""
-    ground = _format_colour(theme.panel)
-    page = _format_colour(theme.background)
-    edge = _format_colour(theme.boundary)
-    solid = _format_colour(theme.obstacle)
+    ground = _format_color(theme.panel)
+    page = _format_color(theme.background)
+    edge = _format_color(theme.boundary)
+    solid = _format_color(theme.obstacle)
     return (
         f"svg {{ background: {ground} }}\n#boundary {{ fill: {page}; stroke: {edge} }}\n"
         f"#obstacles {{ fill: {solid} }}\n.wall {{ fill: none; stroke: {solid} }}"
     )
 
 
-def _format_colour(colour: tuple[int, int, int]) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour)
+def _format_color(color: tuple[int, int, int]) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)
 
 
 def _escape(text: str) -> str:

@@ -23,7 +23,7 @@ def describe_losses(pairs: PairedComparison, name: str) -> str:
 
 
 def list_ratios_by_start(pairs: PairedComparison) -> str:
-    """Return the median ratio for each kind of starts: "corner 0.6, centre 0.7"."""
+    """Return the median ratio for each kind of starts: "corner 0.6, center 0.7"."""
     starts = np.array(pairs.outcomes.starts)
     kinds = dict.fromkeys(pairs.outcomes.starts)
     return ", ".join(f"{kind} {format_median(pairs.ratios[starts == kind])}" for kind in kinds)

@@ -101,7 +101,7 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
     goals = [
         _build_goal(
             "gap",
-            f"{label}'s cost is within {format_amount(MAX_GAP, '%')} of the centralised reference in the "
+            f"{label}'s cost is within {format_amount(MAX_GAP, '%')} of the centralized reference in the "
             "median.",
             _build_main_criteria(known, key).gap,
             describe_middle_half(gaps),

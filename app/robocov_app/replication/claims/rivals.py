@@ -57,7 +57,7 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
     claim = Claim(
         f"beyond-{own.key}-closes",
         RIVALS,
-        f"{own.label} closes most of the gap that {other.label} leaves to the centralised reference.",
+        f"{own.label} closes most of the gap that {other.label} leaves to the centralized reference.",
     )
     known = outcomes.select_finite("gap", own.key, other.key)
     if not known.instances:

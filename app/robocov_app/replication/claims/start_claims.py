@@ -67,7 +67,7 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
         ),
     )
     explanation = (
-        f"In metres: RAPF {format_median(rapf * sides, 'm')}, RPF {format_median(rpf * sides, 'm')} "
+        f"In meters: RAPF {format_median(rapf * sides, 'm')}, RPF {format_median(rpf * sides, 'm')} "
         f"(medians over maps). "
         f"Robots are matched so that the sum of straight distances is least. "
         f"A placement can differ while its cost does not: many are equally good."

@@ -1,18 +1,18 @@
 // One moment of a run, drawn on a canvas.
 
-const COLOURS = [
+const COLORS = [
   "background", "panel", "ink", "faint", "grid", "line", "boundary", "obstacle", "obstacle-edge", "moving-obstacle", "cell-edge", "start",
   "final", "on-final", "trajectory", "ring", "rapf", "rpf", "lloyd", "other-0", "other-1", "other-2",
   ...Array.from({ length: 9 }, (_, k) => `cell-${k}`),
 ];
 const ONE_HUE_EACH = 9;
-const MAP_COLOURS = 6;
+const MAP_COLORS = 6;
 const MOST_CELLS = 400; // of more, a picture takes too long to move
 const FONT = "system-ui, sans-serif";
 
 function lookOf(element) {
   const style = getComputedStyle(element);
-  return Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--rc-${name}`).trim()]));
+  return Object.fromEntries(COLORS.map((name) => [name, style.getPropertyValue(`--rc-${name}`).trim()]));
 }
 
 /** Makes a canvas as sharp as its screen and returns its context in CSS pixels, null while it has no size. */
@@ -68,7 +68,7 @@ function clipped(polygon, x, y, dx, dy, limit) {
   return kept;
 }
 
-/** Where metres are on a canvas: the whole region, as large as it goes, with a margin. */
+/** Where meters are on a canvas: the whole region, as large as it goes, with a margin. */
 function frameOf(plan, width, height, margin = 2) {
   const zoom = Math.min((width - 2 * margin) / plan.width, (height - 2 * margin) / plan.height);
   const left = (width - zoom * plan.width) / 2;
@@ -206,7 +206,7 @@ function drawTimedCells(context, run, places, states, frame, hues, look) {
 }
 
 function drawCells(context, run, places, states, frame, look) {
-  const hues = run.robots <= ONE_HUE_EACH ? ONE_HUE_EACH : MAP_COLOURS;
+  const hues = run.robots <= ONE_HUE_EACH ? ONE_HUE_EACH : MAP_COLORS;
   context.lineWidth = 1;
   context.strokeStyle = look["cell-edge"];
   if (run.speeds) {

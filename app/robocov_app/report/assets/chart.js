@@ -171,8 +171,8 @@ function drawCurve(context, run, x, y, look, above) {
   context.setLineDash([]);
 }
 
-/** The mark of a curve, an SVG path: a shape of its own beside the colour of its own. */
-function drawMark(context, mark, x, y, size, colour, look) {
+/** The mark of a curve, an SVG path: a shape of its own beside the color of its own. */
+function drawMark(context, mark, x, y, size, color, look) {
   const path = new Path2D(mark);
   context.save();
   context.translate(x, y);
@@ -180,7 +180,7 @@ function drawMark(context, mark, x, y, size, colour, look) {
   context.strokeStyle = look.background;
   context.lineWidth = 10 / size;
   context.stroke(path);
-  context.fillStyle = colour;
+  context.fillStyle = color;
   context.fill(path);
   context.restore();
 }

@@ -31,7 +31,7 @@ class Series {
     return row >= this.count - 1 ? this.end : row * this.step;
   }
 
-  /** The row at any time, linear in between; NaN where either neighbour is. */
+  /** The row at any time, linear in between; NaN where either neighbor is. */
   at(time) {
     const row = this.before(time);
     const from = this.values.subarray(row * this.width, (row + 1) * this.width);
@@ -46,14 +46,14 @@ class Series {
 class Plan {
   /** `again` is called when there is more to be drawn than at first. */
   constructor(data, again) {
-    const metres = (ring) => Float64Array.from(ring, (value) => value * data.unit);
+    const meters = (ring) => Float64Array.from(ring, (value) => value * data.unit);
     this.name = data.name;
-    [this.left, this.low, this.right, this.high] = metres(data.bounds);
+    [this.left, this.low, this.right, this.high] = meters(data.bounds);
     this.width = this.right - this.left;
     this.height = this.high - this.low;
-    this.region = metres(data.region);
-    this.blocked = data.blocked.map((rings) => rings.map(metres));
-    this.movers = (data.movers ?? []).map(({ rings, line, speed }) => ({ rings: rings.map(metres), line: metres(line), speed }));
+    this.region = meters(data.region);
+    this.blocked = data.blocked.map((rings) => rings.map(meters));
+    this.movers = (data.movers ?? []).map(({ rings, line, speed }) => ({ rings: rings.map(meters), line: meters(line), speed }));
     if (data.density) {
       this.density = new Image();
       this.density.onload = again;
@@ -105,17 +105,17 @@ class Run {
     });
   }
 
-  /** Places in metres, x and y in turn. Where the record tells no path, robots stay until they are there. */
+  /** Places in meters, x and y in turn. Where the record tells no path, robots stay until they are there. */
   placesAt(time, series = this.where) {
-    return this.metres(series.at(this.path || time >= this.end ? time : 0));
+    return this.meters(series.at(this.path || time >= this.end ? time : 0));
   }
 
-  metres(row) {
+  meters(row) {
     const { left, low, width, height } = this.plan;
     return Float64Array.from(row, (value, k) => (k % 2 ? low + value * height : left + value * width));
   }
 
-  /** Mean distance to the nearest robot in metres, NaN where it is not known. */
+  /** Mean distance to the nearest robot in meters, NaN where it is not known. */
   costAt(time) {
     if (!this.cost) return NaN;
     const { low, high, last } = this.range;

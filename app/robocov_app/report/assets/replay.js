@@ -71,7 +71,7 @@ class Replay {
     this.build();
     this.fill();
     new ResizeObserver(() => this.draw()).observe(this.stage);
-    const again = () => this.recolour();
+    const again = () => this.recolor();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
     // notebooks change their theme by attributes of the page
     const watch = new MutationObserver(again);
@@ -151,7 +151,7 @@ class Replay {
     this.controls.querySelector(".goals").hidden = !shown.some((k) => runs[k].goals);
     this.slider.max = String(this.end);
     this.chart.parentElement.hidden = !shown.some((k) => runs[k].cost);
-    this.recolour();
+    this.recolor();
     this.update();
     this.describe();
   }
@@ -269,7 +269,7 @@ class Replay {
     acts[event.key]();
   }
 
-  recolour() {
+  recolor() {
     this.look = lookOf(this.root);
     this.draw();
   }

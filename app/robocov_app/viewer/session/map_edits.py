@@ -13,10 +13,10 @@ from robocov.environment import CircleObstacle, Environment, Obstacle, Point, Po
 from robocov.errors import MapError, format_path
 from robocov.mapfile import from_json, to_json
 
-SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
+SHORTEST = 0.02  # meters below which what is drawn is taken for a slip of the hand
 CELLS = 96  # cells along the longer side of a map whose density is painted
 LEAST, MOST = 0.05, 50.0  # between these a place counts once it has been painted
-_DAB = 1.15  # factor of one dab on the density at its centre
+_DAB = 1.15  # factor of one dab on the density at its center
 _DECIMALS = 3  # of what is painted, so that a map that is saved stays short
 
 
@@ -97,7 +97,7 @@ def circle_of(center: tuple[float, float], rim: tuple[float, float]) -> CircleOb
 
 
 def _rounded(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Return points to the tenth of a millimetre, so that files stay short; repeated ones once."""
+    """Return points to the tenth of a millimeter, so that files stay short; repeated ones once."""
     rounded = [(round(float(x), 4), round(float(y), 4)) for x, y in points]
     return tuple(point for point, _ in groupby(rounded))
 

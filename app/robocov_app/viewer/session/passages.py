@@ -26,7 +26,7 @@ def passage_words(
             words.append(f"the team is parted in {left.sum()}")
         if not left.any():
             left = shapely.area(parts) == shapely.area(parts).max(initial=0.0)
-        lost = shapely.union_all(parts[~left])  # of places of centres
+        lost = shapely.union_all(parts[~left])  # of places of centers
         area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost, radius)))
         if area > radius * radius:
             words.append(f"{area:.1f} m² cut off")

@@ -73,7 +73,7 @@ def _known(law: "ControllerChoice", info: Any) -> "ControllerChoice":
 
 Text: TypeAlias = Annotated[str, Field(strict=True, max_length=10_000)]
 Coordinate: TypeAlias = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
-Position: TypeAlias = Annotated[tuple[Coordinate, Coordinate], Field(description="[x, y] in metres")]
+Position: TypeAlias = Annotated[tuple[Coordinate, Coordinate], Field(description="[x, y] in meters")]
 _VALUE: TypeAlias = Annotated[float, Field(strict=True)] | Annotated[str, Field(strict=True)] | None
 _GAINS = read_as(dict[str, _VALUE], lambda gains, _: gains, lambda gains, _: dict(gains))
 _LIMIT = read_as(

@@ -29,7 +29,7 @@ from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Sc
 from robocov_app.viewer.session.undo_tree import MOST_KEPT, Document, Node, replayed
 
 MOST_GHOSTS = 8  # branches whose curves are shown
-PUSHED = 5e-3  # metres from which on a robot counts as pushed: who leans on something moves in any case
+PUSHED = 5e-3  # meters from which on a robot counts as pushed: who leans on something moves in any case
 MOST_SENSED = 300  # moments of another branch from which it is found out anew what was sensed
 _SLIDE = 1.0  # seconds of simulation within which changes of a value, as by a slider, are one touch
 _SLICE = 0.03  # seconds of a frame for making a branch again

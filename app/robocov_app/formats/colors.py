@@ -1,4 +1,4 @@
-"""Colours of drawings and pictures, and the roles that the user declares for them."""
+"""Colors of drawings and pictures, and the roles that the user declares for them."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from numpy.typing import NDArray
 
 from robocov.errors import ParameterError, format_count, quote
 
-Colour: TypeAlias = tuple[int, int, int]
+Color: TypeAlias = tuple[int, int, int]
 Role: TypeAlias = Literal["free", "solid", "ignore"]
 ROLES: tuple[Role, ...] = ("free", "solid", "ignore")
-WHITE: Colour = (255, 255, 255)
+WHITE: Color = (255, 255, 255)
 NO_ROLE = 0
 """Value in arrays of roles, in which a role is its index in `ROLES` plus one."""
 PICTURE_TOLERANCE = 24.0
-"""Tolerance of a picture, in levels: JPEG compression and soft edges change colours by that much."""
+"""Tolerance of a picture, in levels: JPEG compression and soft edges change colors by that much."""
 MAX_DARK_LUMINANCE = 0.5
 """Paint with a lower luminance is dark."""
 MIN_PALE_LUMINANCE = 0.75
 """Paint with this luminance or a higher one is pale."""
 _LUMA_WEIGHTS = (0.299, 0.587, 0.114)
 """Weights of red, green and blue (ITU-R BT.601)."""
-_MAX_COLOURS = 32
-"""Largest number of declared colours: each is compared with every pixel."""
-_MAX_LISTED_COLOURS = 6
+_MAX_COLORS = 32
+"""Largest number of declared colors: each is compared with every pixel."""
+_MAX_LISTED_COLORS = 6
 _MAX_NAME_CHARACTERS = 100
 _FUNCTION = re.compile(r"rgba?\(([^()]*)\)", re.IGNORECASE)
 _NUMBER = re.compile(r"\+?(\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(%?)", re.ASCII)
 
 
 @dataclass(frozen=True)
-class ColourKey:
-    """Colours with a declared role.
+class ColorKey:
+    """Colors with a declared role.
 
     Parameters
     ----------
-    entries : sequence of (colour, role)
+    entries : sequence of (color, role)
     tolerance : float
         Largest difference in each of red, green and blue, from 0 to 255.
 
@@ -50,45 +50,45 @@ class ColourKey:
     A key without entries is false.
     """
 
-    entries: tuple[tuple[Colour, Role], ...] = ()
+    entries: tuple[tuple[Color, Role], ...] = ()
     tolerance: float = 0.0
 
     @classmethod
-    def from_names(cls, names: Mapping[Role, Sequence[str]], tolerance: float = 0.0) -> ColourKey:
-        """Build a key from the names of colours of each role.
+    def from_names(cls, names: Mapping[Role, Sequence[str]], tolerance: float = 0.0) -> ColorKey:
+        """Build a key from the names of colors of each role.
 
         Raises
         ------
         ParameterError
-            If a colour is unknown, or has two roles.
+            If a color is unknown, or has two roles.
         """
-        entries: dict[Colour, Role] = {}
+        entries: dict[Color, Role] = {}
         for role, texts in names.items():
             for text in texts:
-                colour = parse_colour(text, f"{role}_colour")
-                if entries.setdefault(colour, role) != role:
-                    other = f"{entries[colour]}_colour"
-                    raise ParameterError(f"{role}_colour: {quote(text)} is a colour of {other} as well")
-        if len(entries) > _MAX_COLOURS:
-            raise ParameterError(f"free_colour: expected at most {_MAX_COLOURS} colours, got {len(entries)}")
+                color = parse_color(text, f"{role}_color")
+                if entries.setdefault(color, role) != role:
+                    other = f"{entries[color]}_color"
+                    raise ParameterError(f"{role}_color: {quote(text)} is a color of {other} as well")
+        if len(entries) > _MAX_COLORS:
+            raise ParameterError(f"free_color: expected at most {_MAX_COLORS} colors, got {len(entries)}")
         return cls(tuple(entries.items()), tolerance)
 
     def __bool__(self) -> bool:
         return bool(self.entries)
 
-    def find_role(self, colour: Colour | None) -> Role | None:
-        """Return the role of the nearest declared colour within the tolerance, or None."""
-        if colour is None or not self.entries:
+    def find_role(self, color: Color | None) -> Role | None:
+        """Return the role of the nearest declared color within the tolerance, or None."""
+        if color is None or not self.entries:
             return None
-        code = int(self.classify(np.array([[colour]], dtype=np.uint8))[0, 0])
+        code = int(self.classify(np.array([[color]], dtype=np.uint8))[0, 0])
         return None if code == NO_ROLE else ROLES[code - 1]
 
-    def find_nearest(self, colour: Colour) -> Colour | None:
-        """Return the nearest colour of the key within the tolerance, of any role, or None."""
-        nearest: Colour | None = None
+    def find_nearest(self, color: Color) -> Color | None:
+        """Return the nearest color of the key within the tolerance, of any role, or None."""
+        nearest: Color | None = None
         smallest_difference = np.inf
         for entry, _ in self.entries:
-            difference = max(abs(a - b) for a, b in zip(colour, entry, strict=True))
+            difference = max(abs(a - b) for a, b in zip(color, entry, strict=True))
             if difference <= self.tolerance and difference < smallest_difference:
                 nearest = entry
                 smallest_difference = difference
@@ -108,11 +108,11 @@ class ColourKey:
         """
         roles = np.full(pixels.shape[:2], NO_ROLE, dtype=np.uint8)
         nearest = np.full(pixels.shape[:2], 256, dtype=np.int16)
-        for colour, role in self.entries:
+        for color, role in self.entries:
             difference = np.zeros(pixels.shape[:2], dtype=np.int16)
             for channel in range(3):
                 levels = pixels[:, :, channel].astype(np.int16)
-                np.maximum(difference, abs(levels - colour[channel]), out=difference)
+                np.maximum(difference, abs(levels - color[channel]), out=difference)
             closer = (difference < nearest) & (difference <= self.tolerance)
             roles[closer] = ROLES.index(role) + 1
             nearest[closer] = difference[closer]
@@ -124,45 +124,45 @@ class Paint(NamedTuple):
 
     Attributes
     ----------
-    colour : tuple of 3 int or None
-        Colour on a white page, if it is known.
+    color : tuple of 3 int or None
+        Color on a white page, if it is known.
     role : str or None
-        Declared role of the colour.
+        Declared role of the color.
     """
 
-    colour: Colour | None = None
+    color: Color | None = None
     role: Role | None = None
 
 
 UNPAINTED = Paint()
 
 
-def parse_colour(text: str, option: str) -> Colour:
-    """Return the colour of a CSS name or of ``#rrggbb``, given as an option.
+def parse_color(text: str, option: str) -> Color:
+    """Return the color of a CSS name or of ``#rrggbb``, given as an option.
 
     Raises
     ------
     ParameterError
         If the text is neither; the message begins with `option`.
     """
-    colour = None if text.strip().casefold() == "transparent" else parse_css_colour_on_white(text)
-    if colour is None:
-        expected = "a colour name or #rrggbb, as in lightblue or '#add8e6'"
+    color = None if text.strip().casefold() == "transparent" else parse_css_color_on_white(text)
+    if color is None:
+        expected = "a color name or #rrggbb, as in lightblue or '#add8e6'"
         raise ParameterError(f"{option}: expected {expected}, got {quote(text)}")
-    return colour
+    return color
 
 
-def parse_css_colour_on_white(text: str) -> Colour | None:
-    """Return the colour of a CSS text on a white page, or None if it is not a colour."""
-    paint = parse_css_colour(text)
+def parse_css_color_on_white(text: str) -> Color | None:
+    """Return the color of a CSS text on a white page, or None if it is not a color."""
+    paint = parse_css_color(text)
     if paint is None:
         return None
-    colour, opacity = paint
-    return mix_with_white(colour, opacity)
+    color, opacity = paint
+    return mix_with_white(color, opacity)
 
 
-def parse_css_colour(text: str) -> tuple[Colour, float] | None:
-    """Return the colour and the opacity, from 0 to 1, of a CSS text, or None if it is not a colour."""
+def parse_css_color(text: str) -> tuple[Color, float] | None:
+    """Return the color and the opacity, from 0 to 1, of a CSS text, or None if it is not a color."""
     from PIL import ImageColor
 
     text = text.strip()
@@ -181,8 +181,8 @@ def parse_css_colour(text: str) -> tuple[Colour, float] | None:
     return (red, green, blue), opacity
 
 
-def _parse_rgb_arguments(arguments: str) -> tuple[Colour, float] | None:
-    """Return the colour and the opacity of the arguments of ``rgb()``, in any notation of CSS Color 4."""
+def _parse_rgb_arguments(arguments: str) -> tuple[Color, float] | None:
+    """Return the color and the opacity of the arguments of ``rgb()``, in any notation of CSS Color 4."""
     levels: list[float] = []
     for word in re.split(r"[\s,/]+", arguments.strip()):
         number = _NUMBER.fullmatch(word)
@@ -198,27 +198,27 @@ def _parse_rgb_arguments(arguments: str) -> tuple[Colour, float] | None:
     return (red, green, blue), opacity
 
 
-def mix_with_white(colour: Colour, opacity: float) -> Colour:
-    """Return a colour as it appears on white with an opacity from 0 to 1."""
-    red, green, blue = (round(255 + (level - 255) * opacity) for level in colour)
+def mix_with_white(color: Color, opacity: float) -> Color:
+    """Return a color as it appears on white with an opacity from 0 to 1."""
+    red, green, blue = (round(255 + (level - 255) * opacity) for level in color)
     return red, green, blue
 
 
-def name_colour(colour: Sequence[int]) -> str:
-    """Return a colour as ``#rrggbb``."""
-    return "#{:02x}{:02x}{:02x}".format(*colour)
+def name_color(color: Sequence[int]) -> str:
+    """Return a color as ``#rrggbb``."""
+    return "#{:02x}{:02x}{:02x}".format(*color)
 
 
-def count_colours(colours: Iterable[Colour | None]) -> str:
-    """Return the names of colours with their frequencies, the most frequent first; None is ignored."""
-    counts = Counter(name_colour(colour) for colour in colours if colour is not None)
-    words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_LISTED_COLOURS)]
+def count_colors(colors: Iterable[Color | None]) -> str:
+    """Return the names of colors with their frequencies, the most frequent first; None is ignored."""
+    counts = Counter(name_color(color) for color in colors if color is not None)
+    words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_LISTED_COLORS)]
     unlisted = len(counts) - len(words)
     if unlisted:
-        words.append(f"and {format_count(unlisted, 'other colour')}")
+        words.append(f"and {format_count(unlisted, 'other color')}")
     return ", ".join(words)
 
 
-def compute_luminance(colour: Colour) -> float:
-    """Return the luminance of a colour, from 0 (black) to 1 (white)."""
-    return sum(weight * level for weight, level in zip(_LUMA_WEIGHTS, colour, strict=True)) / 255
+def compute_luminance(color: Color) -> float:
+    """Return the luminance of a color, from 0 (black) to 1 (white)."""
+    return sum(weight * level for weight, level in zip(_LUMA_WEIGHTS, color, strict=True)) / 255

@@ -1,4 +1,4 @@
-"""Colours in the import dialogue: by a click, by the keyboard, with a live preview."""
+"""Colors in the import dialog: by a click, by the keyboard, with a live preview."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,10 +12,10 @@ from PIL import Image, ImageDraw
 
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.import_sheet import (
-    build_colour_sheet,
+    build_color_sheet,
     choose_next_role,
     find_role,
-    list_declared_colours,
+    list_declared_colors,
     set_role,
 )
 from robocov_app.editor.ui.importing import ImportJob
@@ -48,42 +48,42 @@ def free_area(asked: ImportDialog) -> float:
     return asked.imported.environment.free_area
 
 
-def test_a_colour_goes_through_its_roles_and_back(drawing: Path) -> None:
+def test_a_color_goes_through_its_roles_and_back(drawing: Path) -> None:
     asked = dialog(drawing)
     assert free_area(asked) == pytest.approx(ROOM - 6)
     for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
-        asked.cycle_colour((224, 224, 255))
+        asked.cycle_color((224, 224, 255))
         assert find_role(asked.entries, (224, 224, 255)) == role
         assert free_area(asked) == pytest.approx(area)
         # what is left out can still be clicked
         assert asked.imported is not None and asked.imported.sheet is not None
-        assert asked.imported.sheet.find_colour(*RUG) == (224, 224, 255)
+        assert asked.imported.sheet.find_color(*RUG) == (224, 224, 255)
     assert asked.entries == {}
 
 
 def test_what_was_typed_stays_beside_what_is_clicked() -> None:
-    given = {"free_colour": "red, lightblue", "cell": "1"}
+    given = {"free_color": "red, lightblue", "cell": "1"}
     set_role(given, (0, 0, 255), "free")
-    assert given == {"free_colour": "red, lightblue, #0000ff", "cell": "1"}
+    assert given == {"free_color": "red, lightblue, #0000ff", "cell": "1"}
     set_role(given, (255, 0, 0), "solid")
-    assert given == {"free_colour": "lightblue, #0000ff", "solid_colour": "#ff0000", "cell": "1"}
-    assert list_declared_colours(given) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
+    assert given == {"free_color": "lightblue, #0000ff", "solid_color": "#ff0000", "cell": "1"}
+    assert list_declared_colors(given) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
     set_role(given, (255, 0, 0), None)
-    assert "solid_colour" not in given
-    # half a name is no colour yet
-    given["free_colour"] = "lightbl"
-    assert list_declared_colours(given) == []
+    assert "solid_color" not in given
+    # half a name is no color yet
+    given["free_color"] = "lightbl"
+    assert list_declared_colors(given) == []
     assert choose_next_role(choose_next_role(choose_next_role(choose_next_role(None)))) is None
 
 
 def test_the_topmost_shape_is_the_one_that_is_clicked(drawing: Path) -> None:
-    found = build_colour_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
+    found = build_color_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
     assert found is not None
-    assert found.colours == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
-    assert found.find_colour(*RUG) == (224, 224, 255)
-    assert found.find_colour(5.0, 5.0) == (0, 0, 0)
-    assert found.find_colour(8.0, 1.0) == (200, 200, 200)
-    assert found.find_colour(-1.0, 1.0) is None
+    assert found.colors == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
+    assert found.find_color(*RUG) == (224, 224, 255)
+    assert found.find_color(5.0, 5.0) == (0, 0, 0)
+    assert found.find_color(8.0, 1.0) == (200, 200, 200)
+    assert found.find_color(-1.0, 1.0) is None
 
 
 def picture(folder: Path) -> Path:
@@ -97,25 +97,25 @@ def picture(folder: Path) -> Path:
     return folder / "plan.png"
 
 
-def test_colours_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
-    found = build_colour_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
+def test_colors_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
+    found = build_color_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
     assert found is not None
     names = {(255, 255, 255), (160, 192, 255), (0, 0, 0), (255, 0, 0)}
-    assert set(found.colours) == names
-    assert found.find_colour(5.0, 8.0) == (160, 192, 255)
-    assert found.find_colour(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
-    assert found.find_colour(25.0, 5.0) is None and found.find_colour(5.0, -0.01) is None
+    assert set(found.colors) == names
+    assert found.find_color(5.0, 8.0) == (160, 192, 255)
+    assert found.find_color(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
+    assert found.find_color(25.0, 5.0) is None and found.find_color(5.0, -0.01) is None
     asked = dialog(picture(tmp_path), "picture")
     asked.set("cell", "0.1")
     split = free_area(asked)
-    asked.cycle_colour((255, 0, 0))
+    asked.cycle_color((255, 0, 0))
     assert find_role(asked.entries, (255, 0, 0)) == "free"
     assert free_area(asked) > split + 50
 
 
-def test_a_map_without_colours_has_no_sheet(tmp_path: Path) -> None:
+def test_a_map_without_colors_has_no_sheet(tmp_path: Path) -> None:
     foreign = IMPORTERS["svg"].read(dialog_file(tmp_path), ReadOptions())
-    assert build_colour_sheet(foreign) is not None
+    assert build_color_sheet(foreign) is not None
     path = tmp_path / "plan.wkt"
     path.write_text(shapely.box(0, 0, 5, 5).wkt)
     asked = dialog(path, "wkt")
@@ -153,18 +153,18 @@ def pixel(hands: Hands, point: Any) -> tuple[int, ...]:
     return tuple(hands.window.screen.get_at((x, y)))[:3]
 
 
-def test_a_click_on_the_preview_changes_a_colour_and_the_preview(hands: Hands) -> None:
+def test_a_click_on_the_preview_changes_a_color_and_the_preview(hands: Hands) -> None:
     asked, widgets = shown(hands)
-    hands.click(*widgets["button:clicks:colour"].rect.center)
+    hands.click(*widgets["button:clicks:color"].rect.center)
     asked, widgets = shown(hands)
     before, after = (camera.to_pixels(np.array(RUG)) for camera in asked.preview.cameras)
     assert pixel(hands, before) == (224, 224, 255)
     solid = pixel(hands, after)
     hands.click(*before.tolist())
     asked, widgets = shown(hands)
-    assert asked.entries == {"free_colour": "#e0e0ff"}
-    # the rows of colours are in sight, and do not move the maps
-    chip = widgets["button:colour:#e0e0ff"]
+    assert asked.entries == {"free_color": "#e0e0ff"}
+    # the rows of colors are in sight, and do not move the maps
+    chip = widgets["button:color:#e0e0ff"]
     assert chip.text.strip() == "free"
     assert pixel(hands, asked.preview.cameras[1].to_pixels(np.array(RUG))) != solid
     # a click into the right map still keeps a part
@@ -173,29 +173,29 @@ def test_a_click_on_the_preview_changes_a_colour_and_the_preview(hands: Hands) -
     assert [float(word) for word in asked.entries["inside"].split()] == pytest.approx((8.0, 1.0), abs=0.1)
 
 
-def test_colours_are_reached_by_the_keyboard(hands: Hands) -> None:
+def test_colors_are_reached_by_the_keyboard(hands: Hands) -> None:
     shown(hands)
     ui = hands.window.dialogs._ui
     for _ in range(60):
-        if ui.focus == "clicks:colour":
+        if ui.focus == "clicks:color":
             break
         hands.key("tab")
         hands.frames(1)
-    assert ui.focus == "clicks:colour"
+    assert ui.focus == "clicks:color"
     hands.key("space")
     hands.frames(2)
     for _ in range(10):
-        if ui.focus == "colour:#e0e0ff":
+        if ui.focus == "color:#e0e0ff":
             break
         hands.key("tab")
         hands.frames(1)
     hands.key("space")
     asked, _ = shown(hands)
-    assert asked.entries == {"free_colour": "#e0e0ff"}
-    assert ui.focus is not None and ui.focus == "colour:#e0e0ff"
+    assert asked.entries == {"free_color": "#e0e0ff"}
+    assert ui.focus is not None and ui.focus == "color:#e0e0ff"
     hands.key("space")
     asked, _ = shown(hands)
-    assert asked.entries == {"solid_colour": "#e0e0ff"}
+    assert asked.entries == {"solid_color": "#e0e0ff"}
 
 
 def test_the_report_is_in_sight(hands: Hands) -> None:

@@ -1,4 +1,4 @@
-"""Drawings by their colours: free, solid and ignored paint, floors, nesting, thin strokes, widths."""
+"""Drawings by their colors: free, solid and ignored paint, floors, nesting, thin strokes, widths."""
 
 from pathlib import Path
 
@@ -27,31 +27,31 @@ def test_paint_that_is_declared_free_is_no_obstacle(tmp_path: Path) -> None:
     rug = FLOOR + WALLS + '<rect x="1" y="1" width="3" height="2" fill="#e0e0ff"/>'
     foreign = drawn(tmp_path, rug)
     assert foreign.free.area == pytest.approx(ROOM - 6)
-    assert "pale paint taken as solid: #e0e0ff (1) (--free-colour: as free space)" in foreign.notes
-    chosen = drawn(tmp_path, rug, free_colour=("#e0e0ff",))
+    assert "pale paint taken as solid: #e0e0ff (1) (--free-color: as free space)" in foreign.notes
+    chosen = drawn(tmp_path, rug, free_color=("#e0e0ff",))
     assert chosen.free.area == pytest.approx(ROOM)
-    assert "painted as free: #e0e0ff (1) (--free-colour)" in chosen.notes
-    assert free(tmp_path, rug, free_colour=("#e6e6fa",), colour_tolerance=6.0) == pytest.approx(ROOM)
-    ignored = drawn(tmp_path, rug, ignore_colour=("#e0e0ff",))
+    assert "painted as free: #e0e0ff (1) (--free-color)" in chosen.notes
+    assert free(tmp_path, rug, free_color=("#e6e6fa",), color_tolerance=6.0) == pytest.approx(ROOM)
+    ignored = drawn(tmp_path, rug, ignore_color=("#e0e0ff",))
     assert ignored.free.area == pytest.approx(ROOM)
-    assert any("of a colour that is left out" in line for line in ignored.dropped)
+    assert any("of a color that is left out" in line for line in ignored.dropped)
 
 
-def test_a_colour_that_does_not_occur_is_named_with_those_that_do(tmp_path: Path) -> None:
-    notes = drawn(tmp_path, FLOOR + WALLS, free_colour=("red",)).notes
-    assert any("nothing is painted #ff0000 (--free-colour); there are #" in note for note in notes)
+def test_a_color_that_does_not_occur_is_named_with_those_that_do(tmp_path: Path) -> None:
+    notes = drawn(tmp_path, FLOOR + WALLS, free_color=("red",)).notes
+    assert any("nothing is painted #ff0000 (--free-color); there are #" in note for note in notes)
 
 
 def test_what_is_painted_later_counts(tmp_path: Path) -> None:
     door = '<rect x="4.8" y="2" width="0.4" height="1" fill="white"/>'
-    assert free(tmp_path, FLOOR + WALLS + door, free_colour=("white",)) == pytest.approx(ROOM + 0.2)
+    assert free(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
     below = FLOOR + door + WALLS
-    assert free(tmp_path, below, free_colour=("white",)) == pytest.approx(ROOM)
+    assert free(tmp_path, below, free_color=("white",)) == pytest.approx(ROOM)
 
 
 def test_a_free_stroke_opens_a_wall(tmp_path: Path) -> None:
     door = '<line x1="5" y1="2" x2="5" y2="3" stroke="white" stroke-width="0.4"/>'
-    assert free(tmp_path, FLOOR + WALLS + door, free_colour=("white",)) == pytest.approx(ROOM + 0.2)
+    assert free(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
 
 
 def test_a_pale_fill_with_dark_paint_on_it_is_floor(tmp_path: Path) -> None:
@@ -60,17 +60,17 @@ def test_a_pale_fill_with_dark_paint_on_it_is_floor(tmp_path: Path) -> None:
     foreign = drawn(tmp_path, FLOOR + rooms + table + WALLS)
     assert any(note.startswith("pale fills taken as floor: #fff0d0 (1)") for note in foreign.notes)
     assert foreign.free.area == pytest.approx(ROOM - shapely.Point(0, 0).buffer(0.5).area, abs=0.01)
-    # of its colour all are floor, and of others none
+    # of its color all are floor, and of others none
     other = '<rect x="6" y="1" width="1" height="1" fill="#fff0d0"/>'
     same = free(tmp_path, FLOOR + rooms + table + WALLS + other)
     assert same == pytest.approx(foreign.free.area)
-    declared = free(tmp_path, FLOOR + rooms + table + WALLS, solid_colour=("#fff0d0",))
+    declared = free(tmp_path, FLOOR + rooms + table + WALLS, solid_color=("#fff0d0",))
     assert declared == pytest.approx(4.9 * 5.8 - 0.1 * 3.9)
 
 
 def test_a_stroke_around_floor_is_a_wall(tmp_path: Path) -> None:
     room = '<rect x="1" y="1" width="4" height="4" fill="white" stroke="#000" stroke-width="0.2"/>'
-    foreign = drawn(tmp_path, FLOOR + WALLS.replace("M5 0V4", "") + room, free_colour=("white",))
+    foreign = drawn(tmp_path, FLOOR + WALLS.replace("M5 0V4", "") + room, free_color=("white",))
     assert foreign.free.area == pytest.approx(9.8 * 5.8 - (4.2**2 - 3.8**2))
 
 
@@ -89,7 +89,7 @@ def test_rooms_on_a_dark_ground_are_free(tmp_path: Path) -> None:
 
 def test_only_what_is_painted_free_is_free_where_nothing_encloses(tmp_path: Path) -> None:
     rooms = "".join(f'<rect x="{x}" y="1" width="3" height="4" fill="#eef"/>' for x in (1, 4))
-    assert free(tmp_path, rooms, free_colour=("#eef",)) == pytest.approx(24)
+    assert free(tmp_path, rooms, free_color=("#eef",)) == pytest.approx(24)
 
 
 def test_nested_outlines_are_free_and_solid_by_turns(tmp_path: Path) -> None:
@@ -167,7 +167,7 @@ def test_the_width_of_a_stretched_stroke_is_that_across_it(
 
 
 @pytest.mark.parametrize(
-    ("paint", "colour"),
+    ("paint", "color"),
     [
         ('fill="#bcd"', "#bbccdd"),
         ('style="fill:rgb(187, 204, 221)"', "#bbccdd"),
@@ -183,7 +183,7 @@ def test_the_width_of_a_stretched_stroke_is_that_across_it(
         ('fill="lavender"', "#e6e6fa"),
     ],
 )
-def test_colours_are_read_as_they_are_seen(tmp_path: Path, paint: str, colour: str) -> None:
+def test_colors_are_read_as_they_are_seen(tmp_path: Path, paint: str, color: str) -> None:
     head = (
         "<style>.room { fill: #fed }</style><defs><linearGradient id='shade'>"
         "<stop style='stop-color:#eee'/><stop stop-color='#111'/></linearGradient>"
@@ -191,7 +191,7 @@ def test_colours_are_read_as_they_are_seen(tmp_path: Path, paint: str, colour: s
     )
     shape = f'<g><rect x="1" y="1" width="3" height="2" {paint}/></g>'
     foreign = drawn(tmp_path, head + FLOOR + WALLS + shape)
-    assert f"pale paint taken as solid: {colour} (1) (--free-colour: as free space)" in foreign.notes
+    assert f"pale paint taken as solid: {color} (1) (--free-color: as free space)" in foreign.notes
 
 
 @pytest.mark.parametrize("paint", ['fill="rgba(0,0,0,0)"', 'fill="#0000"', 'fill="transparent"'])
