@@ -20,10 +20,10 @@ from robocov.errors import ParameterError, require_number
 from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.geodesics import SOURCE_BINS
 from robocov.lower_bound.price_table import PriceTable, add_paid_shares
-from robocov.lower_bound.worth_bounds import (
+from robocov.lower_bound.profit_bounds import (
     SiteData,
     TriangleScratch,
-    bound_worths,
+    bound_profits,
     halve_triangles,
 )
 
@@ -31,10 +31,13 @@ MIN_PRECISION = 1e-5
 """The smallest precision that may be requested."""
 
 _ROUGH_SMOOTHINGS = (0.02, 0.007)
-"""Smoothing of the maximal worth in the first searches for prices, as fractions of the cost."""
+"""Smoothing of the maximal profit in the first searches for prices, as fractions of the cost."""
 
 _SMOOTHING = 0.0025
 """Smoothing before the first proof. It is halved before each later proof."""
+
+_FINAL_SMOOTHING = 0.125
+"""Smoothing of the last search for prices, as a fraction of the requested precision."""
 
 _SLACK = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
@@ -163,7 +166,7 @@ def compute_lower_bound(
     report(1.0)
     mean_distance = max(best.bound, 0.0) / dual.total_weight
     all_prices = np.full(len(cost.points), np.nan)
-    all_prices[dual.sites] = best.prices
+    all_prices[dual.site_numbers] = best.prices
     mass = float(environment.free_masses[dual.is_covered].sum())
     return LowerBound(
         mean_distance=mean_distance,
@@ -181,7 +184,7 @@ class _Proof(NamedTuple):
     prices: Array
     """(m,) m, prices of the sites that prove the bound."""
     better_candidates: Array
-    """(p, 2) grid steps, positions that are worth more than any in the table."""
+    """(p, 2) grid steps, positions with a higher profit than any in the table."""
 
 
 def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
@@ -191,7 +194,7 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
     best: _Proof | None = None
     smoothing = _SMOOTHING
-    rounds = max(1, math.ceil(math.log2(8.0 * smoothing / precision)))
+    rounds = max(1, math.ceil(math.log2(smoothing / (_FINAL_SMOOTHING * precision))))
     for k in range(rounds):
         fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / rounds
         heartbeat = partial(report, fraction)
@@ -214,8 +217,8 @@ class _Dual:
     ----------
     is_covered : (c,) bool array
         Whether each component of the free space contains robots.
-    sites : (m,) int array
-        The sites in these components.
+    site_numbers : (m,) int array
+        The sites in these components, as indices into the points of the cost.
     total_weight : float
         Sum of their weights.
     placement_cost : float, m
@@ -228,23 +231,23 @@ class _Dual:
         geodesics = cost.geodesics
         self._geodesics = geodesics
         self._unit = geodesics.grid.unit
-        self._robots = len(positions)
+        self._robot_count = len(positions)
         result = cost(positions)
-        robots, is_inside = geodesics.snap_to_free_space(positions)
+        robots, is_inside = geodesics.snap_to_free_space(positions)  # (n, 2) grid steps; (n, c) bool
         self.is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
-        self.sites: IntArray = np.flatnonzero(result.owner >= 0)
+        self.site_numbers: IntArray = np.flatnonzero(result.owner >= 0)
         weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
-        self._weights = weights[self.sites]
+        self._weights = weights[self.site_numbers]
         self.total_weight = float(self._weights.sum())
         if not self.total_weight > 0.0:
             raise ParameterError(
                 f"lattice: expected sites with a weight where the robots are, got none with {cost.lattice} "
                 "cells along a side"
             )
-        self.placement_cost = float(self._weights @ result.distances[self.sites])
+        self.placement_cost = float(self._weights @ result.distances[self.site_numbers])
 
-        points = cost.points[self.sites]
-        sites, _ = geodesics.snap_to_free_space(points)
+        site_positions = cost.points[self.site_numbers]
+        sites, _ = geodesics.snap_to_free_space(site_positions)  # (m, 2) grid steps
         from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
         self._site_data = SiteData(
             walls=geodesics.walls,
@@ -260,7 +263,7 @@ class _Dual:
         count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * len(robots))
         side = max(1, int(math.sqrt(len(sites) / count)))
         self._candidate_spacing = side * cost.spacing / self._unit
-        inside = sites[shapely.intersects_xy(configuration_space, points[:, 0], points[:, 1])]
+        inside = sites[shapely.intersects_xy(configuration_space, site_positions[:, 0], site_positions[:, 1])]
         self._table = PriceTable.build_empty()
         self.add_candidates(np.concatenate([robots, self._thin_out(inside)]))
 
@@ -271,7 +274,7 @@ class _Dual:
         area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
         if area.is_empty:
             raise ParameterError(
-                f"radius: expected one that fits in the components of the positions, got {radius:g} m"
+                f"radius: expected a disc that fits in the free space around the positions, got {radius:g} m"
             )
         return area
 
@@ -312,22 +315,22 @@ class _Dual:
     def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
         """Search for prices, (m,) m, that raise the dual over the positions in the table.
 
-        In place of the maximum worth, the search uses the smooth function ``s log sum exp(worth / s)``.
+        In place of the maximum profit, the search uses the smooth function ``s log sum exp(profit / s)``.
         `smoothing` is s as a fraction of the cost per robot.
         """
         weights = self._weights
         scale = max(self.placement_cost, 1e-9 * self.total_weight * self._geodesics.size)
-        s = smoothing * scale / self._robots
+        s = smoothing * scale / self._robot_count
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
             heartbeat()
-            worths = self._table.compute_worths(prices, weights)
-            max_worth = worths.max()
-            shares = np.exp((worths - max_worth) / s)
-            smooth_max = max_worth + s * math.log(shares.sum())
+            profits = self._table.compute_profits(prices, weights)
+            max_profit = profits.max()
+            shares = np.exp((profits - max_profit) / s)
+            smooth_max = max_profit + s * math.log(shares.sum())
             paid = np.zeros(len(prices))
-            add_paid_shares(self._table, prices, shares * (self._robots / shares.sum()), paid)
-            dual = float(weights @ prices) - self._robots * smooth_max
+            add_paid_shares(self._table, prices, shares * (self._robot_count / shares.sum()), paid)
+            dual = float(weights @ prices) - self._robot_count * smooth_max
             return -dual / scale, weights * (paid - 1.0) / scale
 
         solution = minimize(
@@ -340,8 +343,8 @@ class _Dual:
         )
         return np.asarray(solution.x)
 
-    def bound_worths(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
-        """Compute upper bounds on the worths of all points of triangles.
+    def bound_profits(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
+        """Compute upper bounds on the profits of all points of triangles.
 
         Parameters
         ----------
@@ -352,55 +355,57 @@ class _Dual:
         -------
         centers : (t, 2) array, grid steps
             A point in each triangle.
-        worths : (t,) array, m
-            Worths of these points.
+        profits : (t,) array, m
+            Profits of these points.
         bounds : (t,) array, m
-            Upper bound on the worth of every point of each triangle.
+            Upper bound on the profit of every point of each triangle.
         """
         middles = self._geodesics.grid.to_meters(triangles.mean(axis=1))
         centers, _ = self._geodesics.snap_to_free_space(middles)
         scratch = TriangleScratch.allocate(len(self._geodesics.corners))
-        worths = np.empty((2, len(triangles)))
+        profits = np.empty((2, len(triangles)))
         grid_prices = prices / self._unit
 
         def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
-            return int(bound_worths(self._site_data, index, grid_prices, triangles, centers, scratch, worths))
+            return int(
+                bound_profits(self._site_data, index, grid_prices, triangles, centers, scratch, profits)
+            )
 
         self._geodesics.run_with_index(1, SOURCE_BINS, fill)
-        worths *= self._unit
-        return centers, worths[0], worths[1]
+        profits *= self._unit
+        return centers, profits[0], profits[1]
 
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost.
 
         The bound is at most `tolerance` times the placement's cost below the best one for these prices.
         """
-        slack = tolerance * self.placement_cost / self._robots
-        table_worth = self._table.compute_worths(prices, self._weights).max()
-        worth_bound = 0.0
-        best_worth = 0.0
+        slack = tolerance * self.placement_cost / self._robot_count
+        table_profit = self._table.compute_profits(prices, self._weights).max()
+        profit_bound = 0.0
+        best_profit = 0.0
         count = 0
         triangles = self._triangles
         leaves = []
         better_candidates = [np.empty((0, 3))]
         while len(triangles):
             heartbeat()
-            centers, worths, bounds = self.bound_worths(prices, triangles)
-            best_worth = max(best_worth, float(worths.max()))
+            centers, profits, bounds = self.bound_profits(prices, triangles)
+            best_profit = max(best_profit, float(profits.max()))
             count += len(triangles)
-            better_candidates.append(np.column_stack([worths, centers])[worths > table_worth])
-            is_leaf = (bounds <= best_worth + slack) | (count >= _MAX_TRIANGLES)
-            worth_bound = max(worth_bound, float(bounds[is_leaf].max(initial=0.0)))
+            better_candidates.append(np.column_stack([profits, centers])[profits > table_profit])
+            is_leaf = (bounds <= best_profit + slack) | (count >= _MAX_TRIANGLES)
+            profit_bound = max(profit_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
             triangles = halve_triangles(triangles[~is_leaf])
         # The next proof starts with these triangles.
         self._triangles = np.concatenate(leaves)
-        rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robots
-        bound = float(self._weights @ prices) - self._robots * worth_bound - rounding
+        rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robot_count
+        bound = float(self._weights @ prices) - self._robot_count * profit_bound - rounding
         candidates = np.concatenate(better_candidates)
-        by_worth = np.argsort(-candidates[:, 0], kind="stable")
+        by_profit = np.argsort(-candidates[:, 0], kind="stable")
         return _Proof(
             bound=bound,
             prices=prices,
-            better_candidates=self._thin_out(candidates[by_worth, 1:]),
+            better_candidates=self._thin_out(candidates[by_profit, 1:]),
         )

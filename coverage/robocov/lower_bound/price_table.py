@@ -56,8 +56,8 @@ class PriceTable(NamedTuple):
             distance=np.append(self.distance, distances[position, site].astype(np.float32)),
         )
 
-    def compute_worths(self, prices: Array, weights: Array) -> Array:
-        """Compute the worths of the positions.
+    def compute_profits(self, prices: Array, weights: Array) -> Array:
+        """Compute the profits of the positions.
 
         Parameters
         ----------
@@ -70,20 +70,20 @@ class PriceTable(NamedTuple):
         -------
         (p,) array
         """
-        worths = np.empty(len(self.first_entry) - 1)
-        _compute_worths(self, prices, weights, worths)
-        return worths
+        profits = np.empty(len(self.first_entry) - 1)
+        _compute_profits(self, prices, weights, profits)
+        return profits
 
 
 @kernel
-def _compute_worths(table: PriceTable, prices: Array, weights: Array, worths: Array) -> None:
-    """Write the worths of the positions of the table."""
-    for position in range(len(worths)):
-        worth = 0.0
+def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: Array) -> None:
+    """Write the profits of the positions of the table."""
+    for position in range(len(profits)):
+        profit = 0.0
         for entry in range(table.first_entry[position], table.first_entry[position + 1]):
             site = table.site[entry]
-            worth += weights[site] * max(prices[site] - table.distance[entry], 0.0)
-        worths[position] = worth
+            profit += weights[site] * max(prices[site] - table.distance[entry], 0.0)
+        profits[position] = profit
 
 
 @kernel

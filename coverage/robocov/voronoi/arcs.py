@@ -40,27 +40,27 @@ _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
 
-def compute_moments(pieces: Array, cells: int) -> Array:
+def compute_moments(pieces: Array, cell_count: int) -> Array:
     """Compute the moments of cells from the pieces of their boundaries.
 
     Parameters
     ----------
     pieces : (p, 6 or more) array
         In any order; each relative to the generator of its cell.
-    cells : int
-        Number of cells.
+    cell_count : int
 
     Returns
     -------
     (n, 4) array
         Area (m²), first moments in x and y (m³) and polar moment (m⁴) of each cell about its generator.
     """
-    return np.asarray(_compute_moments(np.ascontiguousarray(pieces), cells, _SERIES))
+    return np.asarray(_compute_moments(np.ascontiguousarray(pieces), cell_count, _SERIES))
 
 
 @kernel
-def _compute_moments(pieces: Array, cells: int, series: Array) -> Array:
-    moments = np.zeros((cells, 4))
+def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
+    """Return the areas, first moments in x and y, and polar moments of the cells, (n, 4)."""
+    moments = np.zeros((cell_count, 4))
     for k in range(len(pieces)):
         x = pieces[k, START_X]
         y = pieces[k, START_Y]

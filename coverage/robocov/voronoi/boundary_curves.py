@@ -46,8 +46,12 @@ PAIR_OWN_SPEED = 4
 PAIR_OTHER_SPEED = 5
 """Column of a pair: speed of the neighbor, m/s."""
 
+_EDGE_START_X = 0
+_EDGE_START_Y = 1
+_EDGE_END_X = 2
+_EDGE_END_Y = 3
 _EDGE_CELL = 4
-_EDGE_BEYOND = 5
+_EDGE_BEYOND = 5  # the robot on the other side; negative for a side of the region
 
 _FIRST_IS_OUTSIDE = 1
 _SECOND_IS_OUTSIDE = 2
@@ -95,18 +99,18 @@ def trace_boundaries(
             edge += 1
         own_pairs = pairs[first_pair:pair]
         own_edges = edges[first_edge:edge]
-        lines = edge - first_edge
-        curves = np.empty((lines + pair - first_pair, _CURVE_COLUMNS))
+        line_count = edge - first_edge
+        curves = np.empty((line_count + pair - first_pair, _CURVE_COLUMNS))
         count = _write_circles(curves, own_pairs, own_edges)
         # Without circles, the cell is the one among robots of equal speeds.
-        is_straight[i] = count == lines
+        is_straight[i] = count == line_count
         if is_straight[i]:
-            pieces = _make_room(pieces, used, lines)
+            pieces = _make_room(pieces, used, line_count)
             used = _add_edges(own_edges, pieces, used)
         elif count > 0:
             _write_lines(curves, own_pairs, own_edges, sides, points[i])
             crossings = np.empty((count, count, 2))
-            _find_crossings(curves[:count], lines, crossings)
+            _find_crossings(curves[:count], line_count, crossings)
             for c in range(count):
                 pieces = _make_room(pieces, used, 2 * count + 2)
                 used = _add_parts(curves[c], crossings[c], pieces, used)
@@ -170,7 +174,7 @@ def _compute_reach(pairs: Array, edges: Array) -> float:
     """Return an upper bound of the distances of a cell's points from its generator, m; -1 if it is empty."""
     reach = 0.0
     for e in range(len(edges)):
-        reach = max(reach, np.sqrt(edges[e, 0] ** 2 + edges[e, 1] ** 2))
+        reach = max(reach, np.sqrt(edges[e, _EDGE_START_X] ** 2 + edges[e, _EDGE_START_Y] ** 2))
     for k in range(len(pairs)):
         own_speed = pairs[k, PAIR_OWN_SPEED]
         other_speed = pairs[k, PAIR_OTHER_SPEED]
@@ -195,8 +199,8 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
         normal_y = curves[e, _NORMAL_Y]
         curves[e, _COEFFICIENT] = 0.0
         # On a line, t is half the signed distance along it from the point nearest to the generator.
-        curves[e, _BEGIN] = 0.5 * (normal_x * edges[e, 1] - normal_y * edges[e, 0])
-        curves[e, _END] = 0.5 * (normal_x * edges[e, 3] - normal_y * edges[e, 2])
+        curves[e, _BEGIN] = 0.5 * (normal_x * edges[e, _EDGE_START_Y] - normal_y * edges[e, _EDGE_START_X])
+        curves[e, _END] = 0.5 * (normal_x * edges[e, _EDGE_END_Y] - normal_y * edges[e, _EDGE_END_X])
         curves[e, _CURVE_CELL] = edges[e, _EDGE_CELL]
         curves[e, _CURVE_BEYOND] = edges[e, _EDGE_BEYOND]
 
@@ -218,8 +222,8 @@ def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
 @kernel
 def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
     """Write the direction and distance from the generator of the side of the region that an edge lies on."""
-    middle_x = 0.5 * (edge[0] + edge[2])
-    middle_y = 0.5 * (edge[1] + edge[3])
+    middle_x = 0.5 * (edge[_EDGE_START_X] + edge[_EDGE_END_X])
+    middle_y = 0.5 * (edge[_EDGE_START_Y] + edge[_EDGE_END_Y])
     min_offset = np.inf
     for s in range(len(sides)):
         normal_x = sides[s, 2]
@@ -234,12 +238,12 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 
 
 @kernel
-def _find_crossings(curves: Array, lines: int, crossings: Array) -> None:
+def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
     """For each pair of curves, find the interval of the first one on the cell's side of the second one.
 
     The crossings are (k, k, 2) values of t on the first curve, nan if the two do not intersect. A curve that
-    is nowhere on the cell's side of another one gets an empty interval. The lines of a cell are not compared
-    with each other: between their ends they are its edges.
+    is nowhere on the cell's side of another one gets an empty interval. The first `line_count` curves are the
+    edges of the cell among equally fast robots. They are not compared with each other.
     """
     count = len(curves)
     for one in range(count):
@@ -249,7 +253,7 @@ def _find_crossings(curves: Array, lines: int, crossings: Array) -> None:
             enter = np.nan
             leave = np.nan
             outside = 0
-            if other >= lines:
+            if other >= line_count:
                 enter, leave, outside = _intersect(curves[one], curves[other])
             if outside & _FIRST_IS_OUTSIDE:
                 curves[one, _END] = -np.inf

@@ -86,7 +86,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
         polygon = _find_cell(workspace, triangulation, points, sides, i)
         total = write_cell(workspace, polygon, points, i, cells, total)
         mass += cells.mass[i]
-    area = _compute_area(sides)
+    area = _compute_region_area(sides)
     return total if abs(mass - area) <= _MASS_TOLERANCE * area else -1
 
 
@@ -94,7 +94,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
 def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> bool:
     """Triangulate the robots and three sentinels; return whether it succeeded."""
     n = len(points)
-    x, y, size = _compute_bounds(sides)
+    x, y, size = _compute_center_and_size(sides)
     corners = np.empty((n + 3, 2))
     for i in range(n):
         corners[i, 0] = points[i, 0]
@@ -120,7 +120,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
 
 
 @kernel
-def _compute_bounds(sides: Array) -> tuple[float, float, float]:
+def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
     """Return the center of the region's bounding box and the sum of its width and height, m."""
     left = sides[0, 0]
     right = sides[0, 0]
@@ -135,9 +135,12 @@ def _compute_bounds(sides: Array) -> tuple[float, float, float]:
 
 
 @kernel
-def _compute_area(sides: Array) -> float:
-    """Return the area of the region, m², from coordinates relative to its center."""
-    x, y, _ = _compute_bounds(sides)
+def _compute_region_area(sides: Array) -> float:
+    """Return the area of the region, m².
+
+    Its vertices are the starts of its sides. They are taken relative to the center, which limits rounding.
+    """
+    x, y, _ = _compute_center_and_size(sides)
     area = 0.0
     for k in range(len(sides)):
         after = k + 1 if k + 1 < len(sides) else 0

@@ -94,8 +94,8 @@ class WeightedCells(Cells):
         if self.density is not None and not self.density.is_uniform:
             return super().polar_moment
         weight = 1.0 if self.density is None else self.density.max_value
-        polar_moment = compute_moments(self.pieces, len(self.generators))[:, 3]
-        return np.where(self.mass > 0.0, weight * polar_moment, 0.0)
+        moments = compute_moments(self.pieces, cell_count=len(self.generators))
+        return np.where(self.mass > 0.0, weight * moments[:, 3], 0.0)
 
 
 def partition_by_travel_time(
@@ -186,9 +186,11 @@ def _compute_weighted_cells(
             edges=np.column_stack([edges.start, edges.end, edges.cell, edges.beyond]),
             is_straight=is_straight,
         )
-    moments = compute_moments(pieces, len(points))
-    mass = np.where(moments[:, 0] < _MIN_AREA * region.area, 0.0, moments[:, 0])
-    centroid = points + moments[:, 1:3] / np.where(mass > 0.0, mass, np.inf)[:, None]
+    moments = compute_moments(pieces, cell_count=len(points))
+    areas = moments[:, 0]
+    first_moments = moments[:, 1:3]
+    mass = np.where(areas < _MIN_AREA * region.area, 0.0, areas)
+    centroid = points + first_moments / np.where(mass > 0.0, mass, np.inf)[:, None]
     speeds.setflags(write=False)
     return WeightedCells(
         generators=points,

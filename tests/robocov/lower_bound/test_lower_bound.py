@@ -16,7 +16,7 @@ from robocov.errors import InputError, ParameterError
 from robocov.k_median import apply_best_swaps, run_lloyd
 from robocov.lower_bound import compute_lower_bound
 from robocov.lower_bound.bound import _Dual
-from robocov.lower_bound.worth_bounds import halve_triangles
+from robocov.lower_bound.profit_bounds import halve_triangles
 from robocov.mapfile import load_map
 from robocov.optimum import find_optimum
 
@@ -82,7 +82,7 @@ def test_it_is_close_to_the_optimum_on_bundled_maps(name, robots):
 
 @settings(max_examples=30)
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 7))
-def test_no_point_of_a_triangle_is_worth_more_than_its_bound(kind, seed, halvings):
+def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvings):
     environment = build_random_map(kind, 12, seed)
     if environment is None:
         return
@@ -90,20 +90,20 @@ def test_no_point_of_a_triangle_is_worth_more_than_its_bound(kind, seed, halving
     cost = CoverageCost(environment, 8)
     dual = _Dual(cost, rng.choice(cost.points, 3), float(rng.choice([1e-6, 0.02])))
     # With prices for few sites, an error at one of them is not hidden by the slack of the others.
-    some = rng.random(len(dual.sites)) < rng.choice([0.04, 1.0])
-    prices = np.where(some, rng.uniform(2.0, 12.0, len(dual.sites)), 0.0)
+    some = rng.random(len(dual.site_numbers)) < rng.choice([0.04, 1.0])
+    prices = np.where(some, rng.uniform(2.0, 12.0, len(dual.site_numbers)), 0.0)
     triangles = dual._triangles
     for _ in range(halvings):
         triangles = halve_triangles(rng.permutation(triangles)[:30])
-    _, worth, bound = dual.bound_worths(prices, triangles)
+    _, profit, bound = dual.bound_profits(prices, triangles)
     part = rng.dirichlet([0.5, 0.5, 0.5], (len(triangles), 12))
     part[:, :3] = np.eye(3)
     places = cost.geodesics.grid.to_meters(np.einsum("tpk,tkd->tpd", part, triangles).reshape(-1, 2))
-    distances = cost.geodesics.compute_distances(places, cost.points[dual.sites])
-    worths = np.maximum(prices - distances, 0.0).sum(axis=1).reshape(len(triangles), 12)
+    distances = cost.geodesics.compute_distances(places, cost.points[dual.site_numbers])
+    profits = np.maximum(prices - distances, 0.0).sum(axis=1).reshape(len(triangles), 12)
     slack = 1e-9 * dual.total_weight
-    assert (worths.max(axis=1) <= bound + slack).all()
-    assert (worth <= bound + slack).all()
+    assert (profits.max(axis=1) <= bound + slack).all()
+    assert (profit <= bound + slack).all()
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_the_same_call_gives_the_same_bits():
         (
             {"radius": 3.0},
             ParameterError,
-            "radius: expected one that fits in the components of the positions, got 3 m",
+            "radius: expected a disc that fits in the free space around the positions, got 3 m",
         ),
         ({"precision": 0.0}, ParameterError, "precision: expected a number from 1e-05 to 1, got 0.0"),
         ({"lattice": 0}, ParameterError, "lattice: expected a whole number from 1 to 4096, got 0"),

@@ -1,4 +1,4 @@
-"""Upper bounds on the worths of positions in a triangle, by tangents of distances; see `lower_bound`."""
+"""Upper bounds on the profits of positions in a triangle, by tangents of distances; see `lower_bound`."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class TriangleScratch(NamedTuple):
     """(3, 2) The vertices, relative to the center."""
     min_distances: Array
     """(3,) A lower bound on the distance from each vertex to the current site."""
-    max_worths: Array
-    """(3,) An upper bound on the worth of each vertex."""
+    max_profits: Array
+    """(3,) An upper bound on the profit of each vertex."""
 
     @classmethod
     def allocate(cls, corners: int) -> TriangleScratch:
@@ -56,23 +56,23 @@ class TriangleScratch(NamedTuple):
             corner_distances=np.empty(corners),
             vertices=np.empty((3, 2)),
             min_distances=np.empty(3),
-            max_worths=np.empty(3),
+            max_profits=np.empty(3),
         )
 
 
 @kernel
-def bound_worths(
+def bound_profits(
     site_data: SiteData,
     index: AngularWallIndex,
     prices: Array,
     triangles: Array,
     centers: Array,
     scratch: TriangleScratch,
-    worths: Array,
+    profits: Array,
 ) -> int:
-    """Compute the worth of the center of each triangle, and an upper bound on the worth of all its points.
+    """Compute the profit of the center of each triangle, and an upper bound on the profit of all its points.
 
-    The worth of a point is the sum over the sites of weight * max(price - distance, 0).
+    The profit of a point is the sum over the sites of weight * max(price - distance, 0).
 
     Parameters
     ----------
@@ -84,8 +84,8 @@ def bound_worths(
     centers : (t, 2) array, grid steps
         A point in each triangle.
     scratch : TriangleScratch
-    worths : (2, t) array, grid steps
-        Result: the worths of the centers in the first row, the bounds in the second.
+    profits : (2, t) array, grid steps
+        Result: the profits of the centers in the first row, the bounds in the second.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def bound_worths(
         for k in range(count):
             corner = scratch.corners[k]
             scratch.corner_distances[k] = np.hypot(x - corners[corner, 0], y - corners[corner, 1])
-        worth = 0.0
+        profit = 0.0
         for site in range(len(prices)):
             price = prices[site]
             dx = x - site_data.sites[site, 0]
@@ -119,11 +119,11 @@ def bound_worths(
                 distance = straight
                 _lower_to_tangent(scratch, straight, dx, dy, straight)
             distance = min(distance, _lower_by_corners(site_data, scratch, count, site, x, y, radius))
-            worth += site_data.weights[site] * max(price - distance, 0.0)
+            profit += site_data.weights[site] * max(price - distance, 0.0)
             for vertex in range(3):
-                scratch.max_worths[vertex] += site_data.weights[site] * (price - min_distances[vertex])
-        worths[0, t] = worth
-        worths[1, t] = max(scratch.max_worths[0], scratch.max_worths[1], scratch.max_worths[2])
+                scratch.max_profits[vertex] += site_data.weights[site] * (price - min_distances[vertex])
+        profits[0, t] = profit
+        profits[1, t] = max(scratch.max_profits[0], scratch.max_profits[1], scratch.max_profits[2])
     return 0
 
 
@@ -135,7 +135,7 @@ def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float)
         scratch.vertices[vertex, 0] = triangle[vertex, 0] - x
         scratch.vertices[vertex, 1] = triangle[vertex, 1] - y
         radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
-        scratch.max_worths[vertex] = 0.0
+        scratch.max_profits[vertex] = 0.0
     return radius
 
 
