@@ -289,20 +289,20 @@ class Team:
         dict
             None stands for no limit, and a value that all robots share is written once.
         """
-        plain: dict[str, Any] = {"robots": len(self)}
+        data: dict[str, Any] = {"robots": len(self)}
         for name in self._list_relevant_parameters():
             values = [None if np.isinf(value) else float(value) for value in getattr(self, name)]
             is_shared = len(set(values)) == 1
-            plain[PARAMETERS[name].json_key] = values[0] if is_shared else values
-        return plain
+            data[PARAMETERS[name].json_key] = values[0] if is_shared else values
+        return data
 
     @classmethod
-    def from_dict(cls, plain: Mapping[str, Any]) -> Team:
+    def from_dict(cls, data: Mapping[str, Any]) -> Team:
         """Build a team from the result of `to_dict`.
 
         Parameters
         ----------
-        plain : mapping
+        data : mapping
 
         Returns
         -------
@@ -313,10 +313,10 @@ class Team:
         ParameterError
             If a value is missing or out of range. The message names its key.
         """
-        n = plain.get("robots")
+        n = data.get("robots")
         if not is_number(n, int) or not 1 <= n <= MAX_ROBOTS:
-            raise _build_json_error(plain, "robots", expected=f"a whole number from 1 to {MAX_ROBOTS}")
-        columns = {name: _read_column(plain, name, n) for name in PARAMETERS}
+            raise _build_json_error(data, "robots", expected=f"a whole number from 1 to {MAX_ROBOTS}")
+        columns = {name: _read_column(data, name, n) for name in PARAMETERS}
         return cls(**columns)
 
 
@@ -336,15 +336,15 @@ def _check_column(name: str, values: Array, size: int) -> None:
         )
 
 
-def _read_column(plain: Mapping[str, Any], name: str, n: int) -> Array:
+def _read_column(data: Mapping[str, Any], name: str, n: int) -> Array:
     """Return the values of a parameter for n robots from JSON, which contains a list or one shared value."""
     parameter = PARAMETERS[name]
-    value = plain.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, "missing"))
+    value = data.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, "missing"))
     values = value if isinstance(value, list) else [value] * n
     is_valid = len(values) == n and all(_is_valid_json(parameter, entry) for entry in values)
     if not is_valid:
         expected = f"{parameter.describe(infinity='null')}, or one for each of {n} robots"
-        raise _build_json_error(plain, parameter.json_key, expected)
+        raise _build_json_error(data, parameter.json_key, expected)
     return np.array([np.inf if entry is None else entry for entry in values], dtype=float)
 
 
@@ -354,6 +354,6 @@ def _is_valid_json(parameter: TeamParameter, value: object) -> bool:
     return is_number(value) and bool(parameter.minimum <= value <= parameter.maximum)
 
 
-def _build_json_error(plain: Mapping[str, Any], key: str, expected: str) -> ParameterError:
-    got = quote_json(plain[key]) if key in plain else "nothing"
+def _build_json_error(data: Mapping[str, Any], key: str, expected: str) -> ParameterError:
+    got = quote_json(data[key]) if key in data else "nothing"
     return ParameterError(f"team.{key}: expected {expected}, got {got}")

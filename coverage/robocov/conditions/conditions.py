@@ -275,11 +275,11 @@ class Conditions:
         -------
         dict
         """
-        plain: dict[str, Any] = {
+        data: dict[str, Any] = {
             parameter.json_key: getattr(self, name) for name, parameter in PARAMETERS.items()
         }
-        plain["failures"] = [{"robot": failure.robot, "time_s": failure.time} for failure in self.failures]
-        plain["joins"] = [
+        data["failures"] = [{"robot": failure.robot, "time_s": failure.time} for failure in self.failures]
+        data["joins"] = [
             {
                 "robot": join.robot,
                 "time_s": join.time,
@@ -287,16 +287,16 @@ class Conditions:
             }
             for join in self.joins
         ]
-        plain["seed"] = int(self.seed)
-        return plain
+        data["seed"] = int(self.seed)
+        return data
 
     @classmethod
-    def from_dict(cls, plain: Mapping[str, Any]) -> Conditions:
+    def from_dict(cls, data: Mapping[str, Any]) -> Conditions:
         """Build conditions from the result of `to_dict`.
 
         Parameters
         ----------
-        plain : mapping
+        data : mapping
 
         Returns
         -------
@@ -308,11 +308,11 @@ class Conditions:
             If a key is missing, or a value cannot be used.
         """
         try:
-            numbers = {name: plain[parameter.json_key] for name, parameter in PARAMETERS.items()}
-            failures = [(failure["robot"], failure["time_s"]) for failure in plain["failures"]]
-            joins = [(join["robot"], join["time_s"], join["place_m"]) for join in plain["joins"]]
+            numbers = {name: data[parameter.json_key] for name, parameter in PARAMETERS.items()}
+            failures = [(failure["robot"], failure["time_s"]) for failure in data["failures"]]
+            joins = [(join["robot"], join["time_s"], join["place_m"]) for join in data["joins"]]
             arguments: dict[str, Any] = {**numbers, "failures": failures, "joins": joins}
-            return cls(**arguments, seed=plain["seed"])
+            return cls(**arguments, seed=data["seed"])
         except (KeyError, TypeError) as error:
             raise ParameterError(f"conditions: cannot be read ({error!r})") from error
 

@@ -9,7 +9,7 @@ import scipy
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
-from robocov.controllers.base import BaseController
+from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
@@ -25,7 +25,6 @@ _BASIS_WIDTH = 0.8
 """Standard deviation of a basis function, relative to the distance to the next one."""
 _NOISE_VARIANCE = 1e-3
 """Variance of a measurement, relative to that of the prior."""
-_TIME_TOLERANCE_S = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +136,7 @@ class Adaptive(BaseController):
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
         """Compute the forces toward the centroids, after a new estimate if it is time for one."""
-        next_plan_time = memory.plan_time + self.period - _TIME_TOLERANCE_S
+        next_plan_time = memory.plan_time + self.period - TIME_TOLERANCE_S
         if memory.goals is None or not memory.plan_time <= seen.time < next_plan_time:
             memory = self._plan(seen, memory)
         assert memory.goals is not None

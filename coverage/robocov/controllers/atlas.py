@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.base import BaseController
+from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
@@ -196,7 +196,7 @@ class _Cooperation(NamedTuple):
     """Whether the robot plans for others as well, not for itself alone."""
     is_fixed: BoolArray
     """(k,) Whether each of the others keeps its position in the plan."""
-    settling: float
+    savings_factor: float
     """Factor of the savings that relocations and goals require."""
 
 
@@ -339,7 +339,7 @@ class Atlas(BaseController):
         routes = list(memory.routes)
         legs = memory.legs.copy()
         for robot, state in enumerate(states):
-            if seen.time >= max(state.next_plan_time, first_plan_time) - 1e-9:
+            if seen.time >= max(state.next_plan_time, first_plan_time) - TIME_TOLERANCE_S:
                 reports = self._list_reports(states, seen.neighbors.list_neighbors(robot))
                 states[robot], goal = self._plan(seen, memory.team, state, robot, reports)
                 planner = states[robot].planner
@@ -370,24 +370,24 @@ class Atlas(BaseController):
         return False
 
     def _plan(
-        self, seen: Observations, team: Team, before: PlannerState, robot: int, reports: Sequence[Teammates]
+        self, seen: Observations, team: Team, previous: PlannerState, robot: int, reports: Sequence[Teammates]
     ) -> tuple[PlannerState, Array | None]:
         """Update a robot's plan; return its state, and its goal or None if it keeps its route."""
         position = seen.positions[robot]
         radius = float(team.radius[robot])
         max_speed = float(team.max_speed[robot])
-        state = self._update_teammates(seen, team, before, robot, reports)
+        state = self._update_teammates(seen, team, previous, robot, reports)
         is_agreed = self._is_agreed(state.teammates, seen)
         others = _list_others(state.teammates, position, seen.time, is_agreed=is_agreed)
         window = Window.build_around(state.known_map.raster, position, math.inf, _OWN_NODES)
         spacing = window.stride * state.known_map.raster.cell_size
-        period = self._compute_period(before, robot, spacing / max_speed)
+        period = self._compute_period(previous, robot, spacing / max_speed)
         state = replace(state, next_plan_time=seen.time + period, was_quiet=others.is_quiet)
         group = np.concatenate([[robot], others.robots])
         positions = np.vstack([position, others.positions])
-        if _may_skip_plan(before, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
+        if _may_skip_plan(previous, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
             return state, None
-        state = _update_path_lengths(before, state, position, seen.time, radius)
+        state = _update_path_lengths(previous, state, position, seen.time, radius)
         planner = state.planner or GridPlanner.get_shared(state.known_map, window, radius + self.clearance)
         state = replace(
             state,
@@ -398,7 +398,7 @@ class Atlas(BaseController):
         )
         cooperation = self._choose_cooperation(state, seen, others, max_speed=max_speed, is_agreed=is_agreed)
         state = self._plan_for_team(state, seen, cooperation)
-        return self._plan_own_motion(before, state, seen, cooperation, robot)
+        return self._plan_own_motion(previous, state, seen, cooperation, robot)
 
     def _plan_own_motion(
         self,
@@ -437,7 +437,7 @@ class Atlas(BaseController):
             is_fixed = np.ones_like(is_fixed)
         doublings = min(state.path_length / (self.settling * diameter), _MAX_DOUBLINGS)
         return _Cooperation(
-            is_agreed=is_agreed, is_joint=is_joint, is_fixed=is_fixed, settling=2.0**doublings
+            is_agreed=is_agreed, is_joint=is_joint, is_fixed=is_fixed, savings_factor=2.0**doublings
         )
 
     def _find_own_goal(
@@ -459,7 +459,7 @@ class Atlas(BaseController):
             other_positions,
             first_node,
             np.full(2, np.nan) if state.own_goal is None else state.own_goal,
-            min(1.0, self.rest * cooperation.settling),
+            min(1.0, self.rest * cooperation.savings_factor),
         )
 
     def _compute_period(self, before: PlannerState, robot: int, time_to_next_node: float) -> float:
@@ -518,15 +518,15 @@ class Atlas(BaseController):
     ) -> MinSavings:
         """Return the fractions of the cost that changes of a plan must save; 1 allows no change."""
         # A plan that all robots share must not depend on the path length of the robot that computes it.
-        settling = 1.0 if cooperation.is_agreed else cooperation.settling
+        factor = 1.0 if cooperation.is_agreed else cooperation.savings_factor
         relocation = 1.0
         if cooperation.is_joint or state.was_quiet:
             # The relocation of one of many robots saves less.
             scale = min(1.0, MAX_PLANNING_GROUP / group_size)
-            relocation = min(1.0, self.threshold * scale * settling)
+            relocation = min(1.0, self.threshold * scale * factor)
         return MinSavings(
             relocation=relocation,
-            own_cell=min(1.0, self.nearby * settling),
+            own_cell=min(1.0, self.nearby * factor),
             swap=_SWAP_SAVING if cooperation.is_agreed else 0.0,
         )
 

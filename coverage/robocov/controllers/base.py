@@ -18,6 +18,9 @@ Information: TypeAlias = Literal["own", "shared map", "whole map"]
 the last known positions of other robots, that neighbors send each other ("shared map"); or the whole map
 from the start ("whole map")."""
 
+TIME_TOLERANCE_S = 1e-9
+"""Margin of comparisons of times: a sum of time steps may be a little less than a multiple of them."""
+
 
 @runtime_checkable
 class Controller(Protocol):

@@ -7,7 +7,7 @@ from typing import Self
 
 import shapely
 
-from robocov.controllers.base import BaseController
+from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 
@@ -79,4 +79,4 @@ def is_plan_due(plan_time: float, period: float, time: float) -> bool:
     -------
     bool
     """
-    return not plan_time <= time < plan_time + period - 1e-9
+    return not plan_time <= time < plan_time + period - TIME_TOLERANCE_S

@@ -104,7 +104,7 @@ def list_controller_classes() -> dict[str, type[Any]]:
             classes[entry.name] = _load_entry(entry)
         except KeyboardInterrupt:
             raise
-        except BaseException as error:
+        except BaseException as error:  # Any package may raise anything on import, even SystemExit.
             warnings.warn(str(_explain_entry_fault(entry, error)), stacklevel=2)
     return {**classes, **CONTROLLERS}
 

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.base import BaseController, Information
+from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Information
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.route_following import follow_routes
@@ -232,7 +232,7 @@ class SharedMapController(BaseController):
         if seen.scans is not None:
             maps = update_maps(memory.maps, seen, seen.scans, list_hearing_groups(seen.neighbors))
             memory = replace(memory, maps=tuple(maps))
-        if seen.time >= memory.next_plan_time - 1e-9:
+        if seen.time >= memory.next_plan_time - TIME_TOLERANCE_S:
             memory = self._plan_routes(seen, memory)
         returns = update_returns(seen, memory.returns)
         command = follow_routes(

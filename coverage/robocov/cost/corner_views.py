@@ -29,14 +29,13 @@ class CornerViews(NamedTuple):
     """(r,) Distance from the corner to the farthest of these sites, grid steps."""
 
 
-def build_corner_views(tiles: int, numbers: IntArray, lengths: Array) -> CornerViews:
+def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:
     """Group the views that `find_corner_views` has found by their tiles.
 
     Parameters
     ----------
-    tiles : int
-        Number of tiles.
-    numbers : (r, 3) int array
+    tile_count : int
+    indices : (r, 3) int array
         Corner, tile, and mask of the sites of the tile that see the corner.
     lengths : (r, 2) array, grid steps
         Distances of the nearest and the farthest site.
@@ -45,15 +44,15 @@ def build_corner_views(tiles: int, numbers: IntArray, lengths: Array) -> CornerV
     -------
     CornerViews
     """
-    order = np.argsort(numbers[:, 1], kind="stable")
-    numbers = numbers[order]
-    lengths = lengths[order]
+    by_tile = np.argsort(indices[:, 1], kind="stable")
+    corner, tile, mask = indices[by_tile].T
+    nearest, farthest = lengths[by_tile].T
     return CornerViews(
-        first_row=np.searchsorted(numbers[:, 1], np.arange(tiles + 1)),
-        corner=np.ascontiguousarray(numbers[:, 0]),
-        mask=np.ascontiguousarray(numbers[:, 2]),
-        nearest=np.ascontiguousarray(lengths[:, 0]),
-        farthest=np.ascontiguousarray(lengths[:, 1]),
+        first_row=np.searchsorted(tile, np.arange(tile_count + 1)),
+        corner=np.ascontiguousarray(corner),
+        mask=np.ascontiguousarray(mask),
+        nearest=np.ascontiguousarray(nearest),
+        farthest=np.ascontiguousarray(farthest),
     )
 
 
@@ -64,7 +63,7 @@ def find_corner_views(
     first: int,
     end: int,
     index: AngularWallIndex,
-    numbers: IntArray,
+    indices: IntArray,
     lengths: Array,
 ) -> int:
     """Find the sites that are visible from a range of corners.
@@ -77,7 +76,7 @@ def find_corner_views(
         The corners are those from `first` up to `end`.
     index : AngularWallIndex
         Scratch space for one source.
-    numbers : (m, 3) int array
+    indices : (m, 3) int array
         Result: corner, tile and mask; see `CornerViews`.
     lengths : (m, 2) array, grid steps
         Result: distances of the nearest and the farthest site.
@@ -104,15 +103,15 @@ def find_corner_views(
                 continue
             leaf = (node - leaves) * LEAF_SIZE
             for tile in range(leaf, min(leaf + LEAF_SIZE, len(tiles.boxes))):
-                if used == len(numbers):
+                if used == len(indices):
                     return -1
                 if is_box_hidden(tiles.boxes, tile, index, 0):
                     continue
                 mask = _find_visible_sites(walls, index, tiles, corner, tile, lengths[used])
                 if mask != 0:
-                    numbers[used, 0] = corner
-                    numbers[used, 1] = tile
-                    numbers[used, 2] = mask
+                    indices[used, 0] = corner
+                    indices[used, 1] = tile
+                    indices[used, 2] = mask
                     used += 1
             node = skip_subtree(node)
     return used

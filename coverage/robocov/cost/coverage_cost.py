@@ -92,10 +92,10 @@ class CoverageCost:
         self.cells = self.sites.cells
         self.spacing = self.sites.spacing
         # Each row describes the sites of one tile that are visible from one corner; see `build_corner_views`.
-        numbers, lengths = geodesics.run_for_corners(
+        indices, lengths = geodesics.run_for_corners(
             partial(find_corner_views, geodesics.walls, tiles), progress
         )
-        views = build_corner_views(len(tiles.boxes), numbers, lengths)
+        views = build_corner_views(len(tiles.boxes), indices, lengths)
         self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)
         self._component_areas = np.array([component.area for component in environment.free.geoms])
         self._entries_per_robot = 2 * SOURCE_BINS
@@ -151,13 +151,14 @@ class CoverageCost:
         if not positions.size:
             raise InputError("positions: expected at least one robot, got none")
         grid_positions, is_inside = self.geodesics.snap_to_free_space(positions)
+        # A component of the free space is covered if any robot is inside it.
         is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
         if speeds is None:
             paths = self._find_paths(grid_positions[None], is_covered[None])
-            return self._build_result(positions, is_covered, paths, 0)
+            return self._build_result(positions, is_covered, paths, team=0)
         checked_speeds = _require_speeds(speeds, len(positions))
         paths = self._find_first_arrivals(grid_positions, is_inside, checked_speeds)
-        return self._build_result(positions, is_covered, paths, 0, checked_speeds)
+        return self._build_result(positions, is_covered, paths, team=0, speeds=checked_speeds)
 
     def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
         """Compute the coverage cost of each of several teams of the same size.

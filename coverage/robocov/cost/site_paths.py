@@ -225,25 +225,31 @@ def _list_nearest_candidates(
     boxes: Array, box: int, robots: Array, candidates: IntArray, count: int, result: IntArray
 ) -> int:
     """List those of the first `count` candidates that may be nearest to a point of a box; return how many."""
-    bound2 = np.inf
+    squared_bound = np.inf
     for k in range(count):
         x = robots[candidates[k], 0]
         y = robots[candidates[k], 1]
         dx = max(x - boxes[box, 0], boxes[box, 2] - x)
         dy = max(y - boxes[box, 1], boxes[box, 3] - y)
-        bound2 = min(bound2, dx * dx + dy * dy)
-    return _list_robots_within(boxes, box, robots, bound2, candidates, count, result)
+        squared_bound = min(squared_bound, dx * dx + dy * dy)
+    return _list_robots_within(boxes, box, robots, squared_bound, candidates, count, result)
 
 
 @kernel
 def _list_robots_within(
-    boxes: Array, box: int, robots: Array, bound2: float, candidates: IntArray, count: int, result: IntArray
+    boxes: Array,
+    box: int,
+    robots: Array,
+    squared_bound: float,
+    candidates: IntArray,
+    count: int,
+    result: IntArray,
 ) -> int:
     """List those of the first `count` candidates within a squared distance of a box; return how many."""
     size = 0
     for k in range(count):
         i = candidates[k]
-        if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= bound2:
+        if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= squared_bound:
             result[size] = i
             size += 1
     return size
@@ -264,10 +270,10 @@ def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, ti
         for slot in range(SLOTS):
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y
-            length2 = dx * dx + dy * dy
-            best2 = length[tile, slot]
-            nearest_robot[tile, slot] = i if length2 < best2 else nearest_robot[tile, slot]
-            length[tile, slot] = length2 if length2 < best2 else best2
+            squared_length = dx * dx + dy * dy
+            squared_best = length[tile, slot]
+            nearest_robot[tile, slot] = i if squared_length < squared_best else nearest_robot[tile, slot]
+            length[tile, slot] = squared_length if squared_length < squared_best else squared_best
     for slot in range(SLOTS):
         i = nearest_robot[tile, slot]
         length[tile, slot] = np.sqrt(length[tile, slot])

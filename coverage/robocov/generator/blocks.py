@@ -116,18 +116,18 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
             _build_block(cell, widening, corner_disc, trim) for cell, trim in zip(cells, trims, strict=True)
         ]
 
-    if _sum_areas(build_blocks(0.0)) < request.blocked:
+    if _sum_areas(build_blocks(0.0)) < request.blocked_area:
         return None
     low = 0.0
     high = feasible_widening
     for _ in range(_WIDENING_STEPS):
         middle = (low + high) / 2.0
-        if _sum_areas(build_blocks(middle)) > request.blocked:
+        if _sum_areas(build_blocks(middle)) > request.blocked_area:
             low = middle
         else:
             high = middle
     blocks = build_blocks(low)
-    factor = math.sqrt(request.blocked / _sum_areas(blocks))
+    factor = math.sqrt(request.blocked_area / _sum_areas(blocks))
     blocks = [scale(block, factor, factor, origin="centroid") for block in blocks]
     if not all(_is_thick(block) for block in blocks):
         return None

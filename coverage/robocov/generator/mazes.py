@@ -77,7 +77,7 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
         if _compute_corridor_width(request, shape, thickness) < request.gap - _GAP_TOLERANCE_M:
             return None
         obstacles = _build_walls(request, shape, trails, thickness)
-        area_error = abs(_compute_union_area(obstacles) - request.blocked)
+        area_error = abs(_compute_union_area(obstacles) - request.blocked_area)
         if _clear_disc(request, shape, walls, thickness, corner_disc):
             continue
         if area_error <= max_area_error:
@@ -113,12 +113,12 @@ def _choose_thickness(request: Request, shape: GridShape, trails: list[list[Post
     high = math.ceil(min(request.width / columns, request.height / rows) / request.step)
     while high - low > 1:
         middle = (low + high) // 2
-        if compute_area(middle) < request.blocked:
+        if compute_area(middle) < request.blocked_area:
             low = middle
         else:
             high = middle
-    low_error = abs(compute_area(low) - request.blocked)
-    high_error = abs(compute_area(high) - request.blocked)
+    low_error = abs(compute_area(low) - request.blocked_area)
+    high_error = abs(compute_area(high) - request.blocked_area)
     steps = low if low_error <= high_error else high
     return round(steps * request.step, request.digits)
 

@@ -48,7 +48,7 @@ def scatter_polygons(
     """
     areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.obstacles)
     areas = np.sort(areas)[::-1]  # The largest is placed first.
-    areas *= request.blocked / areas.sum()
+    areas *= request.blocked_area / areas.sum()
     if _are_too_large(areas, request):
         return None
     kept_free = shapely.Point(corner_disc.center).buffer(corner_disc.radius)

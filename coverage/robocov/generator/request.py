@@ -61,7 +61,7 @@ class Request:
         return np.array([self.width, self.height])
 
     @property
-    def blocked(self) -> float:
+    def blocked_area(self) -> float:
         """Area to be blocked, m²."""
         return self.area * self.width * self.height
 

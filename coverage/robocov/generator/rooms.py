@@ -229,7 +229,7 @@ def build_building(
     wall_area = 0.0
     if walls:
         wall_area = shapely.union_all([wall.polygon for wall in walls]).intersection(map_area).area
-    furniture = _place_furniture(request, corner_disc, plan, request.blocked - wall_area, rng)
+    furniture = _place_furniture(request, corner_disc, plan, request.blocked_area - wall_area, rng)
     return None if furniture is None else [*walls, *furniture]
 
 
@@ -318,7 +318,7 @@ def _divide_by_corridor(
 
 def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
     """Add doors that connect all rooms, and some more; return whether all rooms are connected."""
-    connected = DisjointSet(range(len(plan.rooms)))
+    room_groups = DisjointSet(range(len(plan.rooms)))
     min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
     places = _find_door_places(plan)
     order_keys, loop_draws, relative_positions = rng.random((3, len(places)))
@@ -334,19 +334,19 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
         first_room = plan.rooms[first]
         second_room = plan.rooms[second]
         along = 1 - wall.axis
-        # If the wall does not lie between the two rooms, the end is before the start.
+        # If the wall does not lie between the two rooms, `high` is below `low`.
         low = max(wall.start, first_room[along], second_room[along])
         high = min(wall.end, first_room[along + 2], second_room[along + 2])
         width = request.round_down(min(float(widths[k]), high - low - 2.0 * min_piece))
-        is_unneeded = connected.connected(first, second) and loop_draws[k] > _LOOP_PROBABILITY
+        is_unneeded = room_groups.connected(first, second) and loop_draws[k] > _LOOP_PROBABILITY
         if width < request.gap + request.step or is_unneeded:
             continue
         play = high - low - 2.0 * min_piece - width
         start = round(low + min_piece + play * float(relative_positions[k]), request.digits)
         end = round(start + width, request.digits)
         plan.doors.append(Door(wall, start, end, (first, second)))
-        connected.merge(first, second)
-    return connected.n_subsets == 1
+        room_groups.merge(first, second)
+    return room_groups.n_subsets == 1
 
 
 def _find_door_places(plan: FloorPlan) -> list[tuple[Wall, int, int]]:

@@ -32,20 +32,17 @@ _MAX_TREE_DEPTH = 64
 
 
 class AngularWallIndex(NamedTuple):
-    """The walls that face each of n sources, in angular bins, in grid steps.
-
-    All squared distances have the suffix 2.
-    """
+    """The walls that face each of n sources, in angular bins, in grid steps."""
 
     positions: Array
     """(n, 2) Positions of the sources."""
-    reach2: Array
-    """(n,) Distances up to which walls are in the index."""
-    clear2: Array
-    """(n, bins) Distances up to which nothing is hidden; -1 if the source is a vertex, whose sectors must be
-    checked first."""
-    horizon2: Array
-    """(n, bins) Distances beyond which everything is hidden."""
+    squared_reach: Array
+    """(n,) Squared distances up to which walls are in the index."""
+    squared_clear_distance: Array
+    """(n, bins) Squared distances up to which nothing is hidden; -1 if the source is a vertex, whose sectors
+    must be checked first."""
+    squared_horizon: Array
+    """(n, bins) Squared distances beyond which everything is hidden."""
     head: IntArray
     """(n, bins) The last entry of each bin, or -1 if it is empty."""
     entry_wall: IntArray
@@ -74,9 +71,9 @@ class AngularWallIndex(NamedTuple):
         """
         return cls(
             positions=np.empty((sources, 2)),
-            reach2=np.empty(sources),
-            clear2=np.empty((sources, bins)),
-            horizon2=np.empty((sources, bins)),
+            squared_reach=np.empty(sources),
+            squared_clear_distance=np.empty((sources, bins)),
+            squared_horizon=np.empty((sources, bins)),
             head=np.empty((sources, bins), np.int64),
             entry_wall=np.empty(entries, np.int64),
             entry_before=np.empty(entries, np.int64),
@@ -126,31 +123,31 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    distance2 = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PADDING)
-    if distance2 == 0.0:
+    squared_distance = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PADDING)
+    if squared_distance == 0.0:
         return False
-    bins = index.horizon2.shape[1]
+    bins = index.squared_horizon.shape[1]
     half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
     half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
     dx = boxes[node, 0] + half_width - x
     dy = boxes[node, 1] + half_height - y
     # The angle that half the box spans is at most pi/2 times its sine, and its sine is the half diagonal
     # divided by the distance to the center. A pseudo-angle grows at most as fast as the angle.
-    sine2 = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
-    half_angle = np.sqrt(sine2) * (0.5 * np.pi) + _PADDING
+    squared_sine = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
+    half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _PADDING
     angle = compute_pseudo_angle(dx, dy)
     scale = bins * 0.25
     first = int(np.floor((angle - half_angle) * scale))
     last = int(np.floor((angle + half_angle) * scale))
     for k in range(first, min(last, first + bins - 1) + 1):
-        if index.horizon2[source, k & (bins - 1)] >= distance2:
+        if index.squared_horizon[source, k & (bins - 1)] >= squared_distance:
             return False
     return True
 
 
 @kernel
 def add_walls(
-    walls: Walls, index: AngularWallIndex, source: int, x: float, y: float, reach2: float, used: int
+    walls: Walls, index: AngularWallIndex, source: int, x: float, y: float, squared_reach: float, used: int
 ) -> int:
     """Add a source to an index, with the walls around it.
 
@@ -163,7 +160,7 @@ def add_walls(
         Row of the source in the index.
     x, y : float, grid steps
         Its position, not inside an obstacle.
-    reach2 : float
+    squared_reach : float
         Squared distance up to which walls are added.
     used : int
         Number of entries that the other sources already use.
@@ -177,21 +174,21 @@ def add_walls(
     stack = index.stack
     leaves = len(boxes) // 2
     bins = index.head.shape[1]
-    _reset_source(index, source, x, y, reach2)
+    _reset_source(index, source, x, y, squared_reach)
     stack[0] = 1
     height = 1
     while height:
         height -= 1
         node = stack[height]
-        if compute_squared_box_distance(boxes, node, x, y) >= reach2:
+        if compute_squared_box_distance(boxes, node, x, y) >= squared_reach:
             continue
         if is_box_hidden(boxes, node, index, source):
             continue
         if node < leaves:
             # Visit the nearer half first: boxes that it hides need not be visited.
-            left2 = compute_squared_box_distance(boxes, 2 * node, x, y)
-            right2 = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
-            nearer = 2 * node + int(right2 < left2)
+            left_distance = compute_squared_box_distance(boxes, 2 * node, x, y)
+            right_distance = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
+            nearer = 2 * node + int(right_distance < left_distance)
             stack[height] = nearer ^ 1
             stack[height + 1] = nearer
             height += 2
@@ -204,19 +201,19 @@ def add_walls(
                 used = _add_wall(walls, wall, index, source, used)
     if find_vertex(walls.vertices, x, y) >= 0:
         for k in range(bins):
-            index.clear2[source, k] = -1.0
+            index.squared_clear_distance[source, k] = -1.0
     return used
 
 
 @kernel
-def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, reach2: float) -> None:
+def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squared_reach: float) -> None:
     """Set the position of a source, with no walls around it yet."""
     index.positions[source, 0] = x
     index.positions[source, 1] = y
-    index.reach2[source] = reach2
+    index.squared_reach[source] = squared_reach
     for k in range(index.head.shape[1]):
-        index.clear2[source, k] = reach2
-        index.horizon2[source, k] = np.inf
+        index.squared_clear_distance[source, k] = squared_reach
+        index.squared_horizon[source, k] = np.inf
         index.head[source, k] = -1
 
 
@@ -235,10 +232,10 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     along = min(max(-(ax * ux + ay * uy) / (ux * ux + uy * uy), 0.0), 1.0)
     nearest_x = ax + along * ux
     nearest_y = ay + along * uy
-    near2 = (nearest_x * nearest_x + nearest_y * nearest_y) * (1.0 - _PADDING)
-    if near2 >= index.reach2[source]:
+    squared_near = (nearest_x * nearest_x + nearest_y * nearest_y) * (1.0 - _PADDING)
+    if squared_near >= index.squared_reach[source]:
         return used
-    far2 = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
+    squared_far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
     # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
     bins = index.head.shape[1]
     scale = bins * 0.25
@@ -253,32 +250,34 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     covered_end = int(np.floor((stop - _PADDING) * scale))
     for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bins - 1) + 1):
         k = unwrapped_bin & (bins - 1)
-        if near2 > index.horizon2[source, k]:
+        if squared_near > index.squared_horizon[source, k]:
             continue
-        index.clear2[source, k] = min(index.clear2[source, k], near2)
+        index.squared_clear_distance[source, k] = min(index.squared_clear_distance[source, k], squared_near)
         index.entry_wall[used] = wall
         index.entry_before[used] = index.head[source, k]
         index.head[source, k] = used
         used += 1
         if covered_first <= unwrapped_bin < covered_end:
-            index.horizon2[source, k] = min(index.horizon2[source, k], far2)
+            index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_far)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
     k = covered_end & (bins - 1)
-    if covered_first <= covered_end < first_bin + bins and far2 < index.horizon2[source, k]:
-        chain_far2 = _compute_max_squared_distance(walls, wall, x, y, stop, (covered_end + 1) / scale, far2)
-        index.horizon2[source, k] = min(index.horizon2[source, k], chain_far2)
+    if covered_first <= covered_end < first_bin + bins and squared_far < index.squared_horizon[source, k]:
+        squared_chain_far = _compute_max_squared_distance(
+            walls, wall, x, y, stop, (covered_end + 1) / scale, squared_far
+        )
+        index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_chain_far)
     return used
 
 
 @kernel
 def _compute_max_squared_distance(
-    walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, far2: float
+    walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, squared_far: float
 ) -> float:
     """Return the largest squared distance from (x, y) to a chain of walls up to a pseudo-angle.
 
-    The chain consists of the walls that follow `wall`, as long as they face (x, y). `far2` is the largest
-    squared distance to `wall` itself, which ends at `angle`. The result is inf if the chain does not reach
-    the last angle.
+    The chain consists of the walls that follow `wall`, as long as they face (x, y). `squared_far` is the
+    largest squared distance to `wall` itself, which ends at `angle`. The result is inf if the chain does not
+    reach the last angle.
     """
     for _ in range(_MAX_CHAIN):
         ax = walls.ends[wall, 2] - x
@@ -294,9 +293,9 @@ def _compute_max_squared_distance(
         while stop < angle - _PADDING:
             stop += 4.0
         angle = stop
-        far2 = max(far2, (bx * bx + by * by) * (1.0 + _PADDING))
+        squared_far = max(squared_far, (bx * bx + by * by) * (1.0 + _PADDING))
         if angle - _PADDING >= last_angle:
-            return far2
+            return squared_far
     return np.inf
 
 
@@ -320,7 +319,7 @@ def find_bin(bins: int, dx: float, dy: float) -> int:
 
 @kernel
 def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
-    """Return whether a source sees a point at any distance.
+    """Return whether no wall hides a point from a source, however far away it is.
 
     A source at a vertex sees only the directions that lead into free space.
 
@@ -339,12 +338,12 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     """
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
-    distance2 = dx * dx + dy * dy
-    k = find_bin(index.clear2.shape[1], dx, dy)
+    squared_distance = dx * dx + dy * dy
+    k = find_bin(index.squared_clear_distance.shape[1], dx, dy)
     # These two comparisons settle most cases.
-    if distance2 <= index.clear2[source, k]:
+    if squared_distance <= index.squared_clear_distance[source, k]:
         return True
-    if distance2 > index.horizon2[source, k]:
+    if squared_distance > index.squared_horizon[source, k]:
         return False
     return _is_visible_past_walls(walls, index, source, k, dx, dy)
 
@@ -369,8 +368,8 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
     """
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
-    k = find_bin(index.clear2.shape[1], dx, dy)
-    is_clear: bool = dx * dx + dy * dy <= index.clear2[source, k]
+    k = find_bin(index.squared_clear_distance.shape[1], dx, dy)
+    is_clear: bool = dx * dx + dy * dy <= index.squared_clear_distance[source, k]
     return is_clear
 
 
@@ -381,11 +380,11 @@ def _is_visible_past_walls(
     """Return whether a source sees the point at offset (dx, dy), by testing every wall in bin k."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    if index.clear2[source, k] < 0.0:
+    if index.squared_clear_distance[source, k] < 0.0:
         vertex = find_vertex(walls.vertices, x, y)
         if not contains_direction(walls, vertex, dx, dy):
             return False
-    if dx * dx + dy * dy > index.reach2[source]:
+    if dx * dx + dy * dy > index.squared_reach[source]:
         return _is_segment_free(walls, x, y, dx, dy)
     entry = index.head[source, k]
     while entry >= 0:

@@ -41,19 +41,23 @@ _SNAP_STEPS = 2
 
 
 class IndexComputation(Protocol):
-    """A computation that uses an index. It returns the number of rows written, or -1 if space ran out."""
+    """A computation that uses an index and returns rows of indices and lengths.
 
-    def __call__(self, index: AngularWallIndex, numbers: IntArray, lengths: Array, /) -> int:
-        """Write rows of `numbers` and `lengths`."""
+    What the columns mean is up to the computation. It returns the number of rows written, or -1 if space ran
+    out.
+    """
+
+    def __call__(self, index: AngularWallIndex, indices: IntArray, lengths: Array, /) -> int:
+        """Write rows of `indices` and `lengths`."""
 
 
 class CornerComputation(Protocol):
     """A computation for the corners from `first` up to `end`; see `IndexComputation`."""
 
     def __call__(
-        self, first: int, end: int, index: AngularWallIndex, numbers: IntArray, lengths: Array, /
+        self, first: int, end: int, index: AngularWallIndex, indices: IntArray, lengths: Array, /
     ) -> int:
-        """Write rows of `numbers` and `lengths`."""
+        """Write rows of `indices` and `lengths`."""
 
 
 class Geodesics:
@@ -121,28 +125,28 @@ class Geodesics:
         Parameters
         ----------
         compute : callable
-            Called as ``compute(first, end, index, numbers, lengths)`` for the corners from `first` up to
+            Called as ``compute(first, end, index, indices, lengths)`` for the corners from `first` up to
             `end`. The index has space for one source.
         progress : callable, optional
             Called with the fraction that is done. It may raise an exception to stop.
 
         Returns
         -------
-        numbers : (r, 3) int array
-        lengths : (r, 2) array
+        indices : (r, 3) int array
+        lengths : (r, 2) array, grid steps
             All rows that `compute` has written.
         """
         count = len(self.corners)
-        all_numbers = [np.empty((0, 3), np.int64)]
+        all_indices = [np.empty((0, 3), np.int64)]
         all_lengths = [np.empty((0, 2))]
         for first in range(0, count, _CORNERS_PER_REPORT):
             if progress is not None:
                 progress(first / count)
             end = min(first + _CORNERS_PER_REPORT, count)
-            _, numbers, lengths = self.run_with_index(1, _CORNER_BINS, partial(compute, first, end))
-            all_numbers.append(numbers)
+            _, indices, lengths = self.run_with_index(1, _CORNER_BINS, partial(compute, first, end))
+            all_indices.append(indices)
             all_lengths.append(lengths)
-        return np.concatenate(all_numbers), np.concatenate(all_lengths)
+        return np.concatenate(all_indices), np.concatenate(all_lengths)
 
     def run_with_index(
         self, sources: int, bins: int, compute: IndexComputation
@@ -156,23 +160,23 @@ class Geodesics:
         bins : int
             Number of bins of each source.
         compute : callable
-            Called as ``compute(index, numbers, lengths)``. It returns the number of rows that it has written
-            to `numbers` and `lengths`, or -1 if there was not enough space there or in the index.
+            Called as ``compute(index, indices, lengths)``. It returns the number of rows that it has written
+            to `indices` and `lengths`, or -1 if there was not enough space there or in the index.
 
         Returns
         -------
         index : AngularWallIndex
-        numbers : (r, 3) int array
+        indices : (r, 3) int array
         lengths : (r, 2) array
         """
         while True:
             entries = self._entries_per_source[bins] * sources + 2 * bins
             index = AngularWallIndex.allocate(sources, bins, entries)
-            numbers = np.empty((entries, 3), np.int64)
+            indices = np.empty((entries, 3), np.int64)
             lengths = np.empty((entries, 2))
-            used = compute(index, numbers, lengths)
+            used = compute(index, indices, lengths)
             if used >= 0:
-                return index, numbers[:used].copy(), lengths[:used].copy()
+                return index, indices[:used].copy(), lengths[:used].copy()
             self._entries_per_source[bins] *= 2
 
     def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
@@ -307,7 +311,7 @@ class Geodesics:
         distances = np.empty((len(grid_positions), corners))
         paths = CornerPaths.allocate(corners)
 
-        def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
+        def fill(index: AngularWallIndex, _indices: IntArray, _lengths: Array) -> int:
             used: int = _find_corner_distances(
                 self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
             )

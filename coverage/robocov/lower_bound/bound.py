@@ -366,7 +366,7 @@ class _Dual:
         profits = np.empty((2, len(triangles)))
         grid_prices = prices / self._unit
 
-        def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
+        def fill(index: AngularWallIndex, _indices: IntArray, _lengths: Array) -> int:
             return int(
                 bound_profits(self._site_data, index, grid_prices, triangles, centers, scratch, profits)
             )

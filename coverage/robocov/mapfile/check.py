@@ -195,22 +195,22 @@ def count_vertices(environment: Environment) -> int:
     return sum(len(ring) for _, ring in _iterate_rings(environment))
 
 
-def describe_vertex_count(count: int) -> str:
+def describe_vertex_count(vertex_count: int) -> str:
     """Return the warning about the computing time of a map with many vertices.
 
     Parameters
     ----------
-    count : int
+    vertex_count : int
 
     Returns
     -------
     str
     """
-    seconds = _SECONDS_PER_SQUARED_VERTEX * count * count
+    seconds = _SECONDS_PER_SQUARED_VERTEX * vertex_count * vertex_count
     time = f"{seconds:.0f} seconds" if seconds < 90.0 else f"{seconds / 60:.0f} minutes"
     return (
-        f"This map has many vertices ({count}): computing the distances between them takes about {time} "
-        "before a run, and four times as long for twice as many"
+        f"This map has many vertices ({vertex_count}): computing the distances between them takes about "
+        f"{time} before a run, and four times as long for twice as many"
     )
 
 
@@ -290,8 +290,8 @@ def _find_component_warnings(environment: Environment, radius: float) -> Iterato
         point = component.representative_point()
         yield f"sealed room of {component.area:.3g} m² around [{point.x:.4g}, {point.y:.4g}]"
     if pockets:
-        count = format_count(len(pockets), "sealed pocket")
-        yield f"{count} smaller than a robot, {sum(pockets):.2g} m² in total"
+        pocket_count = format_count(len(pockets), "sealed pocket")
+        yield f"{pocket_count} smaller than a robot, {sum(pockets):.2g} m² in total"
 
 
 def _find_start_warnings(environment: Environment, radius: float) -> Iterator[str]:

@@ -73,9 +73,9 @@ def _find_ring_mistakes(path: JsonPath, ring: Ring) -> Iterator[Mistake]:
     points = np.asarray(ring, dtype=float)
     extent = np.ptp(points, axis=0)
     size = f"{extent[0]:g} x {extent[1]:g} m"
-    count = len(set(map(tuple, ring)))
-    if count < 3:
-        yield Mistake.at_path(path, f"expected at least 3 different points, got {count}")
+    point_count = len(set(map(tuple, ring)))
+    if point_count < 3:
+        yield Mistake.at_path(path, f"expected at least 3 different points, got {point_count}")
         return
     if extent.max() > MAX_SIZE_M:
         yield Mistake.at_path(path, f"expected at most {MAX_SIZE_M / 1000:g} km, got {size}")

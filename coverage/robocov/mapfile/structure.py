@@ -110,7 +110,7 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
     if kinds and len(path) == object_length:
         return _build_kind_mistake(tuple(path), value, list(kinds))
     if kinds and len(path) > object_length:
-        # The path of pydantic contains the kind after the object; the path of the mistake does not.
+        # The path of pydantic contains the kind after the object; the path in the file does not.
         model = kinds[str(path[object_length])]
         path = path[:object_length] + path[object_length + 1 :]
     if detail["type"] == "extra_forbidden":

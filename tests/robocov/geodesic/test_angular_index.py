@@ -92,8 +92,8 @@ def test_each_bin_is_checked_once_however_long_the_box_is():
     """The angle of a long box next to a source is estimated to be many turns."""
     index = AngularWallIndex.allocate(1, 8, 1)
     index.positions[:] = 0.0
-    index.horizon2[:] = 0.0
+    index.squared_horizon[:] = 0.0
     boxes = np.array([[-(2.0**30), 1.0, 2.0**30, 1.0]])
     assert is_box_hidden(boxes, 0, index, 0)
-    index.horizon2[0, 5] = 2.0
+    index.squared_horizon[0, 5] = 2.0
     assert not is_box_hidden(boxes, 0, index, 0)
