@@ -194,9 +194,9 @@ def test_the_longest_text_that_a_page_pastes_is_taken(display):
     text = "\N{SNOWMAN}\n" * 50_000
     with socket_of(display, Cookie=cookie_of(display)) as line:
         line.send(json.dumps({"kind": "paste", "text": text}))
-        while not display._waiting:
+        while not display.shared.window_input._messages:
             time.sleep(0.01)
-        assert display._waiting.popleft().text == text
+        assert display.shared.window_input._messages.popleft().text == text
 
 
 def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
@@ -236,8 +236,8 @@ def controller(told):
 def moved(display):
     """Return where the window's pointer has been meanwhile."""
     found = []
-    while display._waiting:
-        found.append(display._waiting.popleft())
+    while display.shared.window_input._messages:
+        found.append(display.shared.window_input._messages.popleft())
     return [each.x for each in found if isinstance(each, PointerMoved)]
 
 
@@ -352,8 +352,8 @@ def uploaded(display):
     """Return the path of the file that the window is to open."""
     end = time.monotonic() + 5.0
     while time.monotonic() < end:
-        while display._waiting:
-            event = display._waiting.popleft()
+        while display.shared.window_input._messages:
+            event = display.shared.window_input._messages.popleft()
             if isinstance(event, Uploaded):
                 return Path(event.path)
         time.sleep(0.01)
@@ -546,14 +546,14 @@ def close_reason(line):
 
 
 def test_watchers_never_lock_the_teacher_out(display, monkeypatch):
-    monkeypatch.setattr("robocov_app.web.server.MAX_WATCHERS", 3)
+    monkeypatch.setattr("robocov_app.web.pages.MAX_VIEWERS", 3)
     cookie = cookie_of(display)
     with ExitStack() as stack:
         watchers = [stack.enter_context(watcher_of(display)) for _ in range(3)]
         with watcher_of(display) as refused:
             code, reason = close_reason(refused)
         assert code == 1013
-        assert reason.startswith("All 3 places for watchers are taken")
+        assert reason.startswith("All 3 places for viewers are taken")
         for _ in range(5):  # reloads
             with socket_of(display, Cookie=cookie) as teacher:
                 told = told_to(teacher)
@@ -564,7 +564,7 @@ def test_watchers_never_lock_the_teacher_out(display, monkeypatch):
 
 
 def test_a_watcher_whose_connection_broke_comes_back_to_a_full_house(display, monkeypatch):
-    monkeypatch.setattr("robocov_app.web.server.MAX_WATCHERS", 1)
+    monkeypatch.setattr("robocov_app.web.pages.MAX_VIEWERS", 1)
     address = f"ws://127.0.0.1:{display.port}/socket?token={display.watch_token}&page=a"
     with connect(address, proxy=None) as before:
         told_to(before)
@@ -573,7 +573,7 @@ def test_a_watcher_whose_connection_broke_comes_back_to_a_full_house(display, mo
 
 
 def test_the_newest_of_too_many_pages_with_the_controlling_link_stays(display, monkeypatch):
-    monkeypatch.setattr("robocov_app.web.server.MAX_CONTROLLERS", 2)
+    monkeypatch.setattr("robocov_app.web.pages.MAX_TEACHERS", 2)
     cookie = cookie_of(display)
     with ExitStack() as stack:
         first, second = (stack.enter_context(socket_of(display, Cookie=cookie)) for _ in range(2))
@@ -597,7 +597,7 @@ def test_frames_that_pages_have_are_bounded():
 
 
 def test_a_page_whose_frame_was_given_up_gets_the_next_one_from_black(display, monkeypatch):
-    monkeypatch.setattr(display, "_bases", BaseFrames(max_bytes=1))
+    monkeypatch.setattr(display.shared.delivery, "bases", BaseFrames(max_bytes=1))
     surface = pygame.Surface((40, 30), 0, 32)
     with socket_of(display, Cookie=cookie_of(display)) as ahead, watcher_of(display) as behind:
         told_to(ahead), told_to(behind)

@@ -121,7 +121,7 @@ def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp
                         connect_once(
                             watch_link.replace("http", "ws").replace("/?", "/socket?"), proxy=None
                         ) as line,
-                        pytest.raises(ConnectionClosed, match="All 100 places for watchers are taken"),
+                        pytest.raises(ConnectionClosed, match="All 100 places for viewers are taken"),
                     ):
                         while True:
                             line.recv(PATIENCE_S)

@@ -209,29 +209,29 @@ def test_sockets_that_open_and_close_fast(display):
             line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         line.close()
     end = time.monotonic() + PATIENCE_S
-    while display._pages and time.monotonic() < end:
+    while display.shared.pages and time.monotonic() < end:
         time.sleep(0.01)
-    assert not display._pages
-    assert len(display._bases) <= 1
+    assert not display.shared.pages
+    assert len(display.shared.delivery.bases) <= 1
 
 
 def test_a_page_that_never_reads_is_ended_and_holds_up_nobody(display, monkeypatch):
-    monkeypatch.setattr("robocov_app.web.server.SEND_TIMEOUT_S", 0.5)
-    monkeypatch.setattr("robocov_app.web.server.MAX_IN_FLIGHT", 1000)  # it says that it has shown all
+    monkeypatch.setattr("robocov_app.web.conversation.SEND_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("robocov_app.web.pages.MAX_FRAMES_IN_FLIGHT", 1000)  # it says that it has shown all
     with socket.socket() as line:
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         line.connect(("127.0.0.1", display.port))
         line.sendall(upgrade(f"/socket?token={display.watch_token}"))
         end = time.monotonic() + PATIENCE_S
-        while not display._pages:
+        while not display.shared.pages:
             time.sleep(0.01)
         noise = np.random.default_rng(0)
         surface = pygame.Surface((400, 300), 0, 32)
-        while display._pages and time.monotonic() < end:
+        while display.shared.pages and time.monotonic() < end:
             pygame.surfarray.blit_array(surface, noise.integers(0, 255, (400, 300, 3)))
             display.send(surface)
             time.sleep(0.02)
-        assert not display._pages
+        assert not display.shared.pages
 
 
 def test_a_page_that_says_what_it_never_got(display):
@@ -261,7 +261,7 @@ def test_a_name_in_turns_as_fast_as_possible(display):
 def test_files_that_are_large_are_not_read_into_memory(display, tmp_path):
     with (tmp_path / "long.mp4").open("wb") as file:
         file.truncate(1 << 40)  # no bytes on the disk
-    display._saved = ("long.mp4",)
+    display.saved_files = ("long.mp4",)
     with pytest.raises(urllib.error.HTTPError) as refused:
         urllib.request.urlopen(display.link.replace("/?", "/saved/long.mp4?"))
     with refused.value as answer:
@@ -272,7 +272,7 @@ def test_files_that_are_large_are_not_read_into_memory(display, tmp_path):
 def test_files_that_nobody_takes_are_bounded(display, tmp_path, monkeypatch):
     monkeypatch.setattr("robocov_app.web.connections.MAX_FILES_BYTES", 20 << 20)
     (tmp_path / "film.mp4").write_bytes(bytes(8 << 20))
-    display._saved = ("film.mp4",)
+    display.saved_files = ("film.mp4",)
     request = f"GET /saved/film.mp4?token={display.token} HTTP/1.1\r\n\r\n".encode()
     with raw(display) as first, raw(display) as second:
         for line in (first, second):
@@ -290,7 +290,7 @@ def test_a_download_that_is_taken_slowly_is_not_cut(tmp_path, monkeypatch):
     content = os.urandom(8 << 20)
     Path(tmp_path / "film.mp4").write_bytes(content)
     with WebDisplay(folder=tmp_path) as display, socket.socket() as line:
-        display._saved = ("film.mp4",)
+        display.saved_files = ("film.mp4",)
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         line.connect(("127.0.0.1", display.port))
         line.sendall(f"GET /saved/film.mp4?token={display.token} HTTP/1.1\r\n\r\n".encode())

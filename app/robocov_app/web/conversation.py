@@ -1,0 +1,253 @@
+"""Messages between the server and one page: input, requests and files come in, states and frames go out."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from robocov_app.web import events
+from robocov_app.web.connections import NOT_UNDERSTOOD, SEND_TIMEOUT_S, report
+from robocov_app.web.files import TransferError, Upload, check_name
+from robocov_app.web.frame_delivery import FrameDelivery
+from robocov_app.web.pages import Page, Pages
+from robocov_app.web.window_input import WindowInput
+
+MAX_EVENTS_PER_S = 400.0
+"""Maximum rate of events from one page. More of them wait in its connection; none is lost."""
+EVENTS_PER_UPLOAD = 200.0
+"""Number of events that an upload counts as."""
+EVENTS_PER_PIECE = 8.0
+"""Number of events that a piece of an upload counts as."""
+_PAUSE_S = 0.05
+"""Time between two checks whether more messages may be read."""
+
+
+@dataclass
+class SharedWindow:
+    """What all pages have in common.
+
+    Attributes
+    ----------
+    pages : Pages
+    delivery : FrameDelivery
+    window_input : WindowInput
+    folder : Path
+        Folder for uploaded files.
+    file_executor : Executor
+        Thread for reading and writing files.
+    state : dict
+        State of the window that pages show besides its frames: cursor, title, saved files and clipboard.
+    """
+
+    pages: Pages
+    delivery: FrameDelivery
+    window_input: WindowInput
+    folder: Path
+    file_executor: Executor
+    state: dict[str, Any] = field(
+        default_factory=lambda: {"cursor": "default", "title": "robocov", "saved": ()}
+    )
+
+
+class _EventBudget:
+    """The number of events that a page may still send now; it is refilled at a constant rate."""
+
+    def __init__(self) -> None:
+        self._remaining = MAX_EVENTS_PER_S
+        self._refilled_at = monotonic()
+
+    @property
+    def is_exceeded(self) -> bool:
+        return self._remaining < 0.0
+
+    def refill(self) -> None:
+        now = monotonic()
+        gained = (now - self._refilled_at) * MAX_EVENTS_PER_S
+        self._remaining = min(self._remaining + gained, MAX_EVENTS_PER_S)
+        self._refilled_at = now
+
+    def spend(self, event_count: float) -> None:
+        self._remaining -= event_count
+
+
+class Conversation:
+    """The exchange of messages with a page, as long as its connection lasts.
+
+    Parameters
+    ----------
+    page : Page
+    shared : SharedWindow
+    """
+
+    def __init__(self, page: Page, shared: SharedWindow) -> None:
+        self._page = page
+        self._shared = shared
+        self._handlers: dict[type[Any], Callable[[Any], None]] = {
+            events.FrameShown: self._handle_shown_frame,
+            events.Control: self._handle_control,
+            events.Named: self._handle_name,
+            events.PageChanged: self._handle_page,
+        }
+
+    async def run(self) -> None:
+        """Exchange messages until the connection ends."""
+        sender = asyncio.create_task(self._send_news())
+        try:
+            await self._receive_messages()
+        finally:
+            sender.cancel()
+
+    # Messages from the page.
+
+    async def _receive_messages(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        budget = _EventBudget()
+        with suppress(ConnectionClosed):
+            async for message in self._page.connection:
+                budget.refill()
+                try:
+                    budget.spend(await self._handle(message))
+                except ValueError:
+                    await self._page.connection.close(NOT_UNDERSTOOD, "not understood")
+                while budget.is_exceeded or self._shared.window_input.is_full:
+                    await asyncio.sleep(_PAUSE_S)
+                    budget.refill()
+
+    async def _handle(self, message: str | bytes) -> float:
+        """Handle a message; return the number of events that it counts as.
+
+        Raises
+        ------
+        ValueError
+            If the message is invalid.
+        """
+        if isinstance(message, bytes):
+            await self._add_piece(message)
+            return EVENTS_PER_PIECE
+        checked = events.MESSAGES.validate_json(message)
+        if isinstance(checked, events.UploadStarted):
+            await self._start_upload(checked)
+            return EVENTS_PER_UPLOAD
+        handler = self._handlers.get(type(checked))
+        if handler is not None:
+            handler(checked)
+        elif self._is_controlling:
+            assert isinstance(checked, events.InputMessage)
+            self._shared.window_input.put(checked)
+        return 1.0
+
+    @property
+    def _is_controlling(self) -> bool:
+        return self._page is self._shared.pages.controlling
+
+    def _handle_shown_frame(self, message: events.FrameShown) -> None:
+        self._page.confirm_frame(message.number)
+        self._shared.delivery.has_work.set()
+
+    def _handle_control(self, message: events.Control) -> None:
+        if message.to == 0:
+            self._shared.pages.toggle_request(self._page)
+        else:
+            self._shared.pages.pass_control(self._page, message.to)
+
+    def _handle_name(self, message: events.Named) -> None:
+        self._shared.pages.rename(self._page, message.name)
+
+    def _handle_page(self, message: events.PageChanged) -> None:
+        if message.width * message.height > events.MAX_PAGE_PIXELS:
+            raise ValueError("page too large")
+        self._page.settings = message
+        if self._is_controlling:
+            self._shared.window_input.set_page(message)
+
+    # Files from the page.
+
+    async def _start_upload(self, message: events.UploadStarted) -> None:
+        problem = "" if self._is_controlling else "Only the page that controls the window can open files."
+        try:
+            check_name(message.name)
+        except TransferError as error:
+            problem = problem or str(error)
+        if problem:
+            self._page.notify(problem)
+        self._page.upload = Upload(message.name, message.size, is_refused=bool(problem))
+        await self._finish_upload()
+
+    async def _add_piece(self, piece: bytes) -> None:
+        if self._page.upload is None:
+            raise ValueError("a piece without a file")
+        self._page.upload.add(piece)
+        await self._finish_upload()
+
+    async def _finish_upload(self) -> None:
+        """Save a file once all of it has arrived, and let the window open it."""
+        upload = self._page.upload
+        if upload is None or not upload.is_complete:
+            return
+        self._page.upload = None
+        if upload.is_refused:
+            return
+        if not self._is_controlling:
+            self._page.notify(f"{upload.name}: not opened, another page controls the window now.")
+            return
+        loop = asyncio.get_running_loop()
+        try:
+            path = await loop.run_in_executor(self._shared.file_executor, upload.save, self._shared.folder)
+        except TransferError as error:
+            self._page.notify(str(error))
+            report(str(error))
+            return
+        self._shared.window_input.put(events.Uploaded(path=str(path)))
+
+    # Messages to the page.
+
+    async def _send_news(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        page = self._page
+        with suppress(ConnectionClosed):
+            while True:
+                await page.has_news.wait()
+                page.has_news.clear()
+                # The frames are taken before the state, which is then never older than they are.
+                frames = list(page.outbox)
+                page.outbox.clear()
+                await self._send_state()
+                while page.notices:
+                    notice = {"kind": "notice", "text": page.notices.popleft()}
+                    await self._send(json.dumps(notice))
+                for frame in frames:
+                    await self._send(frame)
+
+    async def _send_state(self) -> None:
+        """Send the state of the window and the people, if it differs from what was sent last."""
+        page = self._page
+        state = {
+            **self._shared.state,
+            "kind": "state",
+            "people": self._shared.pages.people,
+            "you": page.number,
+            "teacher": page.is_teacher,
+        }
+        if not self._is_controlling:
+            # Only the page that controls sees the clipboard.
+            state.pop("copied", None)
+        if state != page.sent_state:
+            page.sent_state = state
+            await self._send(json.dumps(state))
+
+    async def _send(self, message: str | bytes) -> None:
+        """Send a message; end the connection if the page does not read it."""
+        try:
+            async with asyncio.timeout(SEND_TIMEOUT_S):
+                await self._page.connection.send(message)
+        except TimeoutError:
+            self._page.connection.transport.abort()

@@ -1,0 +1,105 @@
+"""Delivery of the newest frame to each page that is ready for it."""
+
+from __future__ import annotations
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from time import monotonic
+
+from robocov_app.web.frames import BaseFrames, Frame, encode_frame
+from robocov_app.web.pages import Page, Pages
+
+MAX_INDIVIDUAL_PAGES = 3
+"""Number of pages besides the controlling one up to which each gets every frame that it can show."""
+SHARED_FRAME_INTERVAL_S = 1 / 15
+"""Time between two frames for more pages than that. They get the same frames, which are encoded once."""
+_MIN_TIMEOUT_S = 0.001
+
+
+class FrameDelivery:
+    """Encodes frames for pages, in turn for the controlling page and the others.
+
+    Parameters
+    ----------
+    pages : Pages
+
+    Attributes
+    ----------
+    newest : Frame or None
+        The newest frame of the window, which the window's thread sets.
+    has_work : asyncio.Event
+        Set when there is a newer frame, or when a page has come, gone, or shown a frame.
+    bases : BaseFrames
+        Frames that pages show, with which newer ones are compared.
+    """
+
+    def __init__(self, pages: Pages) -> None:
+        self.newest: Frame | None = None
+        self.has_work = asyncio.Event()
+        self.bases = BaseFrames()
+        self._pages = pages
+        self._shared_frame: Frame | None = None
+        self._next_shared_time = 0.0
+        self._controlling_was_last = False
+        self._encoder = ThreadPoolExecutor(1, thread_name_prefix="web-encoder")
+
+    async def run(self) -> None:
+        """Deliver frames until the task is canceled."""
+        while True:
+            self.has_work.clear()
+            page, frame = self._choose()
+            if page is None or frame is None:
+                await self._wait_for_work()
+            else:
+                await self._deliver(page, frame)
+            self.bases.keep_only({page.base_number for page in self._pages})
+
+    def close(self) -> None:
+        """End the thread that encodes frames."""
+        self._encoder.shutdown(wait=False, cancel_futures=True)
+
+    def _choose(self) -> tuple[Page | None, Frame | None]:
+        """Return the page that gets the next frame, and that frame; None if no page is ready."""
+        controlling = self._pages.controlling
+        controlling_is_ready = controlling is not None and controlling.is_ready_for(self.newest)
+        if controlling_is_ready and not self._controlling_was_last:
+            return controlling, self.newest
+        others = [page for page in self._pages if page is not controlling]
+        self._update_shared_frame(len(others))
+        ready = [page for page in others if page.is_ready_for(self._shared_frame)]
+        if ready:
+            return min(ready, key=lambda page: page.base_number), self._shared_frame
+        if controlling_is_ready:
+            return controlling, self.newest
+        return None, None
+
+    def _update_shared_frame(self, page_count: int) -> None:
+        """Choose the frame for the pages that do not control."""
+        if page_count > MAX_INDIVIDUAL_PAGES and monotonic() < self._next_shared_time:
+            return
+        if self.newest is not self._shared_frame:
+            self._next_shared_time = monotonic() + SHARED_FRAME_INTERVAL_S
+        self._shared_frame = self.newest
+
+    async def _deliver(self, page: Page, frame: Frame) -> None:
+        """Encode a frame for a page, and queue it for all pages that show the same frame as that one."""
+        base_number = page.base_number
+        base = self.bases.get(base_number)
+        loop = asyncio.get_running_loop()
+        message = await loop.run_in_executor(self._encoder, encode_frame, frame, base)
+        self.bases.add(frame)
+        controlling = self._pages.controlling
+        self._controlling_was_last = page is controlling
+        for receiver in self._pages:
+            is_due = receiver is page or receiver is not controlling
+            if receiver.base_number == base_number and is_due and receiver.is_ready_for(frame):
+                receiver.add_frame(frame.number, message)
+
+    async def _wait_for_work(self) -> None:
+        timeout = None
+        if self._shared_frame is not self.newest and len(self._pages) > 1:
+            timeout = max(self._next_shared_time - monotonic(), _MIN_TIMEOUT_S)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(timeout):
+                await self.has_work.wait()

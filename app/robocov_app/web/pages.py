@@ -1,0 +1,259 @@
+"""The browser pages that show a window, and which of them controls it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+from robocov.errors import RobocovError
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+
+    from robocov_app.web.events import PageChanged
+    from robocov_app.web.files import Upload
+    from robocov_app.web.frames import Frame
+
+MAX_VIEWERS = 100
+"""Maximum number of pages with the link for watching."""
+MAX_TEACHERS = 16
+"""Maximum number of pages with the link for controlling. The oldest one has to go for one more."""
+MAX_NOTICES = 8
+"""Maximum number of messages that wait for a page."""
+MAX_FRAMES_IN_FLIGHT = 2
+"""Maximum number of frames that were sent to a page and that it has not shown yet."""
+
+
+class NoPlaceError(RobocovError):
+    """All places for pages are taken; the message is for the page."""
+
+
+@dataclass(eq=False)
+class Page:
+    """A browser page that shows the window.
+
+    Attributes
+    ----------
+    connection : ServerConnection
+    number : int
+        Number of the page, by which other pages name it.
+    is_teacher : bool
+        Whether it was opened with the link for controlling, and may take control at any time.
+    name : str
+        Name that other pages show.
+    page_id : str
+        Identity that the page keeps when its connection breaks.
+    requests_control : bool
+    settings : PageChanged or None
+        Its size and color scheme, once it has reported them.
+    upload : Upload or None
+        The file that it is sending.
+    base_number : int
+        Number of the frame that it shows, or will show when all frames on their way have arrived; 0 for none.
+    in_flight : deque of int
+        Numbers of the frames on their way to it.
+    outbox : deque of bytes
+        Encoded frames to be sent.
+    notices : deque of str
+        Messages to be sent.
+    sent_state : dict
+        State of the window that it was sent last.
+    has_news : asyncio.Event
+        Set when there is something to send.
+    """
+
+    connection: ServerConnection
+    number: int
+    is_teacher: bool
+    name: str
+    page_id: str
+    requests_control: bool = False
+    settings: PageChanged | None = None
+    upload: Upload | None = None
+    base_number: int = 0
+    in_flight: deque[int] = field(default_factory=deque)
+    outbox: deque[bytes] = field(default_factory=deque)
+    notices: deque[str] = field(default_factory=lambda: deque(maxlen=MAX_NOTICES))
+    sent_state: dict[str, Any] = field(default_factory=dict)
+    has_news: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def is_ready_for(self, frame: Frame | None) -> bool:
+        """Return whether a frame is newer than the one that the page has, and can be sent."""
+        if frame is None or len(self.in_flight) >= MAX_FRAMES_IN_FLIGHT:
+            return False
+        return self.base_number < frame.number
+
+    def add_frame(self, number: int, message: bytes) -> None:
+        """Queue an encoded frame."""
+        self.base_number = number
+        self.in_flight.append(number % 2**32)
+        self.outbox.append(message)
+        self.has_news.set()
+
+    def confirm_frame(self, number: int) -> None:
+        """Remove a frame that the page has shown, and all earlier ones, from those on their way."""
+        while self.in_flight and self.in_flight.popleft() != number:
+            pass
+
+    def notify(self, notice: str) -> None:
+        """Show a message in the page."""
+        self.notices.append(notice)
+        self.has_news.set()
+
+
+class Pages:
+    """The pages that show a window. One of them controls it: the first teacher, until control is passed on.
+
+    Parameters
+    ----------
+    on_control_change : callable
+        Called with the page that had control and the one that has it now; either may be None.
+
+    Attributes
+    ----------
+    controlling : Page or None
+        The page that controls the window.
+    people : list of dict
+        Number, name and role of each page, as pages show them.
+    """
+
+    def __init__(self, on_control_change: Callable[[Page | None, Page | None], None]) -> None:
+        self.controlling: Page | None = None
+        self.people: list[dict[str, Any]] = []
+        self._on_control_change = on_control_change
+        self._pages: list[Page] = []
+        self._numbers = count(1)
+
+    def __iter__(self) -> Iterator[Page]:
+        return iter(self._pages)
+
+    def __len__(self) -> int:
+        return len(self._pages)
+
+    def open(self, connection: ServerConnection, *, is_teacher: bool, page_id: str) -> Page:
+        """Add the page of a new connection.
+
+        If it had another connection before, which broke without anyone noticing, it keeps its number, name
+        and role.
+
+        Parameters
+        ----------
+        connection : ServerConnection
+        is_teacher : bool
+            Whether it was opened with the link for controlling.
+        page_id : str
+            Identity of the page; empty if it has none.
+
+        Returns
+        -------
+        Page
+
+        Raises
+        ------
+        NoPlaceError
+            If all places for viewers are taken.
+        """
+        earlier = self._find(page_id, is_teacher=is_teacher)
+        if earlier is None and not is_teacher and self._count_viewers() >= MAX_VIEWERS:
+            raise NoPlaceError(f"All {MAX_VIEWERS} places for viewers are taken. Trying again …")
+        number = next(self._numbers)
+        role = "Teacher" if is_teacher else "Viewer"
+        page = Page(connection, number, is_teacher, f"{role} {number}", page_id)
+        self._pages.append(page)
+        if earlier is not None:
+            self._replace(earlier, page)
+        self.give_control(self.controlling)
+        return page
+
+    def close(self, page: Page) -> None:
+        """Remove a page whose connection has ended; another teacher gets control if it had it."""
+        if page in self._pages:
+            self._pages.remove(page)
+        self.give_control(self.controlling)
+
+    def remove_surplus_teacher(self) -> Page | None:
+        """Remove the oldest page of a teacher that does not control, if there are too many.
+
+        Returns
+        -------
+        Page or None
+            The removed page, whose connection is still open.
+        """
+        teachers = [page for page in self._pages if page.is_teacher]
+        if len(teachers) <= MAX_TEACHERS:
+            return None
+        oldest = next(page for page in teachers if page is not self.controlling)
+        self._pages.remove(oldest)
+        self.give_control(self.controlling)
+        return oldest
+
+    def rename(self, page: Page, name: str) -> None:
+        """Set the name of a page, unless it is blank."""
+        printable = "".join(filter(str.isprintable, name)).strip()
+        page.name = printable or page.name
+        self._update_people()
+
+    def toggle_request(self, page: Page) -> None:
+        """Let a page request control, or withdraw its request."""
+        page.requests_control = not page.requests_control and page is not self.controlling
+        self._update_people()
+
+    def pass_control(self, page: Page, number: int) -> None:
+        """Give control to the page with a number, if the page that asks for it may do so."""
+        if page is not self.controlling and not page.is_teacher:
+            return
+        receivers = (other for other in self._pages if other.number == number)
+        self.give_control(next(receivers, self.controlling))
+
+    def give_control(self, page: Page | None) -> None:
+        """Let a page control the window; the first teacher if that page is gone."""
+        if page not in self._pages:
+            page = next((other for other in self._pages if other.is_teacher), None)
+        if page is not self.controlling:
+            previous = self.controlling
+            self.controlling = page
+            if page is not None:
+                page.requests_control = False
+            self._on_control_change(previous, page)
+        self._update_people()
+
+    def wake(self) -> None:
+        """Send all pages what has changed."""
+        for page in self._pages:
+            page.has_news.set()
+
+    def _find(self, page_id: str, *, is_teacher: bool) -> Page | None:
+        for page in self._pages:
+            if page_id and page.page_id == page_id and page.is_teacher == is_teacher:
+                return page
+        return None
+
+    def _count_viewers(self) -> int:
+        return sum(not page.is_teacher for page in self._pages)
+
+    def _replace(self, earlier: Page, page: Page) -> None:
+        """Let a page take the place of its earlier connection."""
+        page.number = earlier.number
+        page.name = earlier.name
+        page.requests_control = earlier.requests_control
+        had_control = earlier is self.controlling
+        self._pages.remove(earlier)
+        if had_control:
+            self.give_control(page)
+        earlier.connection.transport.abort()
+
+    def _update_people(self) -> None:
+        self.people = [
+            {
+                "number": page.number,
+                "name": page.name,
+                "asks": page.requests_control,
+                "controls": page is self.controlling,
+            }
+            for page in self._pages
+        ]
+        self.wake()

@@ -1,0 +1,88 @@
+"""Input of the controlling page, which the server's thread passes to the thread of the window."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import TYPE_CHECKING
+
+import pygame
+
+from robocov_app.web.events import EventTranslator, InputMessage, PageChanged, Uploaded, get_modifiers
+
+if TYPE_CHECKING:
+    from robocov_app.toolkit.window import BaseWindow
+
+MAX_WAITING_MESSAGES = 5000
+"""Number of messages from which on the server reads no more of them until the window has caught up."""
+NARROW_PAGE_PX = 700
+"""Width of a page below which the panel is hidden, in CSS pixels."""
+_MIN_WAIT_S = 0.001
+"""Other threads get their turn even if the window does not want to wait."""
+
+
+class WindowInput:
+    """Messages and settings of the controlling page, on their way to the window.
+
+    The server's thread calls `put` and `set_page`, the window's thread `wait` and `post`.
+    """
+
+    def __init__(self) -> None:
+        self._messages: deque[InputMessage | Uploaded] = deque()
+        self._page: PageChanged | None = None
+        self._fitted_page: PageChanged | None = None
+        self._is_narrow = False
+        self._translator = EventTranslator()
+        self._held = 0
+        self._has_arrived = threading.Event()
+
+    @property
+    def is_full(self) -> bool:
+        """Whether so many messages wait that no more should be read."""
+        return len(self._messages) > MAX_WAITING_MESSAGES
+
+    def put(self, message: InputMessage | Uploaded) -> None:
+        """Pass a message to the window."""
+        self._messages.append(message)
+        self._has_arrived.set()
+
+    def set_page(self, page: PageChanged | None) -> None:
+        """Let the window take the size and look of a page; None leaves them as they are."""
+        self._page = page or self._page
+        self._has_arrived.set()
+
+    def wait(self, seconds: float) -> None:
+        """Wait until something arrives, or for some seconds."""
+        if self._has_arrived.wait(max(seconds, _MIN_WAIT_S)):
+            self._has_arrived.clear()
+
+    def post(self, window: BaseWindow) -> None:
+        """Fit the window to the page, and post the messages that have arrived as events of pygame."""
+        page = self._page
+        if page is not None and page is not self._fitted_page:
+            self._fitted_page = page
+            self._fit(window, page)
+        has_posted = False
+        while self._messages:
+            held = getattr(self._messages[0], "held", self._held)
+            if held != self._held:
+                if has_posted:
+                    # The window first handles the events for which other keys were held.
+                    self._has_arrived.set()
+                    return
+                self._held = held
+                pygame.key.set_mods(get_modifiers(held))
+            for event in self._translator.translate(self._messages.popleft()):
+                pygame.event.post(event)
+                has_posted = True
+
+    def _fit(self, window: BaseWindow, page: PageChanged) -> None:
+        """Give the window the size, scale and color scheme of a page."""
+        size = (page.width, page.height)
+        if window.screen.get_size() != size:
+            pygame.display.set_mode(size, pygame.RESIZABLE)
+            pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+        was_narrow = self._is_narrow
+        self._is_narrow = page.width < NARROW_PAGE_PX * page.ratio
+        shows_panel = None if self._is_narrow == was_narrow else not self._is_narrow
+        window.suit(page.ratio, "dark" if page.dark else "light", panel=shows_panel)
