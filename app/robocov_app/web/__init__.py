@@ -77,12 +77,12 @@ def serve_each(command: Callable[[Any], int], options: Any) -> int:
     """Serve a command's window to each visitor in a process of their own, until the process is stopped."""
     import asyncio
 
-    from robocov_app.web.each import Sessions
+    from robocov_app.web.visitor_server import VisitorServer
 
     max_idle_s = 60.0 * options.idle_minutes
-    sessions = Sessions(command, options, options.max_sessions, max_idle_s)
+    server = VisitorServer(command, options, options.max_sessions, max_idle_s)
     try:
-        asyncio.run(sessions.serve(lambda line: echo(line, flush=True)))
+        asyncio.run(server.serve(lambda line: echo(line, flush=True)))
     except asyncio.CancelledError:  # by SIGINT or SIGTERM
         raise KeyboardInterrupt from None
     return 0

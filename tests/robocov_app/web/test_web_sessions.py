@@ -9,9 +9,9 @@ import pytest
 pytest.importorskip("websockets")
 
 from robocov.errors import InputError
-from robocov_app.web import each
-from robocov_app.web.each import Sessions, Window
+from robocov_app.web.visitor_server import MIN_IDLE_S, VisitorServer
 from robocov_app.web.visitors import FILE_NAME, VisitorFolders, create_id, is_signed, read_id, sign
+from robocov_app.web.window_process import WindowProcess
 
 
 class Process:
@@ -29,33 +29,33 @@ class Process:
     kill = terminate
 
 
-class FakeSessions(Sessions):
+class FakeServer(VisitorServer):
     """Windows without processes."""
 
-    def __init__(self, folder, max_sessions, max_idle_s=600.0):
-        super().__init__(lambda _: 0, SimpleNamespace(folder=folder), max_sessions, max_idle_s)
+    def __init__(self, folder, max_windows, max_idle_s=600.0):
+        super().__init__(lambda _: 0, SimpleNamespace(folder=folder), max_windows, max_idle_s)
         self.opened = []
-        self.trouble = None
+        self.error = None
 
     async def _open(self, folder):
         await asyncio.sleep(0)
-        if self.trouble is not None:
-            raise self.trouble
-        window = Window(Process(), folder, port=1, token="")
+        if self.error is not None:
+            raise self.error
+        window = WindowProcess(Process(), folder, port=1, token="")
         self.opened.append(window)
         return window
 
     async def visit(self, visitor, *, leaves=True):
         """Open a page, and close it; return the window, or None without a place."""
-        session = await self._find_or_start(visitor)
-        if session is None:
+        window = await self._find_or_open(visitor)
+        if window is None:
             return None
-        window = await asyncio.shield(session.opening)
-        session.n_pages += not leaves
-        return window
+        process = await asyncio.shield(window.opening)
+        window.page_count += not leaves
+        return process
 
     def pass_time(self, visitor, seconds):
-        self._sessions[visitor].unwatched_since -= seconds
+        self._windows[visitor].idle_since -= seconds
 
 
 ADA, BEN, CLEO = (letter * 24 for letter in "abc")
@@ -63,28 +63,28 @@ ADA, BEN, CLEO = (letter * 24 for letter in "abc")
 
 def test_a_visitor_comes_back_to_their_window(tmp_path):
     async def visits():
-        sessions = FakeSessions(tmp_path, 2)
-        windows = await asyncio.gather(*(sessions.visit(ADA) for _ in range(5)))
-        assert len({id(window) for window in windows}) == len(sessions.opened) == 1
-        assert (await sessions.visit(BEN)).folder != windows[0].folder
+        server = FakeServer(tmp_path, 2)
+        windows = await asyncio.gather(*(server.visit(ADA) for _ in range(5)))
+        assert len({id(window) for window in windows}) == len(server.opened) == 1
+        assert (await server.visit(BEN)).folder != windows[0].folder
 
     asyncio.run(visits())
 
 
 def test_a_place_is_given_back_when_nobody_has_looked_for_a_minute_and_somebody_waits(tmp_path):
     async def visits():
-        sessions = FakeSessions(tmp_path, 2)
-        hers = await sessions.visit(ADA)
-        his = await sessions.visit(BEN, leaves=False)
-        assert await sessions.visit(CLEO) is None
-        sessions.pass_time(ADA, each.MIN_IDLE_S / 2)
-        sessions.pass_time(BEN, 1e6)
-        assert await sessions.visit(CLEO) is None
-        sessions.pass_time(ADA, each.MIN_IDLE_S)
-        assert await sessions.visit(CLEO) is not None
+        server = FakeServer(tmp_path, 2)
+        hers = await server.visit(ADA)
+        his = await server.visit(BEN, leaves=False)
+        assert await server.visit(CLEO) is None
+        server.pass_time(ADA, MIN_IDLE_S / 2)
+        server.pass_time(BEN, 1e6)
+        assert await server.visit(CLEO) is None
+        server.pass_time(ADA, MIN_IDLE_S)
+        assert await server.visit(CLEO) is not None
         assert (hers.process.lives, his.process.lives) == (False, True)
-        sessions.pass_time(CLEO, 1e6)
-        again = await sessions.visit(ADA)
+        server.pass_time(CLEO, 1e6)
+        again = await server.visit(ADA)
         assert again is not hers
         assert again.folder == hers.folder
 
@@ -93,49 +93,49 @@ def test_a_place_is_given_back_when_nobody_has_looked_for_a_minute_and_somebody_
 
 def test_a_window_that_nobody_looks_at_is_ended(tmp_path):
     async def visits():
-        sessions = FakeSessions(tmp_path, 3, max_idle_s=100.0)
-        hers = await sessions.visit(ADA)
-        his = await sessions.visit(BEN)
+        server = FakeServer(tmp_path, 3, max_idle_s=100.0)
+        hers = await server.visit(ADA)
+        his = await server.visit(BEN)
         for seconds, lives in ((99.0, True), (2.0, False)):
-            sessions.pass_time(ADA, seconds)
-            sessions._look_after()
+            server.pass_time(ADA, seconds)
+            server._remove_idle_windows()
             await asyncio.sleep(0.1)
             assert (hers.process.lives, his.process.lives) == (lives, True)
-        assert list(sessions._sessions) == [BEN]
+        assert list(server._windows) == [BEN]
 
     asyncio.run(visits())
 
 
 def test_a_window_that_ended_by_itself_gives_its_place_back_at_once(tmp_path):
     async def visits():
-        sessions = FakeSessions(tmp_path, 1)
+        server = FakeServer(tmp_path, 1)
         for visitor in (ADA, BEN, BEN, ADA):
-            window = await sessions.visit(visitor, leaves=False)
+            window = await server.visit(visitor, leaves=False)
             window.process.lives = False
-        assert len(sessions.opened) == 4
+        assert len(server.opened) == 4
 
     asyncio.run(visits())
 
 
 def test_a_window_that_does_not_open_takes_no_place(tmp_path):
     async def visits():
-        sessions = FakeSessions(tmp_path, 1)
-        sessions.trouble = InputError("no")
+        server = FakeServer(tmp_path, 1)
+        server.error = InputError("no")
         for _ in range(3):
             with pytest.raises(InputError):
-                await sessions.visit(ADA)
-            sessions._look_after()
-        sessions.trouble = None
-        assert await sessions.visit(BEN) is not None
+                await server.visit(ADA)
+            server._remove_idle_windows()
+        server.error = None
+        assert await server.visit(BEN) is not None
 
     asyncio.run(visits())
 
 
 def test_a_visitor_who_is_known_takes_the_place_of_the_window_that_is_kept_ready(tmp_path):
     async def visits():
-        sessions = FakeSessions(tmp_path, 1)
-        folder = (await sessions.visit(ADA)).folder
-        later = FakeSessions(tmp_path, 1)
+        server = FakeServer(tmp_path, 1)
+        folder = (await server.visit(ADA)).folder
+        later = FakeServer(tmp_path, 1)
         later._spare = spare = await later._open(later._folders.create())
         assert (await later.visit(ADA)).folder == folder
         assert not spare.process.lives
