@@ -17,7 +17,8 @@ from robocov_app.editor.edits.create import add_rectangle
 from robocov_app.editor.ui.launch import editor_window
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.launch import HEADLESS_FPS, Launcher
-from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 
 if TYPE_CHECKING:
@@ -32,9 +33,11 @@ SIZE = (1280, 720)
 def picture(theme: str, name: str) -> None:
     """Use the window for a while, and keep what it shows."""
     session = Session(
-        Scenario(load_map("rooms"), (ControllerChoice("rapf"), ControllerChoice("lloyd")), start="kitchen")
+        SessionScenario(
+            load_map("rooms"), (ControllerChoice("rapf"), ControllerChoice("lloyd")), start="kitchen"
+        )
     )
-    session.clock.speed = 2.0
+    session.playback.clock.speed = 2.0
     also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
     launcher = Launcher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
     with launcher.window() as window:
@@ -86,7 +89,7 @@ def film(name: str) -> None:
         *("-preset", "veryslow", "-crf", "33", "-tune", "animation", "-pix_fmt", "yuv420p"),
         *("-movflags", "+faststart", str(HERE / name)),
     ]
-    session = Session(Scenario(load_map("rooms")))
+    session = Session(SessionScenario(load_map("rooms")))
     launcher = Launcher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
     with launcher.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None

@@ -21,7 +21,7 @@ from robocov.metrics.run_metrics import COLUMNS
 from robocov_app.cli import COMMANDS, main
 from robocov_app.sweep import table
 from robocov_app.sweep.study_file import _STUDY, _Table
-from robocov_app.viewer.session.file import session_schema
+from robocov_app.viewer.session.file_models import build_session_schema
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -90,7 +90,7 @@ def formats() -> str:
         "# File formats\n\nMaps and sessions are JSON, studies TOML; [the folder of a run](../results.md) is "
     )
     text += "described by itself. `robocov schema map` and `robocov schema session` print the schemas.\n"
-    for title, schema in (("Maps", build_map_schema()), ("Sessions", session_schema())):
+    for title, schema in (("Maps", build_map_schema()), ("Sessions", build_session_schema())):
         text += f"\n## {title}\n"
         parts = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
         for name, part in parts.items():

@@ -419,27 +419,29 @@ def show(
 
 def _show_simulation(simulation: Simulation, height: int) -> LiveWindow:
     """Show the window of a session that starts from the state of a simulation."""
-    from robocov_app.viewer.session import scenario as viewer_scenario
+    from robocov_app.viewer.session.controller_choice import ControllerChoice
     from robocov_app.viewer.session.file import save_session
+    from robocov_app.viewer.session.robot_properties import RobotProperties
+    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
 
     controller = simulation.controller
     gains = get_gain_values(unwrap_controller(controller))
     session = Session(
-        viewer_scenario.Scenario(
+        SessionScenario(
             simulation.environment,
-            (viewer_scenario.ControllerChoice(controller.name, gains),),
+            (ControllerChoice(controller.name, gains),),
             len(simulation.team),
-            limits=viewer_scenario.TeamSpec.of(simulation.team),
+            properties=RobotProperties.from_team(simulation.team),
             dt=simulation.dt,
-            given=simulation.positions,
-            moving=simulation.velocities,
+            given_starts=simulation.positions,
+            velocities=simulation.velocities,
             conditions=simulation.conditions,
         )
     )
     with TemporaryDirectory() as folder:
         file = Path(folder) / "simulation.robocov"
-        save_session(file, session.document, session.head, 0, {})
+        save_session(file, session.timeline.document, session.timeline.head, 0, {})
         return LiveWindow(["demo", str(file)], height)
 
 

@@ -19,7 +19,8 @@ from robocov_app.toolkit.display import open_display
 from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -36,7 +37,7 @@ def resident() -> float:
 def main(minutes: int, robots: int) -> None:
     """Use the window for so long, and tell how its memory grows."""
     rng = np.random.default_rng(0)
-    session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, "uniform"))
+    session = Session(SessionScenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, "uniform"))
     layers = {layer.name for layer in standard_layers() if layer.default}
     with tempfile.TemporaryDirectory() as folder, open_display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
@@ -51,25 +52,25 @@ def main(minutes: int, robots: int) -> None:
             if minute == WARM:
                 warm = resident()
             if minute % 5 == 0:
-                past = f"{len(session.history)} moments, {session.history.thinned} thinned"
+                past = f"{len(session.timeline.history)} moments, {session.timeline.history.thinned} thinned"
                 print(f"{minute:3d} min  {resident():7.1f} MB  {past}", flush=True)
         print(f"grown by {resident() - warm:.1f} MB since minute {WARM}")
 
 
 def touch(viewer: Presenter, rng: np.random.Generator) -> None:
     """Do something that people do, and which leaves the run as long as it is."""
-    numbers = viewer.session.numbers
+    numbers = viewer.session.displayed.numbers
     number = int(rng.choice(numbers))
     try:
         match int(rng.integers(5)):
             case 0:
-                viewer.session.grab(number, (float(rng.uniform(1, 11)), float(rng.uniform(1, 8))))
+                viewer.session.drag_robot(number, (float(rng.uniform(1, 11)), float(rng.uniform(1, 8))))
             case 1:
                 viewer.session.release()
             case 2 if len(numbers) > 3:
                 viewer.session.fail_robot(number)
             case 3:
-                for failed in list(viewer.session.panes[0].setup.failed):
+                for failed in list(viewer.session.timeline.panes[0].setup.failed):
                     viewer.session.revive_robot(failed)
             case _:
                 viewer.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))

@@ -21,7 +21,7 @@ from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
-from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -167,8 +167,8 @@ class Driver:
 
     def robot(self, number: int, pane: int = 0) -> tuple[float, float]:
         """Return the pixel where a robot is."""
-        its = self.session.panes[pane]
-        x, y = self.session.positions(its)[its.numbers.index(number)].tolist()
+        its = self.session.timeline.panes[pane]
+        x, y = self.session.displayed.get_positions(its)[its.numbers.index(number)].tolist()
         return self.pixel((x, y), pane)
 
     def click_at(self, point: tuple[float, float], pane: int = 0, button: int = 1) -> None:
@@ -263,8 +263,8 @@ class Driver:
 
 def place(driver: Driver, number: int, pane: int = 0) -> np.ndarray:
     """Return where a robot is, (2,) m."""
-    its = driver.session.panes[pane]
-    return driver.session.positions(its)[its.numbers.index(number)]
+    its = driver.session.timeline.panes[pane]
+    return driver.session.displayed.get_positions(its)[its.numbers.index(number)]
 
 
 def resized(driver: Driver, size: tuple[int, int]) -> None:

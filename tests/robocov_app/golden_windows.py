@@ -64,11 +64,11 @@ def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> n
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import Launcher
-    from robocov_app.viewer.session.scenario import Scenario
+    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
 
     theme, play = SCENES[name]
-    session = Session(Scenario(load_map("rooms"), robots=4))
+    session = Session(SessionScenario(load_map("rooms"), robots=4))
     opening = Launcher(session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32)
     with opening.window() as window:
         spoil(window)

@@ -26,8 +26,8 @@ class Counting:
 
 def records_of(session: Session) -> list[Record]:
     """Return the records of the last part of a session's story, one for each pane."""
-    parts = parts_of(session.document, session.head, session.step_now)
-    return records_of_part(parts[-1], session.document.path(session.head)[0])
+    parts = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
+    return records_of_part(parts[-1], session.timeline.document.get_path(session.timeline.head)[0])
 
 
 def record_of(session: Session) -> Record:

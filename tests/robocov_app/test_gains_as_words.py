@@ -24,7 +24,7 @@ from robocov_app.sweep.gains import build_gains
 from robocov_app.sweep.sampling import Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
-from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.controller_choice import ControllerChoice
 
 STUDY = """
 maps = ["room.json"]
@@ -172,19 +172,19 @@ def test_laws_of_the_window_say_words() -> None:
         ControllerChoice("rapf"),
         ControllerChoice("rapf", {"target": "median", "attraction_limit": None}),
     )
-    assert after.words_since(before) == "attraction_limit = no limit, target = median"
-    assert after.words == "RAPF, target median, attraction_limit no limit"
+    assert after.describe_changes(before) == "attraction_limit = no limit, target = median"
+    assert after.description == "RAPF, target median, attraction_limit no limit"
     with pytest.raises(ParameterError, match="unknown choice 'mediam'"):
         before.with_gain("target", "mediam")
 
 
 def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
     with opened(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
-        target = lambda: driver.session.panes[0].law.value("target")  # noqa: E731
+        target = lambda: driver.session.timeline.panes[0].controller.get_value("target")  # noqa: E731
         chosen = lambda word: driver.widget("button", f"target:{word}").value  # noqa: E731
         assert target() == "centroid" and chosen("centroid")
         driver.push("target:median")
-        assert target() == "median" and driver.session.events[-1].text.endswith("target = median")
+        assert target() == "median" and driver.session.timeline.events[-1].text.endswith("target = median")
         assert chosen("median") and not chosen("centroid")
         driver.viewer.attempt(lambda: driver.window.commands.typed("target sens"))
         driver.settle()
@@ -208,5 +208,5 @@ def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:
     with opened(tmp_path, ControllerChoice(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
         for word in ("anticlockwise", "whichever is near", "clockwise"):
             driver.choose("way", word)
-            assert driver.session.panes[0].law.value("way") == word
+            assert driver.session.timeline.panes[0].controller.get_value("way") == word
             assert driver.widget("menu", "way").text == word

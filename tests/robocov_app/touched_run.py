@@ -9,7 +9,8 @@ import shapely
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 
 HALL = Environment(
@@ -24,37 +25,62 @@ RAPF, RPF, LLOYD = ControllerChoice("rapf"), ControllerChoice("rpf"), Controller
 
 def begun(*laws: ControllerChoice, robots: int = 3, environment: Environment = HALL, **changes) -> Session:
     """Return a session that is paused at its beginning."""
-    session = Session(Scenario(environment, laws or (RAPF,), robots, **changes))
-    session.playing = False
+    session = Session(SessionScenario(environment, laws or (RAPF,), robots, **changes))
+    session.playback.is_playing = False
     return session
 
 
 def stepped(session: Session, steps: int) -> Session:
     """Let a session make so many steps."""
     for _ in range(steps):
-        session.step()
+        session.playback.step()
     return session
 
 
 def robots_of(session: Session) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the numbers of the robots that work, and of those that failed."""
-    there = session.setup(session.panes[0])
+    there = session.displayed.get_setup(session.timeline.panes[0])
     return there.numbers, tuple(sorted(there.failed))
 
 
 def all_told(session: Session) -> list[object]:
     """Return whatever can be told of a session, so that it can be compared."""
-    told: list[object] = [session.scenario, session.hand, session.settled, session.playing, session.serial]
-    told += [session.time, session.end, session.live, session.history.steps[:], session.history.thinned]
-    told += [list(map(id, session.history.moments)), list(session.events), list(session.ghosts)]
-    told += [session.head.number, session.head.parent is not None, session.head.redo is not None]
-    for pane in session.panes:
+    told: list[object] = [
+        session.timeline.scenario,
+        session.timeline.drag,
+        session.timeline.is_settled,
+        session.playback.is_playing,
+        session.timeline.past_version,
+    ]
+    told += [
+        session.displayed.time,
+        session.timeline.end_time,
+        session.timeline.is_live,
+        session.timeline.history.steps[:],
+        session.timeline.history.thinned,
+    ]
+    told += [
+        list(map(id, session.timeline.history.states)),
+        list(session.timeline.events),
+        list(session.timeline.ghosts),
+    ]
+    told += [
+        session.timeline.head.number,
+        session.timeline.head.parent is not None,
+        session.timeline.head.redo is not None,
+    ]
+    for pane in session.timeline.panes:
         told += [pane.number, pane.setup, pane.time]
         told += [
             array.tobytes()
             for array in (
                 *(pane.simulation.positions, pane.simulation.velocities, pane.starts),
-                *(pane.trail.positions, pane.trail.time, pane.curve.time, pane.curve.value),
+                *(
+                    pane.trail.positions,
+                    pane.trail.times,
+                    pane.distance_curve.times,
+                    pane.distance_curve.values,
+                ),
                 *pane.sensed.until(np.inf),
             )
         ]
@@ -64,8 +90,8 @@ def all_told(session: Session) -> list[object]:
 def too_deep(session: Session) -> float:
     """Return by how many meters some robot is too near to a wall or an obstacle, inf inside of one."""
     deepest = -np.inf
-    for pane in session.panes:
-        free = pane.setup.solid.free
+    for pane in session.timeline.panes:
+        free = pane.setup.sensed_environment.free
         places = shapely.points(pane.simulation.positions)
         if not shapely.contains_properly(free, places).all():
             return np.inf
@@ -86,12 +112,12 @@ def viewer_of(*laws: ControllerChoice, folder: Path = Path(), **changes) -> Pres
 
 def positions_of(session) -> list[np.ndarray]:
     """Return where the robots of each pane are, (n, 2) m."""
-    return [session.positions(pane).copy() for pane in session.panes]
+    return [session.displayed.get_positions(pane).copy() for pane in session.timeline.panes]
 
 
 def with_curves(session, steps) -> None:
     """Make steps, with a cost at each, as the window notes it."""
     for _ in range(steps):
-        for pane in session.panes:
-            pane.curve.add(session.time, 3.0 - session.time)
-        session.step()
+        for pane in session.timeline.panes:
+            pane.distance_curve.add(session.displayed.time, 3.0 - session.displayed.time)
+        session.playback.step()

@@ -18,7 +18,9 @@ from robocov_app.toolkit.display import collect_garbage_rarely, open_display
 from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -95,9 +97,11 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
 
 
 def _build_session(robots: int) -> Session:
-    limits = TeamSpec(radius=_CROWD_RADIUS_M) if robots >= _MIN_CROWD else TeamSpec()
+    limits = RobotProperties(radius=_CROWD_RADIUS_M) if robots >= _MIN_CROWD else RobotProperties()
     start = "uniform" if robots > _MAX_FIRST_START else None
-    scenario = Scenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, start, limits=limits)
+    scenario = SessionScenario(
+        load_map("rooms"), (ControllerChoice("rapf"),), robots, start, properties=limits
+    )
     return Session(scenario)
 
 
@@ -107,7 +111,7 @@ def _use_window(window: Window, seconds: float) -> _Measurements:
     # The first frames prepare the cost of the map, and draw everything that is stored afterwards.
     for _ in range(FPS):
         window.frame(clock.tick(FPS) / 1000.0)
-    curve = window.viewer.pane.curve
+    curve = window.viewer.pane.distance_curve
     known_costs = len(curve)
     measured = _Measurements()
     start = perf_counter()

@@ -148,7 +148,7 @@ def _load_session(file: Path, controllers: tuple[str, ...]) -> tuple[Session, st
     from robocov_app.viewer.session.session import Session
 
     saved = load_session(file, controllers)
-    return Session.opened(saved), str(saved.view.get("map") or "")
+    return Session.open(saved), str(saved.view.get("map") or "")
 
 
 def build_session(options: Arguments) -> Session:
@@ -169,32 +169,34 @@ def build_session(options: Arguments) -> Session:
     """
     from robocov.mapfile import load_map
     from robocov.team_files import read_team
-    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
+    from robocov_app.viewer.session.controller_choice import ControllerChoice
+    from robocov_app.viewer.session.robot_properties import RobotProperties
+    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
 
     robots = options.robots
-    limits = TeamSpec(radius=options.radius)
+    limits = RobotProperties(radius=options.radius)
     if options.team is not None:
         team = read_team(options.team, {"radius": options.radius})
         robots = get_robot_count(team, robots, Arguments.robots, options.team)
-        limits = TeamSpec.of(team)
+        limits = RobotProperties.from_team(team)
     first_name, *other_names = options.controllers
     choices = [ControllerChoice(first_name, parse_gains(options.gains))]
     choices += [ControllerChoice(name) for name in other_names]
     conditions = options.conditions.build_conditions(options.seed, robots)
-    scenario = Scenario(
+    scenario = SessionScenario(
         load_map(options.map),
         tuple(choices),
         robots,
         options.start,
         options.seed,
-        limits=limits,
+        properties=limits,
         dt=options.dt,
         conditions=conditions,
     )
     session = Session(scenario)
-    session.clock.speed = options.speed
-    session.playing = not options.paused
+    session.playback.clock.speed = options.speed
+    session.playback.is_playing = not options.paused
     return session
 
 

@@ -101,17 +101,17 @@ def _replay_session(path: Path, options: Arguments) -> int:
 
     if options.is_headless:
         raise ParameterError(f"{path}: run `robocov run {path} --video` for the video of a session")
-    session = Session.opened(load_session(path, options.controller))
-    session.recorded_until = session.end
-    session.look_at(0.0)
-    session.playing = True
+    session = Session.open(load_session(path, options.controller))
+    session.timeline.record_end_time = session.timeline.end_time
+    session.show_time(0.0)
+    session.playback.is_playing = True
     return _open_window(options, session, path)
 
 
 def _build_session(options: Arguments, saved_runs: Sequence[SavedRun]) -> Session:
     """Build the session whose past is a saved run or comparison."""
     from robocov.controllers import load_controller_class
-    from robocov_app.viewer.session.recorded import replayed_session
+    from robocov_app.viewer.session.recorded import build_replay_session
 
     names = [saved.record.controller for saved in saved_runs]
     class_names = [name.rpartition(":")[2] for name in names]
@@ -121,7 +121,7 @@ def _build_session(options: Arguments, saved_runs: Sequence[SavedRun]) -> Sessio
             expected = f"expected the controller of a run ({summarize_names(names)})"
             raise ParameterError(f"--controller: {expected}, got {controller}")
     try:
-        return replayed_session(saved_runs, options.controller)
+        return build_replay_session(saved_runs, options.controller)
     except InputError as error:
         message = str(error)
         if str(options.run) not in message:
@@ -158,9 +158,9 @@ def _find_map_name(session: Session) -> str:
     from robocov.mapfile import list_bundled_maps, load_map
 
     for name in list_bundled_maps():
-        if load_map(name) == session.environment:
+        if load_map(name) == session.displayed.environment:
             return name
-    return session.environment.name
+    return session.displayed.environment.name
 
 
 def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:

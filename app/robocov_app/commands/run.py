@@ -17,8 +17,8 @@ from robocov_app.terminal.output import echo, list_files, print_answer
 
 if TYPE_CHECKING:
     from robocov_app.runs.execution import Run
+    from robocov_app.viewer.session.document import Node
     from robocov_app.viewer.session.file import SavedSession
-    from robocov_app.viewer.session.undo_tree import Node
 
 _SESSION_SUFFIX = ".robocov"
 
@@ -151,11 +151,11 @@ def _select_branches(session: SavedSession, options: Arguments) -> list[tuple[No
     """Return the last node and step of each selected branch, and the suffix of its folder."""
     document = session.document
     if options.branch is not None:
-        branch = document.branch(options.branch)
-        return [(branch.node, branch.end, "")]
+        branch = document.find_branch(options.branch)
+        return [(branch.node, branch.last_step, "")]
     if options.all_branches:
         return [
-            (branch.node, branch.end, f"-{number}")
-            for number, branch in enumerate(document.branches(), start=1)
+            (branch.node, branch.last_step, f"-{number}")
+            for number, branch in enumerate(document.list_branches(), start=1)
         ]
     return [(session.head, session.step, "")]

@@ -48,7 +48,7 @@ class ViewerCanvas:
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         self.layout, self.theme = layout, theme
-        self._environment, self._painters = self.viewer.session.environment, []
+        self._environment, self._painters = self.viewer.session.displayed.environment, []
         for _, _, width, height in layout.panes:
             layers = standard_layers()
             if len(layout.panes) > 1:  # they share the time, which stands in the window's own status line
@@ -67,14 +67,16 @@ class ViewerCanvas:
     def zoom(self, factor: float, at: tuple[float, float]) -> None:
         pane = self.pane_at(at) or 0
         (left, top, _, _), camera = self.layout.panes[pane], self._painters[pane].camera
-        whole = np.ptp(np.reshape(self.viewer.session.environment.region.bounds, (2, 2)), axis=0).max()
+        whole = np.ptp(
+            np.reshape(self.viewer.session.displayed.environment.region.bounds, (2, 2)), axis=0
+        ).max()
         # neither a dot nor a single wall's paint
         factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
         self._look(camera.zoomed(factor, (at[0] - left, at[1] - top)))
 
     def pan(self, dx: float, dy: float) -> None:
         camera = self._painters[0].camera.panned(dx, dy)
-        bounds = np.reshape(self.viewer.session.environment.region.bounds, (2, 2))
+        bounds = np.reshape(self.viewer.session.displayed.environment.region.bounds, (2, 2))
         x, y = np.clip(camera.center, *bounds).tolist()
         self._look(replace(camera, center=(x, y)))
 
@@ -114,14 +116,16 @@ class ViewerCanvas:
 
     def draw(self, screen: pygame.Surface) -> None:
         session = self.viewer.session
-        if session.environment is not self._environment:
-            before, self._environment = self._environment, session.environment
+        if session.displayed.environment is not self._environment:
+            before, self._environment = self._environment, session.displayed.environment
             for painter in self._painters:
-                painter.environment = session.environment
-            if before is not None and before.region.bounds != session.environment.region.bounds:
+                painter.environment = session.displayed.environment
+            if before is not None and before.region.bounds != session.displayed.environment.region.bounds:
                 self.fit()
         self._scenes = []
-        for pane, painter, box in zip(session.panes, self._painters, self.layout.panes, strict=False):
+        for pane, painter, box in zip(
+            session.timeline.panes, self._painters, self.layout.panes, strict=False
+        ):
             painter.visible = self.viewer.shown | ({"caption"} & {layer.name for layer in painter.layers})
             scene, surface = self._scene(pane, painter), screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
@@ -131,7 +135,7 @@ class ViewerCanvas:
 
     def _scene(self, pane: Pane, painter: Painter) -> Scene:
         viewer, session = self.viewer, self.viewer.session
-        setup, snapshot = session.setup(pane), session.snapshot(pane)
+        setup, snapshot = session.displayed.get_setup(pane), session.displayed.get_snapshot(pane)
         known, field = viewer.costs.known.get(pane.number), None
         if known is not None and painter.needs_field:
             field, largest = known.field, known.field.largest
@@ -153,16 +157,16 @@ class ViewerCanvas:
         look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
         look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
         fade = FADE if viewer.fade else None
-        return pane.scene(setup, snapshot, session.trail(pane), trail_fade=fade, **look)
+        return pane.build_scene(setup, snapshot, session.displayed.get_trail(pane), trail_fade=fade, **look)
 
     def _caption_cost(self, pane: Pane) -> str:
         session = self.viewer.session
-        (time, distances), (_, times) = session.compared(), session.compared("time")
+        (time, distances), (_, times) = session.displayed.get_costs(), session.displayed.get_costs("time")
         if pane.number not in distances:
             return ""
-        what = mean_label(session.setup(pane).environment)
+        what = mean_label(session.displayed.get_setup(pane).environment)
         words = cost_label(what, distances[pane.number], times.get(pane.number))
-        return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
+        return f"{words} at {time:.1f} s" if session.displayed.time - time > _OLD else words
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
         camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))
@@ -172,7 +176,7 @@ class ViewerCanvas:
         canvas, ink = self._canvas(surface, pane, scene), self.theme.ink
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
         numbers, positions = list(scene.numbers or ()), scene.now.positions
-        if (hand := self.viewer.session.hand) is not None and hand[0] in numbers:
+        if (hand := self.viewer.session.timeline.drag) is not None and hand[0] in numbers:
             place, target = positions[numbers.index(hand[0])], hand[1]
             begin, end = canvas.camera.to_pixels(np.array([place, target])).tolist()
             canvas.dashes(begin, end, ink, canvas.width(1.5), dash=3.0)
@@ -228,7 +232,7 @@ class ViewerCanvas:
             pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
             if pane == self.viewer.active:
                 bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * scale))))
-                screen.fill(theme.controller(self.viewer.session.panes[pane].law.name), bar)
+                screen.fill(theme.controller(self.viewer.session.timeline.panes[pane].controller.name), bar)
         (x, y, wide, high), entries = self.layout.legend, self._legend_entries()
         key = tuple(entry.key() for entry in entries), wide, theme.name, scale
         if self._strip is None or self._strip[0] != key:

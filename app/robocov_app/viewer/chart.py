@@ -18,7 +18,7 @@ from robocov_app.render.theme import Color, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.curves import DISTANCE, TIME, Plotted
+from robocov_app.viewer.session.curves import DISTANCE, TIME, PlottedQuantity
 from robocov_app.viewer.session.pane import Pane
 
 LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
@@ -75,12 +75,12 @@ class Chart:
         self.layout, self.theme, self._page = layout, theme, None
 
     @property
-    def plotted(self) -> Plotted:
+    def plotted(self) -> PlottedQuantity:
         return self._wanted if self._timed else DISTANCE
 
     @property
     def _timed(self) -> bool:
-        return any(len(pane.curves["time"]) for pane in self.viewer.session.panes)
+        return any(len(pane.curves["time"]) for pane in self.viewer.session.timeline.panes)
 
     def switch(self) -> str:
         if not self._timed:
@@ -101,17 +101,27 @@ class Chart:
     def _span(self) -> tuple[float, float, float]:
         """Left and right of the axis in pixels of the window, and the time at its end."""
         left, _, width, _ = self.layout.chart
-        scale, panes, beside = self.layout.scale, self.viewer.session.panes, RIGHT * self.layout.scale
+        scale, panes, beside = (
+            self.layout.scale,
+            self.viewer.session.timeline.panes,
+            RIGHT * self.layout.scale,
+        )
         if len(panes) > 1:  # their names stand there, too
             size = round(self.theme.small_text * scale)
-            names = (text_width(f"{pane.law.label}  8.888  +88.8 %", size, True) for pane in panes)
+            names = (text_width(f"{pane.controller.label}  8.888  +88.8 %", size, True) for pane in panes)
             beside = min(max(names) + 20 * scale, 0.4 * width)
-        ghosts = max((float(ghost.time[-1]) for ghost in self.viewer.session.ghosts), default=0.0)
-        return left + LEFT * scale, left + width - beside, time_axis(max(self.viewer.session.end, ghosts))
+        ghosts = max((float(ghost.times[-1]) for ghost in self.viewer.session.timeline.ghosts), default=0.0)
+        return (
+            left + LEFT * scale,
+            left + width - beside,
+            time_axis(max(self.viewer.session.timeline.end_time, ghosts)),
+        )
 
     def time_at(self, x: float) -> float:
         left, right, end = self._span
-        return float(np.clip((x - left) / max(right - left, 1.0) * end, 0.0, self.viewer.session.end))
+        return float(
+            np.clip((x - left) / max(right - left, 1.0) * end, 0.0, self.viewer.session.timeline.end_time)
+        )
 
     def column(self, time: Any) -> Any:
         left, right, end = self._span
@@ -119,11 +129,16 @@ class Chart:
 
     def draw(self, screen: pygame.Surface) -> None:
         session, layout = self.viewer.session, self.layout
-        curves = [pane.curves[self.plotted.name] for pane in session.panes]
-        samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
-        panes = tuple(pane.number for pane in session.panes)
-        told = panes, len(session.events), len(session.ghosts), self._span, self.plotted
-        rest = *told, self.viewer.costs.state, None if session.live else session.time, session.serial
+        curves = [pane.curves[self.plotted.name] for pane in session.timeline.panes]
+        samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in curves]
+        panes = tuple(pane.number for pane in session.timeline.panes)
+        told = panes, len(session.timeline.events), len(session.timeline.ghosts), self._span, self.plotted
+        rest = (
+            *told,
+            self.viewer.costs.state,
+            None if session.timeline.is_live else session.displayed.time,
+            session.timeline.past_version,
+        )
         # curves grow sixty times a second, which nobody sees
         old = self.viewer.now - self._drawn_at >= REFRESHED
         if self._page is None or rest != self._key or (old and samples != self._samples):
@@ -143,7 +158,7 @@ class Chart:
         left, right, end = self._span
         height = self.layout.chart[3]
         top, bottom = TOP * scale, height - BOTTOM * scale
-        weighed = ", weighed by φ" if density_label(session.environment) else ""
+        weighed = ", weighed by φ" if density_label(session.displayed.environment) else ""
         title = f"{what.title}{weighed}, {what.unit}"
         canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
         named = 12 * scale + canvas.text_width(title, bold=True)
@@ -151,8 +166,10 @@ class Chart:
         state = self.viewer.costs.state
         if state and right - canvas.text_width(state) > named:
             canvas.text(state, (right, 0.5 * TOP * scale), color=theme.faint, anchor="right")
-        ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
-        values = [pane.curves[what.name].value for pane in session.panes] + [ghost.value for ghost in ghosts]
+        ghosts = [ghost for ghost in session.timeline.ghosts if ghost.quantity == what.name]
+        values = [pane.curves[what.name].values for pane in session.timeline.panes] + [
+            ghost.values for ghost in ghosts
+        ]
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
         low, high, step = value_axis(float(some.min()), float(some.max()))
 
@@ -170,10 +187,10 @@ class Chart:
         seconds *= math.ceil((canvas.text_width(f"{end:.0f} s", theme.small_text) + 4 * scale) / room)
         for mark in np.arange(0.0, end + 1e-9, seconds):
             note(f"{mark:g} s", (self.column(mark), height - 0.5 * BOTTOM * scale), anchor="middle")
-        for event in session.events:
+        for event in session.timeline.events:
             self._rule(canvas.surface, self.column(event.time), mix(theme.panel, theme.ink, 0.3), 0)
         free = left
-        for event in session.events:  # in words where there is room
+        for event in session.timeline.events:  # in words where there is room
             x, glyph = self.column(event.time), _GLYPHS.get(event.kind, "•")
             words = f"{glyph} {event.text}"
             wide = canvas.text_width(words, theme.small_text)
@@ -182,19 +199,21 @@ class Chart:
             if x >= free:
                 note(words, (x + 3 * scale, top + 6 * scale))
                 free = x + wide + 8 * scale
-        self._ghosts = [(ghost.node, place(ghost.time, ghost.value)) for ghost in ghosts]
+        self._ghosts = [(ghost.node, place(ghost.times, ghost.values)) for ghost in ghosts]
         for ghost, (_, points) in zip(ghosts, self._ghosts, strict=True):
-            color = mix(theme.panel, theme.controller(ghost.law), 0.45)
+            color = mix(theme.panel, theme.controller(ghost.controller), 0.45)
             for k in range(len(points) - 1):
                 if k % 4 < 3 or len(points) < 12:
                     canvas.line(points[k].tolist(), points[k + 1].tolist(), color)
             if len(points):
-                x = max(points[-1][0] - 4 * scale, left + canvas.text_width(ghost.words, theme.small_text))
-                note(ghost.words, (x, points[-1][1] - 9 * scale), anchor="right", color=color)
-        colors = curve_colors(session.panes, theme)
-        for pane in session.panes:
+                x = max(
+                    points[-1][0] - 4 * scale, left + canvas.text_width(ghost.description, theme.small_text)
+                )
+                note(ghost.description, (x, points[-1][1] - 9 * scale), anchor="right", color=color)
+        colors = curve_colors(session.timeline.panes, theme)
+        for pane in session.timeline.panes:
             curve = pane.curves[what.name]
-            points = _thinned(place(curve.time, curve.value))
+            points = _thinned(place(curve.times, curve.values))
             if len(points) > 1:
                 canvas.segments(np.hstack([points[:-1], points[1:]]), colors[pane.number], canvas.width(1.8))
 
@@ -203,7 +222,7 @@ class Chart:
         scale, size, self._other = self.layout.scale, self.theme.small_text, None
         if not self._timed:
             return
-        words, left = f"{(DISTANCE if self.plotted is TIME else TIME).short} ›", left + 16 * scale
+        words, left = f"{(DISTANCE if self.plotted is TIME else TIME).short_title} ›", left + 16 * scale
         canvas.text(words, (left, 0.5 * TOP * scale), color=self.theme.faint, size=size)
         (x, y, _, _), wide = self.layout.chart, canvas.text_width(words, size)
         self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
@@ -213,10 +232,10 @@ class Chart:
         session, theme, scale = self.viewer.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
         canvas = flat_canvas(chart, theme, scale)
-        (_, right, _), colors = self._span, curve_colors(session.panes, theme)
-        time, known = session.compared(self.plotted.name)
+        (_, right, _), colors = self._span, curve_colors(session.timeline.panes, theme)
+        time, known = session.displayed.get_costs(self.plotted.name)
         best = min(known.values(), default=0.0)
-        panes = [pane for pane in session.panes if pane.number in known]
+        panes = [pane for pane in session.timeline.panes if pane.number in known]
         panes.sort(key=lambda pane: -known[pane.number])
         values = np.array([known[pane.number] for pane in panes])
         wanted = self._place(np.full(len(panes), time), values)[:, 1]
@@ -228,7 +247,7 @@ class Chart:
                 gap = f"  +{more:.{1 if more < 99.95 else 0}f} %" if value > best else "  best"
                 room = chart.get_width() - right - 15 * scale
                 room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
-                name = shortened(pane.law.label, canvas.text_size(theme.small_text), room, True)
+                name = shortened(pane.controller.label, canvas.text_size(theme.small_text), room, True)
                 words = f"{name}  {words}{gap}"
             at, color = (right + 9 * scale, y), colors[pane.number]
             canvas.text(words, at, color=color, bold=True, size=theme.small_text)
@@ -243,8 +262,12 @@ class Chart:
         box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
         pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
         canvas.text("time", (12 * scale, middle), color=theme.faint, size=theme.small_text)
-        words, color = ("live", theme.start) if session.live else ("past", theme.final)
-        beside, size, thinned = right + 9 * scale, theme.small_text, session.live and session.history.thinned
+        words, color = ("live", theme.start) if session.timeline.is_live else ("past", theme.final)
+        beside, size, thinned = (
+            right + 9 * scale,
+            theme.small_text,
+            session.timeline.is_live and session.timeline.history.thinned,
+        )
         if thinned:
             words = "live · past thinned"
             fits = beside + canvas.text_width(words, size=size) <= self.layout.track[2]
@@ -259,18 +282,18 @@ class Chart:
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         canvas = flat_canvas(screen, theme, scale)
         middle, thick = self.layout.track[1] + 0.5 * self.layout.track[3], max(4, round(5 * scale))
-        x, begin = self.column(session.time), round(self.column(0.0))
-        bars = [(self.column(session.end), mix(theme.panel, theme.ink, 0.4))]
-        if not session.live:
+        x, begin = self.column(session.displayed.time), round(self.column(0.0))
+        bars = [(self.column(session.timeline.end_time), mix(theme.panel, theme.ink, 0.4))]
+        if not session.timeline.is_live:
             bars.append((x, theme.final))
             self._rule(screen, x, theme.final, self.layout.chart[1])
         for end, color in bars:
             bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
             pygame.draw.rect(screen, color, bar, border_radius=thick)
         dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
-        for event in session.events:
+        for event in session.timeline.events:
             canvas.stamp(dot, (self.column(event.time), middle))
-        fill, radius = theme.ink if session.live else theme.final, round(2 * 6.5 * scale) / 2
+        fill, radius = theme.ink if session.timeline.is_live else theme.final, round(2 * 6.5 * scale) / 2
         handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
         canvas.stamp(handle, (x, middle))
 
@@ -280,12 +303,17 @@ class Chart:
         if over is None or not left <= over[0] <= right or not any(inside(box, over) for box in boxes):
             return
         time = self.time_at(over[0])
-        near = [event for event in session.events if abs(self.column(event.time) - over[0]) < 5 * scale]
+        near = [
+            event for event in session.timeline.events if abs(self.column(event.time) - over[0]) < 5 * scale
+        ]
         if near:
             words = "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
         else:
             what = self.plotted
-            values = [(pane.law.label, pane.curves[what.name].at(time)) for pane in session.panes]
+            values = [
+                (pane.controller.label, pane.curves[what.name].interpolate(time))
+                for pane in session.timeline.panes
+            ]
             known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
             words = "   ".join([f"{time:.1f} s", *known])
         x = round(self.column(time))
@@ -299,7 +327,7 @@ def curve_colors(panes: Iterable[Pane], theme: Theme) -> dict[int, Color]:
     """Return the colors of curves by pane: the controller's, or another one where that is taken."""
     taken: dict[int, Color] = {}
     for pane in panes:
-        wanted = [theme.controllers.get(pane.law.name), *theme.others]
+        wanted = [theme.controllers.get(pane.controller.name), *theme.others]
         taken[pane.number] = next(each for each in wanted if each and each not in taken.values())
     return taken
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from robocov.errors import ParameterError
 from robocov_app.toolkit.command import Command, Takes
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.clock import SPEEDS, speed_words
+from robocov_app.viewer.session.clock import SPEEDS, format_speed
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.tools import Tool
 
@@ -54,23 +54,23 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
         return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
 
     def branches() -> list[str]:
-        return [str(k + 1) for k in range(len(viewer.session.document.branches()))]
+        return [str(k + 1) for k in range(len(viewer.session.timeline.document.list_branches()))]
 
     def next_seed() -> None:
-        viewer.restart(seed=viewer.session.scenario.seed + 1)
+        viewer.restart(seed=viewer.session.timeline.scenario.seed + 1)
 
     def look_on(seconds: float) -> None:
-        viewer.look_at(viewer.session.time + seconds)
+        viewer.look_at(viewer.session.displayed.time + seconds)
 
     def more(robots: int) -> None:
         viewer.restart(robots=len(viewer.numbers) + robots)
 
     def enter(branch: str) -> None:
-        viewer.session.enter(viewer.session.document.branch(branch).node)
+        viewer.session.seek(viewer.session.timeline.document.find_branch(branch).node)
 
     start, law = Takes("start", options=viewer.starts), Takes("controller", options=lambda: viewer.laws)
     target = Takes("file", lambda text: Path(text) if text else None)
-    ask_next, speeds = viewer.ask_next, [speed_words(each).rstrip("×") for each in SPEEDS]
+    ask_next, speeds = viewer.ask_next, [format_speed(each).rstrip("×") for each in SPEEDS]
 
     def tool_row(tool: Tool) -> Row:
         run = partial(viewer.take_tool, tool.name)
@@ -86,7 +86,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     groups: dict[str, Iterable[Row]] = {
         "Run": [
             Row("pause", "Play or pause", viewer.pause, "space"),
-            Row("step", "Single step", lambda: viewer.session.step(), ".", REPEATS),
+            Row("step", "Single step", lambda: viewer.session.playback.step(), ".", REPEATS),
             Row("restart", "Restart", viewer.restart, "r"),
             Row("settle", "Play until settled, then stop", viewer.settle, "s"),
             Row("slower", "Slower", lambda: viewer.change_speed(-1), "-", REPEATS),
@@ -109,7 +109,12 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("back:second", "Back by a second", lambda: look_on(-1.0), "shift+left", REPEATS),
             Row("forward:second", "On by a second", lambda: look_on(1.0), "shift+right", REPEATS),
             Row("first", "To the beginning", lambda: viewer.look_at(0.0), "home"),
-            Row("live", "To the present", lambda: viewer.session.look_at(viewer.session.end), "end"),
+            Row(
+                "live",
+                "To the present",
+                lambda: viewer.session.show_time(viewer.session.timeline.end_time),
+                "end",
+            ),
             Row("branch:here", "Go on from the moment shown", viewer.branch, "b"),
             Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
             Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),

@@ -50,13 +50,18 @@ class Report:
 
 def report_on(viewer: Presenter, number: int) -> Report:
     session, pane = viewer.session, viewer.pane
-    setup = session.setup(pane)
+    setup = session.displayed.get_setup(pane)
     if number in setup.failed:
         x, y = setup.failed[number]
         verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
         return Report(f"Robot {number}", verdict, ())
-    robot = session.snapshot(pane), setup.team, setup.solid, setup.numbers.index(number)
-    return explain(*robot, names=setup.numbers, recent=session.recent(pane, number))
+    robot = (
+        session.displayed.get_snapshot(pane),
+        setup.team,
+        setup.sensed_environment,
+        setup.numbers.index(number),
+    )
+    return explain(*robot, names=setup.numbers, recent=session.displayed.get_recent_positions(pane, number))
 
 
 def explain(

@@ -36,11 +36,11 @@ from robocov_app.runs.video import VIDEO_HOLD_S, get_video_name, write_frames_an
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.session.changes import Place
-from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.moments import PaneSetup
+from robocov_app.viewer.session.document import Node, SessionDocument, replay
+from robocov_app.viewer.session.edits import PlaceRobot
+from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.undo_tree import Document, Node, replayed
+from robocov_app.viewer.session.states import PaneSetup
 
 History: TypeAlias = tuple[float, str, CostHistory]  # when a part began, s, a controller's name, its cost
 
@@ -64,9 +64,9 @@ class Part:
     ends: int = 0
 
 
-def parts_of(document: Document, node: Node, end: int) -> list[Part]:
+def parts_of(document: SessionDocument, node: Node, end: int) -> list[Part]:
     parts: list[Part] = []
-    for run, here in replayed(document, node, end):
+    for run, here in replay(document, node, end):
         setups = {pane.number: pane.setup for pane in run.panes}
         if not parts or parts[-1].setups != setups:
             if parts and parts[-1].node is here and here.scenario is None:
@@ -78,8 +78,8 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
         part.ends = run.step
         for pane in run.panes:
             part.recorders[pane.number].add(pane.simulation.observe_and_decide())
-        held = {run.hand[0]} if run.hand is not None else set()
-        moved = {each.robot for each in here.changes if each.step == run.step and isinstance(each, Place)}
+        held = {run.drag[0]} if run.drag is not None else set()
+        moved = {each.robot for each in here.edits if each.step == run.step and isinstance(each, PlaceRobot)}
         part.placed += [(run.step, robot) for robot in sorted(moved)]
         held |= moved
         for robot in held:
@@ -94,10 +94,10 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
 
 def records_of_part(part: Part, root: Node) -> list[Record]:
     """Return the records of a part, one for each pane, of a branch that began at a node; time begins at 0."""
-    scenario, found = root.begun, []
+    scenario, found = root.require_scenario(), []
     for number, recorder in part.recorders.items():
         record, origin = recorder.record(), dict[str, Any]()
-        if part.begin == 0 and part.node is root and scenario.given is None:
+        if part.begin == 0 and part.node is root and scenario.given_starts is None:
             origin = {"start": scenario.start_name, "seed": scenario.seed}
         session = _session_of(part, part.setups[number], record, scenario.dt)
         time = np.arange(len(record), dtype=float) * scenario.dt
@@ -106,11 +106,11 @@ def records_of_part(part: Part, root: Node) -> list[Record]:
 
 
 def _recorder(setup: PaneSetup, dt: float) -> Recorder:
-    environment, law = setup.environment, setup.law
+    environment, law = setup.environment, setup.controller
     for number, place in setup.failed.items():
-        wreck = CircleObstacle(place, setup.limits.radius_of(number), name_failed_robot(number))
-        environment = with_obstacle(environment, wreck)
-    return Recorder(environment, setup.team, law.made(), dt, name=law.name, conditions=setup.conditions)
+        wreck = CircleObstacle(place, setup.properties.get_radius(number), name_failed_robot(number))
+        environment = add_obstacle(environment, wreck)
+    return Recorder(environment, setup.team, law.build(), dt, name=law.name, conditions=setup.conditions)
 
 
 def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
@@ -128,7 +128,7 @@ def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict
         said.setdefault("touched", []).append({**times, "robots": [robot]})
     for step, robot in part.placed:
         said.setdefault("placed", []).append({"time_s": (step - part.begin) * dt, "robots": [robot]})
-    known = part.begin == 0 or not has_memory(setup.law.made())
+    known = part.begin == 0 or not has_memory(setup.controller.build())
     turned = record.steering is not None and bool(record.steering[0].any())
     repeatable = known and not part.touched and not turned
     return {**said, "repeatable": repeatable} if said or not repeatable else {}
@@ -149,18 +149,18 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
 
 
 def save_story(
-    document: Document,
+    document: SessionDocument,
     node: Node,
     end: int,
     result: ResultFolder,
     settings: OutputSettings,
     stop: Interruption,
 ) -> dict[str, Any]:
-    root = document.path(node)[0]
-    parts, dt, told, rows = parts_of(document, node, end), root.begun.dt, [], []
+    root = document.get_path(node)[0]
+    parts, dt, told, rows = parts_of(document, node, end), root.require_scenario().dt, [], []
     several, histories = len(parts) > 1, list[History]()
     for k, part in enumerate(parts, 1):
-        folder = f"{k:02d}-{_file_name(part.node.words)}" if several else ""
+        folder = f"{k:02d}-{_file_name(part.node.description)}" if several else ""
         records = records_of_part(part, root)
         names = name_folders([record.controller for record in records])
         runs: dict[str, Run] = {}
@@ -185,7 +185,7 @@ def save_story(
         else:
             save_figures([runs[names[0]]], costs[0], result.staging / folder, settings)
         times = {"from_s": part.begin * dt, "to_s": part.ends * dt}
-        told.append({"folder": folder, **times, "words": part.node.words})
+        told.append({"folder": folder, **times, "words": part.node.description})
         result.save_progress()
     if several:
         write_json(result.staging / STORY, {"format": "robocov-story", "version": 1, "parts": told})
@@ -204,15 +204,20 @@ def save_story(
 
 
 def story_frames(
-    document: Document, node: Node, end: int, parts: list[Part], histories: list[History], film: VideoSettings
+    document: SessionDocument,
+    node: Node,
+    end: int,
+    parts: list[Part],
+    histories: list[History],
+    film: VideoSettings,
 ) -> Iterator[Frame]:
     """Draw a branch from its beginning: trajectories go on through all touches, each named below at its time.
 
     All panes have the same layout and one legend, of whatever the story shows, also where some are left out.
     """
     theme, painters = film.color_theme, dict[int, Painter]()
-    widest, root = max(parts, key=lambda part: len(part.setups)), document.path(node)[0]
-    count, dt = len(widest.setups), root.begun.dt
+    widest, root = max(parts, key=lambda part: len(part.setups)), document.get_path(node)[0]
+    count, dt = len(widest.setups), root.require_scenario().dt
     layers = partial(standard_layers if count == 1 else pane_layers, film.colors)
     width, height = film.video_size
     strip, layout = round(STRIP * scale_for((width, height))), None
@@ -222,11 +227,11 @@ def story_frames(
             records_of_part(widest, root), film, (width, height - strip), legend_scenes=scenes
         )
     due = 0.0
-    for run, here in replayed(document, node, end):
+    for run, here in replay(document, node, end):
         if run.time + 1e-9 < due and not (here is node and run.step >= end):
             continue
         due += film.speed / film.fps
-        panes, names = [], name_folders([pane.law.name for pane in run.panes])
+        panes, names = [], name_folders([pane.controller.name for pane in run.panes])
         for pane, name in zip(run.panes, names, strict=True):
             environment, painter = run.scenario.environment, painters.get(pane.number)
             if painter is None or painter.environment.boundary != environment.boundary:
@@ -235,7 +240,7 @@ def story_frames(
                 painter.change(film.shown_layers, film.hidden_layers)
             painter.environment = environment
             panes.append(painter.frame(_scene(pane, histories, name)))
-        words = "" if here.scenario is not None else f"{here.at * dt:.1f} s   {here.words}"
+        words = "" if here.scenario is not None else f"{here.branch_step * dt:.1f} s   {here.description}"
         page = panes[0] if layout is None else layout.compose_page(panes, theme)
         frame = np.concatenate([page, _caption(words, (width, strip), theme)])
         yield frame
@@ -257,7 +262,7 @@ def _scene(pane: Pane, histories: list[History], name: str) -> Scene:
         known += history.mean_distance[begin + history.time <= pane.time + 1e-9].tolist()
     cost = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
     snapshot = pane.simulation.observe_and_decide()
-    return pane.scene(pane.setup, snapshot, pane.trail.until(pane.time), cost=cost)
+    return pane.build_scene(pane.setup, snapshot, pane.trail.get_until(pane.time), cost=cost)
 
 
 def _file_name(words: str) -> str:

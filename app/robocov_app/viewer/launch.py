@@ -23,9 +23,9 @@ from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.clock import FRAME_BUDGET
+from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import recoverable
+from robocov_app.viewer.session.workspace import find_recoverable_drafts
 from robocov_app.viewer.window import Window
 
 NO_DISPLAY = (
@@ -81,7 +81,7 @@ class Launcher:
                 settings, trouble = load_settings(Settings, file)
                 window = self._opened(settings)
                 window.viewer.say(trouble)
-                if found := recoverable(self._drafts):
+                if found := find_recoverable_drafts(self._drafts):
                     window.offer_recovery(found)
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
@@ -123,7 +123,7 @@ class Launcher:
         if self.size is None and not self._alone:
             size = fit_to_screen(size)
         if not self.headless:
-            self.session.clock.budget = FRAME_BUDGET
+            self.session.playback.clock.budget = FRAME_BUDGET_S
         costs = Costs(self.lattice, direct=self.headless)
         try:
             viewer = Presenter(

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from robocov.errors import MapError, Mistake
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.file import ChapterModel, ConditionModel, SavedSession, load_session
+from robocov_app.viewer.session.file import SavedSession, load_session
+from robocov_app.viewer.session.file_models import ChapterModel, ConditionModel
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import Workspace
+from robocov_app.viewer.session.workspace import SessionWorkspace
 
 FIRST = Path(__file__).with_name("assets") / "lesson-1.robocov"  # the lesson that comes with robocov
 READING = 4.0  # seconds on the wall after a chapter's end, and for an answer where nobody answers
@@ -28,13 +29,13 @@ def load_lesson(path: Path = FIRST) -> SavedSession:
 
 
 def holds(condition: ConditionModel, session: Session) -> bool:
-    pane = session.panes[0]
-    reached = condition.step is not None and session.step_now >= condition.step
-    if reached or (condition.settled and session.settled):
+    pane = session.timeline.panes[0]
+    reached = condition.step is not None and session.timeline.step >= condition.step
+    if reached or (condition.settled and session.timeline.is_settled):
         return True
-    if condition.mean_distance_below is not None and len(pane.curve):
-        return bool(pane.curve.value[-1] < condition.mean_distance_below)
-    if condition.robot is None or (row := pane.row(condition.robot)) is None:
+    if condition.mean_distance_below is not None and len(pane.distance_curve):
+        return bool(pane.distance_curve.values[-1] < condition.mean_distance_below)
+    if condition.robot is None or (row := pane.get_row(condition.robot)) is None:
         return False
     place, inside, outside = pane.simulation.positions[row], condition.inside, condition.outside
 
@@ -55,8 +56,8 @@ class LessonPlayer:
         self.alone = alone  # nobody is there to answer or to do tasks, as in a film
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
         self._asked_before, self.session = viewer.hand.selected, _begun(saved)
-        self.session.clock.budget = viewer.session.clock.budget
-        self._workspace = Workspace(self.session, None)
+        self.session.playback.clock.budget = viewer.session.playback.clock.budget
+        self._workspace = SessionWorkspace(self.session, None)
         self.state = "plays"  # or asks, task, ended, left
         self.answer: int | None = None  # from 1
         self.done = self.held = False
@@ -89,7 +90,7 @@ class LessonPlayer:
     @property
     def progress(self) -> float:
         end = self.chapter.until.step
-        part = min(self.session.step_now / end, 1.0) if end else 0.5
+        part = min(self.session.timeline.step / end, 1.0) if end else 0.5
         return (self.number + (1.0 if self.state == "ended" else part)) / len(self.lesson.chapters)
 
     def advance(self, seconds: float) -> None:
@@ -104,7 +105,7 @@ class LessonPlayer:
         elif self.state == "plays" and holds(chapter.until, session):
             tries = chapter.task is not None and not self.alone
             self._turn("task" if tries else "ended")
-            session.playing = session.playing and tries
+            session.playback.is_playing = session.playback.is_playing and tries
         elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
             self._turn("ended")
         elif self.state == "ended" and self._waited >= reading and not self.held:
@@ -115,7 +116,7 @@ class LessonPlayer:
         if self.state == "asks" and question is not None and 1 <= answer <= len(question.answers):
             self.answer = answer
             self._turn("plays")
-            self.session.playing = True
+            self.session.playback.is_playing = True
 
     def skip(self, by: int) -> None:
         if self.number + by >= len(self.lesson.chapters):
@@ -140,7 +141,7 @@ class LessonPlayer:
 
     def hold(self) -> str:
         """Let a chapter that has ended stay, or let the next one come; return words for it."""
-        self.held, self.session.playing = not self.held, False
+        self.held, self.session.playback.is_playing = not self.held, False
         return "this chapter stays until Space or →" if self.held else "on to the next chapter"
 
     def _turn(self, state: str) -> None:
@@ -151,10 +152,10 @@ class LessonPlayer:
         self.number, self.answer = number, None
         chapter, viewer, session = self.chapter, self._viewer, self.session
         _set_out(session, chapter)
-        session.playing, session.stop_when_settled = chapter.question is None, False
-        session.clock.speed, viewer.workspace = chapter.speed, self._workspace
+        session.playback.is_playing, session.playback.stop_when_settled = chapter.question is None, False
+        session.playback.clock.speed, viewer.workspace = chapter.speed, self._workspace
         viewer.show_session(session)
-        viewer.map_name = session.environment.name
+        viewer.map_name = session.displayed.environment.name
         viewer.tool, viewer.active, viewer.hand.selected = viewer.hand, 0, chapter.robot
         viewer.shown, viewer.message = PLAIN | set(chapter.show), ""
         self._fit()
@@ -162,14 +163,14 @@ class LessonPlayer:
 
 
 def _set_out(session: Session, chapter: ChapterModel) -> None:
-    target = session.document.nodes[chapter.touch]
-    session.enter(session.document.path(target)[0], 0)
-    session.remake()
-    session.follow(target)
+    target = session.timeline.document.nodes[chapter.touch]
+    session.seek(session.timeline.document.get_path(target)[0], 0)
+    session.timeline.finish_seek()
+    session.timeline.follow(target)
 
 
 def _begun(saved: SavedSession) -> Session:
-    return Session.opened(replace(saved, head=saved.document.nodes[0], step=0))
+    return Session.open(replace(saved, head=saved.document.nodes[0], step=0))
 
 
 def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
@@ -178,7 +179,7 @@ def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
     session, found = _begun(saved), []
     for chapter in saved.lesson.chapters:
         _set_out(session, chapter)
-        while not (ended := holds(chapter.until, session)) and session.end < LONGEST_TASK:
-            session.step()
-        found.append((chapter.title, session.end, ended))
+        while not (ended := holds(chapter.until, session)) and session.timeline.end_time < LONGEST_TASK:
+            session.playback.step()
+        found.append((chapter.title, session.timeline.end_time, ended))
     return found

@@ -17,8 +17,8 @@ from robocov_app.toolkit.ui import SMALL, SidePanel, Ui
 from robocov_app.viewer.explain import NOTHING, Report
 from robocov_app.viewer.parameters import Parameter, Pick
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
-from robocov_app.viewer.session.scenario import MOST_PANES
+from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
+from robocov_app.viewer.session.scenario import MAX_PANES
 
 TABS = ("parameters", "show", "robot", "keep")
 # layers without a check box: a picture without them is no use; they have keys all the same
@@ -56,8 +56,8 @@ class Panel(SidePanel):
         if self.covered and self.ui.busy:
             self.ui.stop_typing()
         viewer, session = self.viewer, self.viewer.session
-        shows = (viewer.version, self.tab, viewer.theme, session.playing, id(self.report))
-        old = self._age >= _ASKED_AGAIN and session.playing and not session.settled
+        shows = (viewer.version, self.tab, viewer.theme, session.playback.is_playing, id(self.report))
+        old = self._age >= _ASKED_AGAIN and session.playback.is_playing and not session.timeline.is_settled
         if shows != self._drawn or old:
             self._drawn, self._age, self.ui.stale = shows, 0.0, True
 
@@ -84,7 +84,7 @@ class Panel(SidePanel):
         ui.row(172, 0, height=28, below=5)
         if (name := ui.dropdown("map", list(names), files.get(viewer.map_name, viewer.map_name))) is not None:
             viewer.attempt(partial(viewer.open_map, names[name]))
-        if (start := ui.dropdown("start", viewer.starts(), session.scenario.start_name)) is not None:
+        if (start := ui.dropdown("start", viewer.starts(), session.timeline.scenario.start_name)) is not None:
             viewer.attempt(lambda: viewer.restart(start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
@@ -94,13 +94,13 @@ class Panel(SidePanel):
         self._does(ui, "+", "more")
         ui.cell()
         ui.label("Seed")
-        if (seed := ui.text_entry("seed", str(session.scenario.seed))) is not None:
+        if (seed := ui.text_entry("seed", str(session.timeline.scenario.seed))) is not None:
             viewer.attempt(lambda: self._commands.typed(f"seed {seed}"))
         self._does(ui, "↻", "seed:next")
 
     def _controllers(self, ui: Ui) -> None:
         viewer, session = self.viewer, self.viewer.session
-        laws = [session.setup(pane).law for pane in session.panes]
+        laws = [session.displayed.get_setup(pane).controller for pane in session.timeline.panes]
         labels = law_labels(viewer.laws, {law.name: law.label for law in laws})
         names, count = {label: name for name, label in labels.items()}, len(laws)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
@@ -116,7 +116,7 @@ class Panel(SidePanel):
                     self._do("pane:remove")
                 if count == 2 or k % 2 == 0:
                     ui.cell()
-        if count < MOST_PANES:
+        if count < MAX_PANES:
             self._does(ui, "+ compare" if count != 2 else "+", "pane:add")
         ui.space(4)
 
@@ -124,16 +124,21 @@ class Panel(SidePanel):
         session = self.viewer.session
         ui.header("RUN")
         ui.row(0, 0, 0, 0, height=28, below=5)
-        self._does(ui, "Pause" if session.playing else "Play", "pause", chosen=not session.playing)
+        self._does(
+            ui,
+            "Pause" if session.playback.is_playing else "Play",
+            "pause",
+            chosen=not session.playback.is_playing,
+        )
         self._does(ui, "Step", "step")
-        self._does(ui, "Settle", "settle", chosen=session.stop_when_settled)
+        self._does(ui, "Settle", "settle", chosen=session.playback.stop_when_settled)
         self._does(ui, "Restart", "restart")
         ui.row(46, 0, 42, height=22)
         ui.label("Speed")
-        now = float(speed_index(session.clock.speed))
+        now = float(find_speed_index(session.playback.clock.speed))
         if (place := ui.slider("speed", now, 0.0, len(SPEEDS) - 1.0, step=1.0)) is not None:
             self.viewer.attempt(lambda: self.viewer.set_speed(SPEEDS[round(place)]))
-        ui.label(speed_words(session.clock.speed), key="speed")
+        ui.label(format_speed(session.playback.clock.speed), key="speed")
 
     def _tools(self, ui: Ui) -> None:
         ui.header("MOUSE")
@@ -143,7 +148,10 @@ class Panel(SidePanel):
         ui.space(6)
 
     def _parameters(self, ui: Ui) -> None:
-        found, law = self.viewer.parameters(), self.viewer.session.setup(self.viewer.pane).law
+        found, law = (
+            self.viewer.parameters(),
+            self.viewer.session.displayed.get_setup(self.viewer.pane).controller,
+        )
         team = [each for each in found if each.name.startswith("team.")]
         gains = [each for each in found if each not in team]
         groups = {f"GAINS OF {law.label.upper()}": gains, "ROBOTS": team}
@@ -216,7 +224,7 @@ class Panel(SidePanel):
         ui.row(0, 0, 0, 0, below=8)
         self._does(ui, "◀", "robot:previous")
         self._does(ui, "▶", "robot:next")
-        failed = self.viewer.selected in self.viewer.session.setup(self.viewer.pane).failed
+        failed = self.viewer.selected in self.viewer.session.displayed.get_setup(self.viewer.pane).failed
         self._does(ui, "Revive" if failed else "Fail", "robot:fail", why=why)
         self._does(ui, "Remove", "robot:remove", why=why)
         with ui.scroll(f"robot:{self.viewer.selected}"):

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, quote
 from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, UNITS
-from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.robot_properties import RobotProperties
 
 SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more
 _END = 0.985  # from here on a slider says "no limit" where there may be none
@@ -95,8 +96,8 @@ class Pick:
 
 
 def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
-    for name, gain in law.known.items():
-        value = law.value(name)
+    for name, gain in law.available_gains.items():
+        value = law.get_value(name)
         if isinstance(gain, Option):
             word = value if isinstance(value, str) else gain.default
             yield Pick(name, name, gain.meaning, word, gain.default, gain.choices)
@@ -108,8 +109,8 @@ def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
         yield Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
 
 
-def limit_parameters(limits: TeamSpec) -> Iterator[Parameter | Pick]:
-    usual, kind = TeamSpec(), KINEMATICS[limits.track_width > 0.0]
+def limit_parameters(limits: RobotProperties) -> Iterator[Parameter | Pick]:
+    usual, kind = RobotProperties(), KINEMATICS[limits.track_width > 0.0]
     for name, (label, meaning, ends) in _LIMITS.items():
         if name in limits.different:
             label, meaning = f"{label} ≠", f"{meaning}; robots differ in it until it is set here"
@@ -120,7 +121,7 @@ def limit_parameters(limits: TeamSpec) -> Iterator[Parameter | Pick]:
     yield Pick("team.kinematics", "kinematics", _KINDS, kind, KINEMATICS[0], KINEMATICS)
 
 
-def with_limit(limits: TeamSpec, name: str, value: float | str | None) -> TeamSpec:
+def with_limit(limits: RobotProperties, name: str, value: float | str | None) -> RobotProperties:
     name = name.removeprefix("team.")
     if name == "kinematics":
         is_unicycle = value == KINEMATICS[1]

@@ -16,12 +16,17 @@ from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.faults import describe_os_error
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
-from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
+from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
+from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.file import SUFFIX, load_session
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.scenario import ControllerChoice
-from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import Workspace, offer, recoverable, recovered
+from robocov_app.viewer.session.session import Session, toggle_failure
+from robocov_app.viewer.session.workspace import (
+    SessionWorkspace,
+    describe_draft,
+    find_recoverable_drafts,
+    recover_draft,
+)
 from robocov_app.viewer.tools import Brush, Hand, Tool, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
@@ -44,7 +49,7 @@ class Presenter:
         file: Path | None = None,  # of the session
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
-        self._map_names, self._kept_in = {session.environment.name: map_name}, kept_in
+        self._map_names, self._kept_in = {session.displayed.environment.name: map_name}, kept_in
         self.laws, self.tools = list(dict.fromkeys([*CONTROLLERS, *laws])), toolbox()
         self.hand = cast(Hand, self.tools["hand"])
         self.tool: Tool = self.hand
@@ -59,22 +64,22 @@ class Presenter:
         self.cursor_pane = 0
         self._mapped: object = None
         self.rested: object = None  # the touch after which the team has settled, though it may sway again
-        self.workspace = Workspace(session, kept_in, file)
+        self.workspace = SessionWorkspace(session, kept_in, file)
         self.look_at_map()
 
     @property
     def map_name(self) -> str:
         """Bundled name or path of the map of the present, also where undo has led to another one."""
-        name = self.session.environment.name
+        name = self.session.displayed.environment.name
         return self._map_names.get(name, name)
 
     @map_name.setter
     def map_name(self, name: str) -> None:
-        self._map_names[self.session.environment.name] = name
+        self._map_names[self.session.displayed.environment.name] = name
 
     @property
     def numbers(self) -> list[int]:
-        return self.session.setup(self.pane).there
+        return self.session.displayed.get_setup(self.pane).all_numbers
 
     @property
     def selected(self) -> int | None:
@@ -82,12 +87,12 @@ class Presenter:
 
     @property
     def pane(self) -> Pane:
-        self.active = min(self.active, len(self.session.panes) - 1)
-        return self.session.panes[self.active]
+        self.active = min(self.active, len(self.session.timeline.panes) - 1)
+        return self.session.timeline.panes[self.active]
 
     def parameters(self) -> list[Parameter | Pick]:
-        setup = self.session.setup(self.pane)
-        return [*gain_parameters(setup.law), *limit_parameters(setup.limits)]
+        setup = self.session.displayed.get_setup(self.pane)
+        return [*gain_parameters(setup.controller), *limit_parameters(setup.properties)]
 
     def maps(self) -> list[str]:
         return list(dict.fromkeys([*list_bundled_maps(), *([self.map_name] if self.map_name else [])]))
@@ -116,7 +121,7 @@ class Presenter:
         self.look_at_map()
 
     def look_at_map(self) -> None:
-        environment = self.session.environment
+        environment = self.session.displayed.environment
         # while it is painted the cost would never be ready
         if environment is not self._mapped and not self.tool.painting:
             self._mapped = environment
@@ -128,31 +133,39 @@ class Presenter:
         self.say(f"{self.tool.title}: {self.tool.hint}")
 
     def pause(self) -> None:
-        self.session.playing, self.session.stop_when_settled = not self.session.playing, False
+        self.session.playback.is_playing, self.session.playback.stop_when_settled = (
+            not self.session.playback.is_playing,
+            False,
+        )
 
     def settle(self) -> None:
         session = self.session
-        session.stop_when_settled = not session.stop_when_settled
-        if session.stop_when_settled:
-            session.playing, session.settled = True, False
+        session.playback.stop_when_settled = not session.playback.stop_when_settled
+        if session.playback.stop_when_settled:
+            session.playback.is_playing, session.timeline.is_settled = True, False
             self.say("plays until the team has settled")
 
-    def restart(self, **changes: object) -> None:
-        self.session.restart(**changes)
+    def restart(
+        self, *, robots: int | None = None, start: str | None = None, seed: int | None = None
+    ) -> None:
+        """Start again at time 0, with other robots, starts or seed if they are given."""
+        self.session.restart(robots=robots, start=start, seed=seed)
 
     def change_speed(self, by: int) -> None:
-        self.set_speed(SPEEDS[min(max(speed_index(self.session.clock.speed) + by, 0), len(SPEEDS) - 1)])
+        self.set_speed(
+            SPEEDS[min(max(find_speed_index(self.session.playback.clock.speed) + by, 0), len(SPEEDS) - 1)]
+        )
 
     def set_speed(self, speed: float) -> None:
-        self.session.clock.speed = speed
-        self.say(f"speed {speed_words(speed)}")
+        self.session.playback.clock.speed = speed
+        self.say(f"speed {format_speed(speed)}")
 
     def next_start(self) -> None:
         # an obstacle may have covered the start since
-        self.restart(start=_after(self.starts(), self.session.scenario.start_name))
+        self.restart(start=_after(self.starts(), self.session.timeline.scenario.start_name))
 
     def starts(self) -> list[str]:
-        return list(dict.fromkeys([*self.session.environment.starts, "uniform"]))
+        return list(dict.fromkeys([*self.session.displayed.environment.starts, "uniform"]))
 
     def next_map(self, by: int) -> None:
         maps = self.maps()
@@ -163,7 +176,9 @@ class Presenter:
             with suppress(InputError):
                 self.open_map(name)
                 if passed:
-                    self.say(f"no room for {self.session.scenario.robots} robots: {', '.join(passed)}")
+                    self.say(
+                        f"no room for {self.session.timeline.scenario.robots} robots: {', '.join(passed)}"
+                    )
                 return
             passed.append(name)
 
@@ -173,39 +188,42 @@ class Presenter:
         self.map_name = name
 
     def look_by(self, moments: int) -> None:
-        self.session.playing = False
-        self.session.look_by(moments)
+        self.session.playback.is_playing = False
+        self.session.show_offset(moments)
 
     def look_at(self, time: float) -> None:
-        self.session.playing = False
-        self.session.look_at(time)
+        self.session.playback.is_playing = False
+        self.session.show_time(time)
 
     def branch(self) -> None:
         words = "this is the present: go back first (←, or drag the time line)"
         if self.session.branch():
-            self.session.playing, words = True, "goes on from here; what came after stays as a ghost curve"
+            self.session.playback.is_playing, words = (
+                True,
+                "goes on from here; what came after stays as a ghost curve",
+            )
         self.say(words)
 
     def next_law(self) -> None:
-        name = _after(self.laws, self.session.setup(self.pane).law.name)
-        self.session.set_law(self.pane, ControllerChoice(name))
+        name = _after(self.laws, self.session.displayed.get_setup(self.pane).controller.name)
+        self.session.set_controller(self.pane, ControllerChoice(name))
 
     def add_pane(self) -> None:
-        there = {pane.law.name for pane in self.session.panes}
+        there = {pane.controller.name for pane in self.session.timeline.panes}
         self.session.add_pane(ControllerChoice(next((n for n in self.laws if n not in there), self.laws[0])))
-        self.active = len(self.session.panes) - 1
+        self.active = len(self.session.timeline.panes) - 1
         self.say("all begin anew, from the same starts")
 
     def remove_pane(self) -> None:
         self.session.remove_pane(self.pane)
 
     def next_pane(self) -> None:
-        self.active = (self.active + 1) % len(self.session.panes)
+        self.active = (self.active + 1) % len(self.session.timeline.panes)
 
     def undo(self) -> None:
-        other = "; Alt ← leads to other branches" if self.session.document.nodes[1:] else ""
+        other = "; Alt ← leads to other branches" if self.session.timeline.document.nodes[1:] else ""
         nothing, words = f"nothing to undo{other}", self.session.undo()
-        self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else nothing)
+        self.say(f"undone: {words}; back at {self.session.displayed.time:.1f} s" if words else nothing)
 
     def redo(self) -> None:
         words = self.session.redo()
@@ -217,7 +235,7 @@ class Presenter:
         self.hand.selected = numbers[(k + by) % len(numbers)]
 
     def fail_or_revive(self) -> None:
-        self.session.fail_or_revive(self._asked())
+        toggle_failure(self.session, self._asked())
 
     def remove_robot(self) -> None:
         self.session.remove_robot(self._asked())
@@ -254,7 +272,7 @@ class Presenter:
 
     def save_map(self) -> None:
         target = find_free_path(self.folder, Path(self.map_name).stem or "map", ".json")
-        save_map(self.session.environment, target)
+        save_map(self.session.displayed.environment, target)
         self.map_name = str(target)
         self.say(f"map saved: {target}")
 
@@ -281,58 +299,64 @@ class Presenter:
 
     def open_session(self, path: Path) -> None:
         saved = load_session(path, self.laws)
-        self._take(Workspace(Session.opened(saved), self._kept_in, path), saved.view)
+        self._take(SessionWorkspace(Session.open(saved), self._kept_in, path), saved.view)
         self._note_recent(path)
         self.say(f"session opened: {path}")
 
     def recover(self, work: Draft | None = None) -> str:
         """Go on with a session that was left behind, by default the newest."""
-        found = recoverable(self._kept_in) if work is None else (work,)
+        found = find_recoverable_drafts(self._kept_in) if work is None else (work,)
         if not found:
             return "nothing was left behind"
-        self._take(*recovered(found[0], self.laws, self._kept_in))
-        return f"recovered: {offer(found[0])}"
+        self._take(*recover_draft(found[0], self.laws, self._kept_in))
+        return f"recovered: {describe_draft(found[0])}"
 
-    def _take(self, workspace: Workspace, view: Mapping[str, Any]) -> None:
+    def _take(self, workspace: SessionWorkspace, view: Mapping[str, Any]) -> None:
         self.workspace.close()
         self.workspace, self.hand.selected = workspace, None
         self.show_session(workspace.session)
-        self.map_name = str(view.get("map") or self.session.environment.name)
+        self.map_name = str(view.get("map") or self.session.displayed.environment.name)
         if isinstance(shown := view.get("shown"), list):
             self.shown = set(map(str, shown))
 
     def show_session(self, session: Session) -> None:
-        session.clock.budget = self.session.clock.budget
-        session.serial, self.session = max(session.serial, self.session.serial) + 1, session
+        session.playback.clock.budget = self.session.playback.clock.budget
+        session.timeline.past_version, self.session = (
+            max(session.timeline.past_version, self.session.timeline.past_version) + 1,
+            session,
+        )
         self.version += 1
         self.look_at_map()
 
     def enter_branch(self, by: int) -> None:
-        ends, head = [each.node for each in self.session.document.branches()], self.session.head
+        ends, head = (
+            [each.node for each in self.session.timeline.document.list_branches()],
+            self.session.timeline.head,
+        )
         now = ends.index(head) if head in ends else -1
         self.enter(ends[(now + by) % len(ends)].number)
 
     def enter(self, node: int) -> None:
-        branches = self.session.document.branches()
+        branches = self.session.timeline.document.list_branches()
         k = [each.node.number for each in branches].index(node)
-        self.session.enter(branches[k].node)
-        self.say(f"branch {k + 1} of {len(branches)}: {branches[k].words}")
+        self.session.seek(branches[k].node)
+        self.say(f"branch {k + 1} of {len(branches)}: {branches[k].description}")
 
     def set_parameter(self, name: str, value: Value) -> None:
-        setup = self.session.setup(self.pane)
+        setup = self.session.displayed.get_setup(self.pane)
         if name.startswith("team."):
-            self.session.set_limits(with_limit(setup.limits, name, value))
+            self.session.set_properties(with_limit(setup.properties, name, value))
         else:
-            self.session.set_law(self.pane, setup.law.with_gain(name, value))
+            self.session.set_controller(self.pane, setup.controller.with_gain(name, value))
 
     def set_law(self, number: int, name: str) -> None:
-        pane = self.session.panes[number]
-        if self.session.setup(pane).law.name != name:
-            self.session.set_law(pane, ControllerChoice(name))
+        pane = self.session.timeline.panes[number]
+        if self.session.displayed.get_setup(pane).controller.name != name:
+            self.session.set_controller(pane, ControllerChoice(name))
         self.active = number
 
     def use_law(self, name: str) -> None:
-        ControllerChoice(name).made()
+        ControllerChoice(name).build()
         if name not in self.laws:
             self.laws.append(name)
         self.set_law(self.active, name)

@@ -14,8 +14,8 @@ from robocov.environment import Environment, Obstacle, Point, Ring
 from robocov.errors import RobocovError
 from robocov_app.toolkit.draw_tools import SAME, Outline
 from robocov_app.viewer.session import map_edits
-from robocov_app.viewer.session.passages import passage_words
-from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.passages import describe_passage_changes
+from robocov_app.viewer.session.session import Session, toggle_failure
 
 SNAPS_WITHIN = 0.6  # part of a finger's width within which corners and walls draw what is drawn
 WALL_WIDTH = 0.1  # of drawn walls, m
@@ -70,14 +70,19 @@ class Tool:
 
 def edited(session: Session, environment: Environment, words: str) -> str:
     """Put a new map in place; return what to tell. StartError when there is no room for a robot any more."""
-    before, radius = session.environment, session.setup(session.panes[0]).team.radius
+    before, radius = (
+        session.displayed.environment,
+        session.displayed.get_setup(session.timeline.panes[0]).team.radius,
+    )
     gone = set(before.starts) - set(environment.starts)
-    if pushed := session.edit(environment, words):
+    if pushed := session.edit_map(environment, words):
         words += f"; {pushed} robot{'s' if pushed > 1 else ''} pushed out of the way"
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
-    robots = session.positions(session.panes[0])
-    return "; ".join(filter(None, [words, passage_words(before, environment, float(radius.min()), robots)]))
+    robots = session.displayed.get_positions(session.timeline.panes[0])
+    return "; ".join(
+        filter(None, [words, describe_passage_changes(before, environment, float(radius.min()), robots)])
+    )
 
 
 @dataclass
@@ -96,8 +101,10 @@ class Hand(Tool):
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         self._from, self._at, self._drags = point, point, False
-        self.robot, self._taken = number, session.environment.obstacles
-        self.obstacle = None if number is not None else map_edits.obstacle_at(session.environment, point)
+        self.robot, self._taken = number, session.displayed.environment.obstacles
+        self.obstacle = (
+            None if number is not None else map_edits.find_obstacle(session.displayed.environment, point)
+        )
         self.selected = self.selected if number is None else number
         return None
 
@@ -109,8 +116,12 @@ class Hand(Tool):
         self._at = point
         self._drags = self._drags or dist(self._from, point) > 0.02  # a click is no pull
         # meanwhile it may have been taken out
-        if self.robot is not None and self._drags and self.robot in session.setup(session.panes[0]).there:
-            session.grab(self.robot, point)
+        if (
+            self.robot is not None
+            and self._drags
+            and self.robot in session.displayed.get_setup(session.timeline.panes[0]).all_numbers
+        ):
+            session.drag_robot(self.robot, point)
 
     def release(self, session: Session, point: Point) -> str | None:
         self._at = point
@@ -121,8 +132,10 @@ class Hand(Tool):
         if dragged is None:
             return None
         k, moved = dragged
-        words = f"{map_edits.words_for(moved)} moved"
-        return edited(session, map_edits.with_replaced(session.environment, k, 1, [moved]), words)
+        words = f"{map_edits.describe_obstacle(moved)} moved"
+        return edited(
+            session, map_edits.replace_obstacles(session.displayed.environment, k, 1, [moved]), words
+        )
 
     def cancel(self, session: Session) -> bool:
         if not self.holds:
@@ -138,11 +151,15 @@ class Hand(Tool):
         return Preview((self._from, self._at), False, dragged[1], f"{dist(self._from, self._at):.2f} m")
 
     def _dragged(self, session: Session) -> tuple[int, Obstacle] | None:
-        there, k, (dx, dy) = session.environment.obstacles, self.obstacle, np.subtract(self._at, self._from)
+        there, k, (dx, dy) = (
+            session.displayed.environment.obstacles,
+            self.obstacle,
+            np.subtract(self._at, self._from),
+        )
         # meanwhile there may be another map
         if k is None or there[k : k + 1] != self._taken[k : k + 1] or np.hypot(dx, dy) < 1e-3:
             return None
-        return k, map_edits.moved(there[k], float(dx), float(dy))
+        return k, map_edits.move_obstacle(there[k], float(dx), float(dy))
 
 
 def snapped(environment: Environment, point: Point, reach: float) -> Point:
@@ -196,10 +213,10 @@ class Polygon(Tool):
         return Preview(points, len(points) > 2, None, words) if words else None
 
     def _snapped(self, session: Session, point: Point) -> Point:
-        return snapped(session.environment, point, SNAPS_WITHIN * self._reach)
+        return snapped(session.displayed.environment, point, SNAPS_WITHIN * self._reach)
 
     def _made(self, corners: list[Point]) -> Obstacle:
-        return map_edits.polygon_of(corners)
+        return map_edits.build_polygon(corners)
 
 
 @dataclass
@@ -225,7 +242,7 @@ class Wall(Polygon):
         return Preview(drawn.line, False, wall, words)
 
     def _made(self, corners: list[Point]) -> Obstacle:
-        return map_edits.wall_of(corners, self.width)
+        return map_edits.build_wall(corners, self.width)
 
 
 @dataclass
@@ -271,19 +288,19 @@ class Circle(Ruler):
 
     def release(self, session: Session, point: Point) -> str | None:
         middle, self._from = self._from, None
-        return None if middle is None else _drawn(session, map_edits.circle_of(middle, point), "circle")
+        return None if middle is None else _drawn(session, map_edits.build_circle(middle, point), "circle")
 
     def preview(self, session: Session) -> Preview | None:
         if self._from is None:
             return None
         circle, line = None, (self._from, self._at)
         with suppress(RobocovError):
-            circle = map_edits.circle_of(*line)
+            circle = map_edits.build_circle(*line)
         return Preview(line, False, circle, f"radius {dist(*line):.2f} m")
 
 
 def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
-    return edited(session, map_edits.with_obstacle(session.environment, obstacle), f"{name} drawn")
+    return edited(session, map_edits.add_obstacle(session.displayed.environment, obstacle), f"{name} drawn")
 
 
 @dataclass
@@ -304,17 +321,17 @@ class Brush(Tool):
 
     def size(self, session: Session) -> float:
         if self.radius is None:
-            self.radius = float(f"{0.1 * session.environment.region.diameter:.2g}")
+            self.radius = float(f"{0.1 * session.displayed.environment.region.diameter:.2g}")
         return self.radius
 
     def widen(self, session: Session, factor: float) -> str:
-        whole = session.environment.region.diameter
+        whole = session.displayed.environment.region.diameter
         self.radius = float(f"{np.clip(self.size(session) * factor, whole / 200, whole / 2):.3g}")
         return f"the brush has a radius of {self.radius:g} m"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         self.painting, self._at, self._dabs = True, point, [point]
-        self._boundary = session.environment.boundary
+        self._boundary = session.displayed.environment.boundary
         self._stroke += 1
         self._show(session)
         return None
@@ -323,7 +340,7 @@ class Brush(Tool):
         if not self.painting or self._at is None:
             self._at = point
             return
-        if session.environment.boundary != self._boundary:
+        if session.displayed.environment.boundary != self._boundary:
             self.painting = False  # meanwhile there is another map
             return
         spacing, begin = _SPACING * self.size(session), self._at
@@ -356,7 +373,10 @@ class Brush(Tool):
             return None
         turn, radius = np.linspace(0.0, 2.0 * np.pi, _RING + 1), self.size(session)
         x, y = self._at[0] + radius * np.cos(turn), self._at[1] + radius * np.sin(turn)
-        outline, density = tuple(zip(x.tolist(), y.tolist(), strict=True)), session.environment.density
+        outline, density = (
+            tuple(zip(x.tolist(), y.tolist(), strict=True)),
+            session.displayed.environment.density,
+        )
         value = 1.0 if density is None else float(density.evaluate(np.array([self._at]))[0])
         return Preview(outline, False, None, f"φ {value:.2g}", marks=False)
 
@@ -383,11 +403,11 @@ def _erase(session: Session, point: Point, reach: float, number: int | None) -> 
     if number is not None:
         session.remove_robot(number)
         return f"robot {number} taken out"
-    index = map_edits.obstacle_at(session.environment, point, 0.5 * reach)
+    index = map_edits.find_obstacle(session.displayed.environment, point, 0.5 * reach)
     if index is None:
         return None
-    words = f"{map_edits.words_for(session.environment.obstacles[index])} deleted"
-    return edited(session, map_edits.with_replaced(session.environment, index, 1), words)
+    words = f"{map_edits.describe_obstacle(session.displayed.environment.obstacles[index])} deleted"
+    return edited(session, map_edits.replace_obstacles(session.displayed.environment, index, 1), words)
 
 
 def _add(session: Session, point: Point, reach: float, number: int | None) -> str:
@@ -395,7 +415,7 @@ def _add(session: Session, point: Point, reach: float, number: int | None) -> st
 
 
 def _fail(session: Session, point: Point, reach: float, number: int | None) -> str | None:
-    return None if number is None else session.fail_or_revive(number)
+    return None if number is None else toggle_failure(session, number)
 
 
 def toolbox() -> dict[str, Tool]:

@@ -31,7 +31,8 @@ from robocov_app.viewer.lessons import FIRST, LessonPlayer, load_lesson
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.presenter import Presenter, plain
 from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.session.workspace import RunSaver, offer
+from robocov_app.viewer.session.run_saver import RunSaver
+from robocov_app.viewer.session.workspace import describe_draft
 from robocov_app.viewer.status import HINT, facts, suggestion
 from robocov_app.viewer.tools import Brush
 
@@ -111,7 +112,7 @@ class Pointer:
         if brush:
             brush.lowers = event.button == 3
         self._interrupt()
-        pane = min(pane, len(viewer.session.panes) - 1)
+        pane = min(pane, len(viewer.session.timeline.panes) - 1)
         if viewer.active != pane:
             viewer.active = pane
             viewer.version += 1
@@ -211,11 +212,11 @@ class Window(BaseWindow):
     def save_point(self) -> Callable[[], None]:
         viewer = self.viewer
         session = viewer.session
-        point = session.save_point()
+        point = session.build_save_point()
 
         def take_back() -> None:
             if viewer.session is session:
-                session.roll_back(point, in_step=True)
+                session.restore(point, in_step=True)
             viewer.tool.cancel(viewer.session)
             viewer.version += 1
 
@@ -231,7 +232,7 @@ class Window(BaseWindow):
         self.viewer.version += 1
 
     def close(self) -> None:
-        self.viewer.workspace.keep(self.viewer.view, at_once=True)
+        self.viewer.workspace.save_draft(self.viewer.view, at_once=True)
         self._end_tour()  # what was before it is kept
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)
@@ -255,38 +256,51 @@ class Window(BaseWindow):
 
     def look(self) -> object:
         viewer, session, tour = self.viewer, self.viewer.session, self.tour
-        at_rest = session.settled and session.live and not session.environment.has_moving_obstacles
-        if (session.playing and not at_rest) or self.film is not None:
+        at_rest = (
+            session.timeline.is_settled
+            and session.timeline.is_live
+            and not session.displayed.environment.has_moving_obstacles
+        )
+        if (session.playback.is_playing and not at_rest) or self.film is not None:
             return None
-        told = viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing
+        told = (
+            viewer.version,
+            viewer.message,
+            viewer.trouble,
+            session.displayed.time,
+            session.timeline.past_version,
+            session.playback.is_playing,
+        )
         drawn = self._answers, viewer.costs.state, self._arranged, self.panel.ui.stale
         return *told, *drawn, tour and (tour.state, tour.number, tour.progress)
 
     def _pass_time(self, seconds: float) -> None:
         viewer, session = self.viewer, self.viewer.session
         viewer.pass_time(seconds)
-        viewer.workspace.keep(viewer.view)
+        viewer.workspace.save_draft(viewer.view)
         for words, trouble in self.keeper.poll():
             viewer.say(words, trouble=trouble)
         if self.tour is not None:
             self.tour.advance(seconds)
             self.tour = None if self.tour.done else self.tour
-        playing = session.playing
+        playing = session.playback.is_playing
         try:
             slices = max(round(seconds * FPS), 1) if self.resting else 1  # a long pause is many frames
-            steps = sum(session.advance(seconds / slices) for _ in range(slices))
-            for pane in session.panes:
-                session.snapshot(pane)  # what is decided belongs to the simulation, not to drawing
+            steps = sum(session.playback.advance(seconds / slices) for _ in range(slices))
+            for pane in session.timeline.panes:
+                session.displayed.get_snapshot(
+                    pane
+                )  # what is decided belongs to the simulation, not to drawing
         except RobocovError as error:
             steps = 0
             viewer.say(plain(str(error)), trouble=True)
-        if session.settled:
-            viewer.rested = session.head
-        if session.playing != playing:
+        if session.timeline.is_settled:
+            viewer.rested = session.timeline.head
+        if session.playback.is_playing != playing:
             viewer.version += 1
-            if session.settled:
-                viewer.say(f"settled at {session.time:.1f} s")
-            elif session.at_end_of_record and session.live and not viewer.trouble:
+            if session.timeline.is_settled:
+                viewer.say(f"settled at {session.displayed.time:.1f} s")
+            elif session.timeline.is_at_record_end and session.timeline.is_live and not viewer.trouble:
                 viewer.say("the record ends here; Space goes on from it, by simulating")
         if seconds > 0:
             self._steps_rate += 0.1 * (steps / seconds - self._steps_rate)
@@ -294,42 +308,55 @@ class Window(BaseWindow):
 
     def _ask_costs(self) -> None:
         viewer, session = self.viewer, self.viewer.session
-        if session.serial != self._serial:
-            self._serial = session.serial
+        if session.timeline.past_version != self._serial:
+            self._serial = session.timeline.past_version
             viewer.costs.forget()
         point = np.array(viewer.cursor) if "path" in viewer.shown and viewer.cursor is not None else None
-        for pane in session.panes:
-            positions, known = session.positions(pane), viewer.costs.known.get(pane.number)
-            fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
+        for pane in session.timeline.panes:
+            positions, known = session.displayed.get_positions(pane), viewer.costs.known.get(pane.number)
+            fresh = known is not None and point is None and abs(known.time - session.displayed.time) < 1e-9
             if known is None or not (fresh and np.array_equal(known.result.positions, positions)):
-                viewer.costs.ask(pane.number, session.time, positions, point, session.setup(pane).speeds)
+                viewer.costs.ask(
+                    pane.number,
+                    session.displayed.time,
+                    positions,
+                    point,
+                    session.displayed.get_setup(pane).speed_limits,
+                )
         self._ask_beginning()
         for number, known in viewer.costs.poll():
             self._answers += 1
-            for pane in session.panes:
+            for pane in session.timeline.panes:
                 if pane.number == number and known.time <= pane.time + 1e-9:
-                    pane.curve.add(known.time, known.result.mean_distance)
+                    pane.distance_curve.add(known.time, known.result.mean_distance)
                     if known.travel_time is not None:
                         pane.curves["time"].add(known.time, known.travel_time)
 
     def _ask_beginning(self) -> None:
         """Ask in turn with the present for the costs of the time in which nobody answered yet."""
         session, costs = self.viewer.session, self.viewer.costs
-        if session.head.kind != "begin" or not session.live or (session.playing and self._answers % 2):
+        if (
+            session.timeline.head.kind != "begin"
+            or not session.timeline.is_live
+            or (session.playback.is_playing and self._answers % 2)
+        ):
             return
-        for pane in session.panes:
-            first = min(pane.curve.time, default=0.0)
+        for pane in session.timeline.panes:
+            first = min(pane.distance_curve.times, default=0.0)
             if first <= _GAP:
                 continue
-            k = session.history.at(first - _GAP if first > 2 * _GAP else 0.0)
-            state, time = session.history[k].states[pane.number], session.history.time(k)
-            costs.ask(pane.number, time, state.positions, speeds=state.setup.speeds, aside=True)
+            k = session.timeline.history.find_index(first - _GAP if first > 2 * _GAP else 0.0)
+            state, time = (
+                session.timeline.history[k].states[pane.number],
+                session.timeline.history.get_time(k),
+            )
+            costs.ask(pane.number, time, state.positions, speeds=state.setup.speed_limits, aside=True)
 
     def _arrange(self) -> None:
         viewer, session, size = self.viewer, self.viewer.session, self.screen.get_size()
-        panes = len(session.panes)
+        panes = len(session.timeline.panes)
         rows = max(self.canvas.shared_rows(), 1) if panes > 1 and self._arranged else 1
-        low_x, low_y, high_x, high_y = session.environment.region.bounds
+        low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
         outer = size, self.scale, viewer.panel, viewer.theme
         key = outer, panes, round(aspect, 3), rows
@@ -352,7 +379,11 @@ class Window(BaseWindow):
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(viewer, self.rate, self._steps_rate, filmed)
         waits = self.tour is not None and self._lesson is None
-        hint = self.hint if viewer.session.playing else self.hint.replace("Space pause", "Space play")
+        hint = (
+            self.hint
+            if viewer.session.playback.is_playing
+            else self.hint.replace("Space pause", "Space play")
+        )
         hint = "F2 back to the lesson · Esc ends it" if waits else hint
         draw_status(self.screen, layout.status, theme, layout.scale, line, hint)
         self._spots = []
@@ -379,7 +410,10 @@ class Window(BaseWindow):
         if number is None or panel.tab != "robot" or panel.hidden:
             panel.report = None
             return
-        shown, (before, at) = (number, session.time, session.serial, self.viewer.version), self._reported
+        shown, (before, at) = (
+            (number, session.displayed.time, session.timeline.past_version, self.viewer.version),
+            self._reported,
+        )
         if panel.report is None or (shown != before and self._now - at >= _ASKED_AGAIN):
             self._reported = shown, self._now
             panel.report = report_on(self.viewer, number)
@@ -465,21 +499,21 @@ class Window(BaseWindow):
 
     def _list_branches(self) -> None:
         viewer, session = self.viewer, self.viewer.session
-        session.stow()  # the curve of the present with those of the others
+        session.timeline.cache_present()  # the curve of the present with those of the others
 
         def lines() -> Iterator[Option]:
-            for k, each in enumerate(session.document.branches(), 1):
-                text = f"{k}  {each.words}" + ("  (here)" if each.node is session.head else "")
-                yield Option(text, each.told(session.scenario.dt), value=each.node.number)
+            for k, each in enumerate(session.timeline.document.list_branches(), 1):
+                text = f"{k}  {each.description}" + ("  (here)" if each.node is session.timeline.head else "")
+                yield Option(text, each.describe_end(session.timeline.scenario.dt), value=each.node.number)
 
         self.dialogs.ask(list_choice("Branches", lines, lambda option: viewer.enter(int(str(option.value)))))
 
     def offer_lesson(self) -> None:
         session = self.viewer.session
-        playing, session.playing = session.playing, False
+        playing, session.playback.is_playing = session.playback.is_playing, False
 
         def go_on(*, lesson: bool = False) -> None:
-            session.playing = playing
+            session.playback.is_playing = playing
             if lesson:
                 self._start_tour()
 
@@ -493,10 +527,10 @@ class Window(BaseWindow):
     def offer_recovery(self, found: Sequence[Draft]) -> None:
         """Ask whether to go on with what windows left behind, the newest first; until then the team waits."""
         viewer, session, newest = self.viewer, self.viewer.session, found[0]
-        playing, session.playing = session.playing, False
+        playing, session.playback.is_playing = session.playback.is_playing, False
 
         def later() -> None:
-            session.playing = playing
+            session.playback.is_playing = playing
 
         def recover() -> None:
             later()
@@ -508,7 +542,7 @@ class Window(BaseWindow):
             if found[1:]:
                 self.offer_recovery(found[1:])
 
-        words = f"A window ended without saving: {offer(newest)}."
+        words = f"A window ended without saving: {describe_draft(newest)}."
         if more := len(found) - 1:
             words += f"\n{more} more {'are' if more > 1 else 'is'} kept besides."
         answers = [Answer("Recover", recover, "r"), Answer("Discard", drop, "d"), Answer("Later", later, "l")]

@@ -163,16 +163,16 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
 def test_the_window_shows_a_run(run: Path, shown: list[Session]) -> None:
     assert main(["replay", str(run), "--size", "900x600", "--theme", "dark", "--hide", "cells"]) == 0
     (session,) = shown
-    assert 0.0 < session.time < session.end == 1.0
-    assert len(session.panes[0].curve) == 11
+    assert 0.0 < session.displayed.time < session.timeline.end_time == 1.0
+    assert len(session.timeline.panes[0].distance_curve) == 11
 
 
 def test_the_window_shows_a_comparison(both: Path, shown: list[Session]) -> None:
     assert main(["replay", str(both), "--size", "900x600"]) == 0
     (session,) = shown
-    assert [pane.law.name for pane in session.panes] == ["rpf", "lloyd"]
-    assert session.numbers == (2, 3)
-    assert len(session.panes[1].curve) == 11
+    assert [pane.controller.name for pane in session.timeline.panes] == ["rpf", "lloyd"]
+    assert session.displayed.numbers == (2, 3)
+    assert len(session.timeline.panes[1].distance_curve) == 11
 
 
 @pytest.mark.skipif("sys.platform != 'linux'", reason="elsewhere there is always one")

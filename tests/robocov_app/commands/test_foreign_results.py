@@ -17,7 +17,7 @@ from robocov_app.replication.contenders import Contender
 from robocov_app.replication.outcome_tables import read_outcomes
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study_file import read_study
-from robocov_app.viewer.session.recorded import LostController
+from robocov_app.viewer.session.missing_controller import MissingController
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -130,7 +130,7 @@ def test_no_command_runs_the_code_of_results(
     assert not (shared / "marker").exists()
     assert status == 0 or words[0] == "sweep"  # which may not take over a folder of another study
     for session in windows:
-        lost = [isinstance(pane.law, LostController) for pane in session.panes]
+        lost = [isinstance(pane.controller, MissingController) for pane in session.timeline.panes]
         assert lost == ([False, True, True] if words[1] == "both" else [True])
 
 
@@ -160,8 +160,8 @@ def test_who_opens_a_run_may_load_its_controller(
     name = controller(tmp_path, "", "safe.py")
     assert main(["replay", str(shared / "run"), "--controller", name]) == 0
     (session,) = windows
-    assert session.panes[0].law.name == name
-    assert session.live and session.end == 0.0, "it has begun anew"
+    assert session.timeline.panes[0].controller.name == name
+    assert session.timeline.is_live and session.timeline.end_time == 0.0, "it has begun anew"
     assert not (shared / "marker").exists()
     capsys.readouterr()
     message = complaint(capsys, "replay", str(shared / "run"), "--controller", name.replace("Mine", "Other"))

@@ -98,8 +98,8 @@ def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
         trial = hands.window.trial
         session = trial.viewer.session
         circle = CircleObstacle((5.0, 5.0), 0.3)
-        obstacles = (*session.environment.obstacles, circle)
-        session.edit(replace(session.environment, obstacles=obstacles), "drawn")
+        obstacles = (*session.displayed.environment.obstacles, circle)
+        session.edit_map(replace(session.displayed.environment, obstacles=obstacles), "drawn")
         if ends == "killed":
             hands.window.frame(0.1)
         else:

@@ -32,10 +32,10 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         before, camera, selection = hands.sketch, hands.window.canvas.camera, hands.editor.selection
         picture = hands.picture()
         trial = tried(hands)
-        assert trial.viewer.session.environment == before.build_environment()
-        assert trial.viewer.session.scenario.start_name == "s"
+        assert trial.viewer.session.displayed.environment == before.build_environment()
+        assert trial.viewer.session.timeline.scenario.start_name == "s"
         hands.frames(10)
-        assert trial.viewer.session.time > 0.0
+        assert trial.viewer.session.displayed.time > 0.0
         hands.key("f5")
         assert hands.window.trial is None
         assert hands.sketch is before and hands.window.canvas.camera == camera
@@ -101,7 +101,7 @@ def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
         trial = tried(hands)
         trial.viewer.attempt(lambda: trial.viewer.open_map("rooms"))
         trial.viewer.attempt(lambda: trial.viewer.open_map("Untitled"))
-        assert not trial.viewer.elsewhere and len(trial.viewer.session.environment.obstacles) == 1
+        assert not trial.viewer.elsewhere and len(trial.viewer.session.displayed.environment.obstacles) == 1
         hands.key("escape")
 
 

@@ -226,32 +226,36 @@ def test_an_edit_of_a_session_that_raises_is_taken_back(
         window, session = driver.window, driver.session
         window.contains_faults = True
         for _ in range(20):
-            session.step()
+            session.playback.step()
         session.fail_robot(2)
-        nodes, positions = len(session.document.nodes), session.panes[0].simulation.positions.copy()
-        amend = session.history.amend
+        nodes, positions = (
+            len(session.timeline.document.nodes),
+            session.timeline.panes[0].simulation.positions.copy(),
+        )
+        amend = session.timeline.history.amend
 
         def fail(moment: object) -> None:
             raise ZeroDivisionError("half-way")
 
-        monkeypatch.setattr(session.history, "amend", fail)
+        monkeypatch.setattr(session.timeline.history, "amend", fail)
         driver.viewer.hand.selected = 1
         driver.key("delete")
         assert "ZeroDivisionError" in driver.viewer.message
-        monkeypatch.setattr(session.history, "amend", amend)
-        assert session.numbers == (1, 3) and len(session.document.nodes) == nodes
-        assert (session.panes[0].simulation.positions == positions).all()
+        monkeypatch.setattr(session.timeline.history, "amend", amend)
+        assert session.displayed.numbers == (1, 3) and len(session.timeline.document.nodes) == nodes
+        assert (session.timeline.panes[0].simulation.positions == positions).all()
         again = _same_without_a_fault()
         for _ in range(30):
-            session.step()
-            again.step()
-        assert (session.panes[0].simulation.positions == again.panes[0].simulation.positions).all()
+            session.playback.step()
+            again.playback.step()
+        expected = again.timeline.panes[0].simulation.positions
+        assert (session.timeline.panes[0].simulation.positions == expected).all()
 
 
 def _same_without_a_fault() -> Session:
     session = begun()
     for _ in range(20):
-        session.step()
+        session.playback.step()
     session.fail_robot(2)
     return session
 
@@ -263,8 +267,8 @@ def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
         window, session = driver.window, driver.session
         window.contains_faults = True
         for _ in range(20):
-            session.step()
-        pane = session.panes[0]
+            session.playback.step()
+        pane = session.timeline.panes[0]
         positions = pane.simulation.positions.copy()
         step = pane.step
 
@@ -273,14 +277,14 @@ def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
             raise ZeroDivisionError("half-way")
 
         monkeypatch.setattr(pane, "step", fail)
-        session.playing = True
+        session.playback.is_playing = True
         driver.frames(3, 0.1)
-        assert not session.playing and "ZeroDivisionError" in driver.viewer.message
-        assert session.panes[0].time == pytest.approx(session.end)
-        assert (session.panes[0].simulation.positions == positions).all()
-        session.playing = True
+        assert not session.playback.is_playing and "ZeroDivisionError" in driver.viewer.message
+        assert session.timeline.panes[0].time == pytest.approx(session.timeline.end_time)
+        assert (session.timeline.panes[0].simulation.positions == positions).all()
+        session.playback.is_playing = True
         driver.frames(3, 0.1)
-        assert session.end > 20 * session.scenario.dt
+        assert session.timeline.end_time > 20 * session.timeline.scenario.dt
 
 
 def test_a_map_with_controls_in_its_texts_is_drawn(tmp_path: Path) -> None:

@@ -102,11 +102,11 @@ def test_a_paused_window_is_drawn_when_its_cost_or_words_change_only(tmp_path: P
         viewer.say("something")
         driver.frames(5)
         assert len(drawn) == 1
-        driver.session.playing = True
+        driver.session.playback.is_playing = True
         driver.frames(5)
         assert len(drawn) == 6 and not window.resting
-        driver.session.settled = True  # time goes on, and nothing moves
+        driver.session.timeline.is_settled = True  # time goes on, and nothing moves
         assert window.look() is not None
-        window._calm, before = CALM, driver.session.time
+        window._calm, before = CALM, driver.session.displayed.time
         window.advance(0.5)
-        assert driver.session.time == pytest.approx(before + 0.5, abs=0.05)
+        assert driver.session.displayed.time == pytest.approx(before + 0.5, abs=0.05)

@@ -303,4 +303,4 @@ def test_a_command_that_is_typed_within_one_frame_is_done(tmp_path: Path) -> Non
                 pygame.event.post(pygame.event.Event(pygame.TEXTINPUT, text=letter))
             pygame.event.post(pygame.event.Event(pygame.KEYUP, key=key, mod=0, unicode=letter, scancode=0))
         driver.frames(2)
-        assert not driver.window.dialogs.open and driver.viewer.session.numbers == (1,)
+        assert not driver.window.dialogs.open and driver.viewer.session.displayed.numbers == (1,)

@@ -79,14 +79,14 @@ def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
 
         def keep_small() -> None:
             session, viewer = driver.session, driver.viewer
-            is_large = len(session.numbers) > 6 or len(session.environment.obstacles) > 20
-            if is_large or session.scenario.robots > 6:
+            is_large = len(session.displayed.numbers) > 6 or len(session.displayed.environment.obstacles) > 20
+            if is_large or session.timeline.scenario.robots > 6:
                 viewer.attempt(lambda: viewer.open_map("square"))
                 viewer.attempt(lambda: viewer.restart(robots=2))
 
         fuzz.play(events, keep_small)
         leave_everything(driver)
-        for pane in driver.session.panes:
+        for pane in driver.session.timeline.panes:
             assert np.isfinite(pane.simulation.positions).all()
         driver.key("ctrl+k")
         assert driver.window.dialogs.open

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from driven_window import Driver, opened
 
-from robocov_app.viewer.session import moments, session
+from robocov_app.viewer.session import history, present
 
 
 @pytest.fixture
@@ -21,5 +21,5 @@ def driver(tmp_path: Path) -> Iterator[Driver]:
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the past be thinned soon."""
-    monkeypatch.setattr(moments, "_FEWEST", 20)
-    monkeypatch.setattr(session, "History", lambda dt, most=0: moments.History(dt, 60_000))
+    monkeypatch.setattr(history, "MIN_STATES", 20)
+    monkeypatch.setattr(present, "RunHistory", lambda dt: history.RunHistory(dt, 60_000))

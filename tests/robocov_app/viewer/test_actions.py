@@ -135,15 +135,25 @@ def state_of(driver: Driver) -> list[object]:
         viewer.hand.selected,
         viewer.message,
         viewer.map_name,
-        session.playing,
-        session.time,
-        session.end,
+        session.playback.is_playing,
+        session.displayed.time,
+        session.timeline.end_time,
     ]
-    told += [session.serial, session.clock.speed, session.stop_when_settled, session.environment]
-    told += [session.scenario, len(session.panes), [pane.law for pane in session.panes], camera]
+    told += [
+        session.timeline.past_version,
+        session.playback.clock.speed,
+        session.playback.stop_when_settled,
+        session.displayed.environment,
+    ]
+    told += [
+        session.timeline.scenario,
+        len(session.timeline.panes),
+        [pane.controller for pane in session.timeline.panes],
+        camera,
+    ]
     told += [
         viewer.tool.preview(session),
-        session.setup(session.panes[0]),
+        session.displayed.get_setup(session.timeline.panes[0]),
         its.help,
         its.dialogs.open,
         its.tour,
@@ -189,23 +199,23 @@ def prepared(driver: Driver) -> Driver:
     its.dialogs.close()
     its._end_tour()
     viewer.attempt(lambda: viewer.open_map("square"))
-    while len(session.panes) > 1:
-        session.remove_pane(session.panes[-1])
+    while len(session.timeline.panes) > 1:
+        session.remove_pane(session.timeline.panes[-1])
     viewer.add_pane()
     for _ in range(90):
-        session.step()
+        session.playback.step()
     viewer.hand.selected = 2
     session.add_robot((8.0, 8.0))
     session.add_robot((8.0, 2.0))
     session.undo()
-    session.playing = False
+    session.playback.is_playing = False
     do(viewer, "tool:polygon")
     viewer.tool.press(session, (6.0, 6.0), 0.1, None)
     viewer.tool.press(session, (7.0, 6.0), 0.1, None)
     viewer.tool.press(session, (7.0, 7.0), 0.1, None)
     viewer.tool.move(session, (6.5, 7.5))
-    session.step()
-    session.look_at(0.7)
+    session.playback.step()
+    session.show_time(0.7)
     its.canvas.fit()
     its.canvas.zoom(1.4, (200, 200))
     its.canvas.pan(20, 20)

@@ -10,8 +10,8 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, positions_of, s
 
 from robocov.environment import CircleObstacle
 from robocov.errors import StartError
-from robocov_app.viewer.session import session as module
-from robocov_app.viewer.session.scenario import TeamSpec
+from robocov_app.viewer.session import lockstep as module
+from robocov_app.viewer.session.robot_properties import RobotProperties
 
 # branches
 
@@ -20,11 +20,11 @@ from robocov_app.viewer.session.scenario import TeamSpec
 def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
     session = stepped(begun(*laws, robots=4), 100)
     end = positions_of(session)
-    session.look_at(0.5)
+    session.show_time(0.5)
     assert session.branch()
-    assert session.live
-    assert session.end == pytest.approx(0.5)
-    assert session.history.steps[-1] == 30
+    assert session.timeline.is_live
+    assert session.timeline.end_time == pytest.approx(0.5)
+    assert session.timeline.history.steps[-1] == 30
     stepped(session, 70)
     for now, before in zip(positions_of(session), end, strict=True):
         # bit for bit
@@ -33,15 +33,17 @@ def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
 
 def test_so_it_does_from_a_thinned_past_after_touches(short):
     session = stepped(begun(RAPF, LLOYD, robots=4), 100)
-    session.edit(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn")
+    session.edit_map(
+        replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn"
+    )
     session.fail_robot(3)
     stepped(session, 400)
     end = positions_of(session)
-    assert session.history.thinned > 0
-    session.look_at(2.5)
+    assert session.timeline.history.thinned > 0
+    session.show_time(2.5)
     assert session.branch()
-    while session.end < 500 / 60 - 1e-9:
-        session.step()
+    while session.timeline.end_time < 500 / 60 - 1e-9:
+        session.playback.step()
     for now, before in zip(positions_of(session), end, strict=True):
         np.testing.assert_array_equal(now, before)
 
@@ -49,49 +51,51 @@ def test_so_it_does_from_a_thinned_past_after_touches(short):
 def test_a_branch_leaves_a_ghost():
     session = begun(RAPF, LLOYD)
     with_curves(session, 60)
-    serial = session.serial
-    session.look_at(0.5)
+    serial = session.timeline.past_version
+    session.show_time(0.5)
     assert session.branch()
-    assert session.serial == serial + 1
-    assert [ghost.law for ghost in session.ghosts] == ["rapf", "lloyd"]
-    assert [ghost.words for ghost in session.ghosts] == ["RAPF", "Lloyd"]
-    for ghost in session.ghosts:
-        assert ghost.time[0] == pytest.approx(0.5)
-        assert ghost.time[-1] == pytest.approx(59 / 60)
-    for pane in session.panes:
-        assert pane.curve.last_time == pytest.approx(0.5)
+    assert session.timeline.past_version == serial + 1
+    assert [ghost.controller for ghost in session.timeline.ghosts] == ["rapf", "lloyd"]
+    assert [ghost.description for ghost in session.timeline.ghosts] == ["RAPF", "Lloyd"]
+    for ghost in session.timeline.ghosts:
+        assert ghost.times[0] == pytest.approx(0.5)
+        assert ghost.times[-1] == pytest.approx(59 / 60)
+    for pane in session.timeline.panes:
+        assert pane.distance_curve.last_time == pytest.approx(0.5)
         assert pane.time == pytest.approx(0.5)
-        assert pane.trail.time[-1] == pytest.approx(0.5)
-    assert [pane.curve.at(session.time) for pane in session.panes] == pytest.approx([2.5, 2.5])
+        assert pane.trail.times[-1] == pytest.approx(0.5)
+    assert [
+        pane.distance_curve.interpolate(session.displayed.time) for pane in session.timeline.panes
+    ] == pytest.approx([2.5, 2.5])
 
 
 def test_the_present_is_no_branch():
     session = stepped(begun(), 10)
     before = all_told(session)
     assert not session.branch()
-    session.look_at(99.0)
+    session.show_time(99.0)
     assert not session.branch()
     assert all_told(session) == before
 
 
 def test_a_branch_takes_back_what_was_chosen_later():
     session = stepped(begun(RAPF, RPF), 20)
-    session.set_law(session.panes[0], LLOYD)
-    session.set_limits(TeamSpec(max_speed=0.5))
-    session.edit(replace(HALL, obstacles=()), "emptied")
+    session.set_controller(session.timeline.panes[0], LLOYD)
+    session.set_properties(RobotProperties(max_speed=0.5))
+    session.edit_map(replace(HALL, obstacles=()), "emptied")
     session.add_robot((1.0, 3.0))
     stepped(session, 20)
-    session.look_at(10 / 60)
-    assert session.environment is HALL
-    assert session.numbers == (1, 2, 3)
+    session.show_time(10 / 60)
+    assert session.displayed.environment is HALL
+    assert session.displayed.numbers == (1, 2, 3)
     session.branch()
-    assert [pane.law for pane in session.panes] == [RAPF, RPF]
-    assert session.scenario.laws == (RAPF, RPF)
-    assert session.scenario.limits == TeamSpec()
-    assert session.scenario.environment is HALL
-    assert session.panes[0].starts.shape == (3, 2)
-    assert list(session.events) == []
-    assert session.head.parent is None
+    assert [pane.controller for pane in session.timeline.panes] == [RAPF, RPF]
+    assert session.timeline.scenario.controllers == (RAPF, RPF)
+    assert session.timeline.scenario.properties == RobotProperties()
+    assert session.timeline.scenario.environment is HALL
+    assert session.timeline.panes[0].starts.shape == (3, 2)
+    assert list(session.timeline.events) == []
+    assert session.timeline.head.parent is None
     stepped(session, 5)
 
 
@@ -101,25 +105,25 @@ def test_events_up_to_the_branch_stay():
     stepped(session, 10)
     session.fail_robot(3)
     stepped(session, 10)
-    session.look_at(10 / 60)
+    session.show_time(10 / 60)
     session.branch()
-    assert [event.text for event in session.events] == ["robot 2 failed"]
-    assert session.numbers == (1, 3)
+    assert [event.text for event in session.timeline.events] == ["robot 2 failed"]
+    assert session.displayed.numbers == (1, 3)
 
 
 def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
     session = begun(RAPF, RPF)
     with_curves(session, 40)
-    session.look_at(0.3)
+    session.show_time(0.3)
     before = all_told(session)
 
     def no_room(moment):
         raise StartError("no room")
 
-    monkeypatch.setattr(module.Lockstep, "resumed", no_room)
+    monkeypatch.setattr(module.Lockstep, "resume", no_room)
     for touch in (
         session.branch,
-        lambda: session.set_law(session.panes[0], LLOYD),
+        lambda: session.set_controller(session.timeline.panes[0], LLOYD),
         lambda: session.fail_robot(1),
     ):
         with pytest.raises(StartError, match="no room"):
@@ -133,22 +137,27 @@ def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
 def test_a_slider_that_is_dragged_is_one_event():
     session = stepped(begun(RAPF, RPF), 3)
     for k in range(1, 20):
-        session.set_law(session.panes[0], RAPF.with_gain("k_rep", k / 10))
-        session.step()
+        session.set_controller(session.timeline.panes[0], RAPF.with_gain("k_rep", k / 10))
+        session.playback.step()
     for k in range(1, 20):
-        session.set_law(session.panes[0], session.panes[0].law.with_gain("k_att", k / 10))
-        session.step()
+        session.set_controller(
+            session.timeline.panes[0], session.timeline.panes[0].controller.with_gain("k_att", k / 10)
+        )
+        session.playback.step()
     for k in range(1, 20):
-        session.set_limits(TeamSpec(max_speed=k / 10))
-        session.step()
-    assert [event.text for event in session.events] == [
+        session.set_properties(RobotProperties(max_speed=k / 10))
+        session.playback.step()
+    assert [event.text for event in session.timeline.events] == [
         "RAPF: k_rep = 1.9",
         "RAPF: k_att = 1.9",
         "limits changed",
     ]
     # later it is another one
     stepped(session, 70)
-    session.set_limits(TeamSpec(max_speed=3.0))
-    session.set_law(session.panes[0], LLOYD)
-    session.set_law(session.panes[1], LLOYD)
-    assert [event.text for event in session.events][3:] == ["limits changed", *["Lloyd takes over"] * 2]
+    session.set_properties(RobotProperties(max_speed=3.0))
+    session.set_controller(session.timeline.panes[0], LLOYD)
+    session.set_controller(session.timeline.panes[1], LLOYD)
+    assert [event.text for event in session.timeline.events][3:] == [
+        "limits changed",
+        *["Lloyd takes over"] * 2,
+    ]

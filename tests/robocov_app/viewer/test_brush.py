@@ -15,7 +15,12 @@ from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
 from robocov_app.render.density import density_range
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.session.map_edits import CELLS, LEAST, MOST, painted_raster
+from robocov_app.viewer.session.map_edits import (
+    MAX_PAINTED_DENSITY,
+    MIN_PAINTED_DENSITY,
+    PAINTED_RASTER_CELLS,
+    build_paintable_raster,
+)
 from robocov_app.viewer.tools import Brush
 
 REACH = 0.1
@@ -30,7 +35,7 @@ def stroke(brush, session, *points, lowers=False) -> str | None:
 
 
 def value_at(session, point) -> float:
-    density = session.environment.density
+    density = session.displayed.environment.density
     return 1.0 if density is None else float(density.evaluate(np.array([point]))[0])
 
 
@@ -44,27 +49,27 @@ def test_left_raises_and_right_lowers():
     assert value_at(session, (1.5, 1.0)) == pytest.approx(1.0, abs=0.01)
     for _ in range(60):
         stroke(brush, session, (5.0, 3.0), (5.2, 3.0), lowers=True)
-    low, _ = density_range(session.environment)
-    assert low == pytest.approx(LEAST, abs=0.02)
+    low, _ = density_range(session.displayed.environment)
+    assert low == pytest.approx(MIN_PAINTED_DENSITY, abs=0.02)
     for _ in range(90):
         stroke(brush, session, (5.0, 3.0), (5.2, 3.0))
-    assert density_range(session.environment)[1] == pytest.approx(MOST, rel=0.1)
+    assert density_range(session.displayed.environment)[1] == pytest.approx(MAX_PAINTED_DENSITY, rel=0.1)
 
 
 def test_a_stroke_is_undone_as_a_whole_and_done_again():
     brush, session = Brush(radius=0.5), stepped(begun(), 5)
-    before = session.environment
+    before = session.displayed.environment
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0), (3.0, 2.0))
-    painted = session.environment
+    painted = session.displayed.environment
     stroke(brush, session, (4.0, 3.0), (4.5, 3.0))
     assert session.undo() == "density raised"
-    assert session.environment == painted
+    assert session.displayed.environment == painted
     session.undo()
-    assert session.environment == before and session.environment.density is None
-    assert session.head.parent is None
+    assert session.displayed.environment == before and session.displayed.environment.density is None
+    assert session.timeline.head.parent is None
     session.redo()
-    assert session.environment == painted
-    assert [event.kind for event in session.events] == ["density"]
+    assert session.displayed.environment == painted
+    assert [event.kind for event in session.timeline.events] == ["density"]
 
 
 def test_robots_know_of_it_while_it_is_painted():
@@ -75,13 +80,13 @@ def test_robots_know_of_it_while_it_is_painted():
         now[0] += 0.1
         brush.move(session, (5.0 - 0.02 * k, 3.0))
         stepped(session, 1)
-        for pane in session.panes:
-            assert pane.simulation.observe_and_decide().seen.density is session.environment.density
-    assert session.environment.density is not None
-    assert session.head.parent is not None
+        for pane in session.timeline.panes:
+            assert pane.simulation.observe_and_decide().seen.density is session.displayed.environment.density
+    assert session.displayed.environment.density is not None
+    assert session.timeline.head.parent is not None
     assert brush.painting
     brush.release(session, (4.6, 3.0))
-    assert not brush.painting and session.head.parent is not None
+    assert not brush.painting and session.timeline.head.parent is not None
 
 
 def test_it_does_not_tell_the_robots_more_often_than_is_seen():
@@ -91,17 +96,17 @@ def test_it_does_not_tell_the_robots_more_often_than_is_seen():
     for k in range(200):
         now[0] += 0.01
         brush.move(session, (1.0 + 0.02 * k, 1.0))
-        told.append(session.environment.density)
+        told.append(session.displayed.environment.density)
     assert 15 <= len(set(map(id, told))) <= 30
 
 
 def test_escape_gives_the_stroke_up():
     brush, session = Brush(radius=1.0), begun()
-    before = session.environment
+    before = session.displayed.environment
     brush.press(session, (1.0, 1.0), REACH, None)
-    assert session.environment != before
+    assert session.displayed.environment != before
     assert brush.cancel(session)
-    assert session.environment == before and session.head.parent is None
+    assert session.displayed.environment == before and session.timeline.head.parent is None
     assert brush.release(session, (1.0, 1.0)) is None
     assert brush.preview(session) is None
 
@@ -109,17 +114,20 @@ def test_escape_gives_the_stroke_up():
 def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
     """Only the density changes: nobody is pushed, and an obstacle of in between stays."""
     brush, session = Brush(radius=0.5), stepped(begun(), 3)
-    places = session.panes[0].simulation.positions.copy()
+    places = session.timeline.panes[0].simulation.positions.copy()
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0))
-    assert np.array_equal(session.panes[0].simulation.positions, places)
+    assert np.array_equal(session.timeline.panes[0].simulation.positions, places)
     pillar = CircleObstacle((5.0, 2.5), 0.2)
-    with_pillar = replace(session.environment, obstacles=(*HALL.obstacles, pillar))
-    session.edit(with_pillar, "circle drawn")
+    with_pillar = replace(session.displayed.environment, obstacles=(*HALL.obstacles, pillar))
+    session.edit_map(with_pillar, "circle drawn")
     stroke(brush, session, (3.0, 1.0), (3.5, 1.0))
-    assert session.environment.obstacles == with_pillar.obstacles
+    assert session.displayed.environment.obstacles == with_pillar.obstacles
     for _ in range(3):
         session.undo()
-    assert session.environment.obstacles == HALL.obstacles and session.environment.density is None
+    assert (
+        session.displayed.environment.obstacles == HALL.obstacles
+        and session.displayed.environment.density is None
+    )
 
 
 def test_another_map_in_the_midst_of_a_stroke_ends_it():
@@ -128,17 +136,20 @@ def test_another_map_in_the_midst_of_a_stroke_ends_it():
     session.restart(environment=load_map("square"))
     brush.move(session, (2.0, 1.0))
     assert brush.release(session, (2.0, 1.0)) is None
-    assert session.environment.boundary == load_map("square").boundary
+    assert session.displayed.environment.boundary == load_map("square").boundary
 
 
 def test_what_is_painted_on():
     peak = Gaussians((Gaussian((2.0, 2.0), 3.0, sigma=0.5),), 0.5)
-    raster = painted_raster(HALL.with_density(peak))
-    assert raster.values.shape == (round(CELLS * 4 / 6), CELLS) and raster.extent == (0.0, 0.0, 6.0, 4.0)
-    assert painted_raster(HALL.with_density(raster)) is raster
-    assert painted_raster(HALL.with_density(Uniform(2.0))).values.max() == 2.0
+    raster = build_paintable_raster(HALL.with_density(peak))
+    assert raster.values.shape == (
+        round(PAINTED_RASTER_CELLS * 4 / 6),
+        PAINTED_RASTER_CELLS,
+    ) and raster.extent == (0.0, 0.0, 6.0, 4.0)
+    assert build_paintable_raster(HALL.with_density(raster)) is raster
+    assert build_paintable_raster(HALL.with_density(Uniform(2.0))).values.max() == 2.0
     cells = Raster(np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0), "cells")
-    assert painted_raster(HALL.with_density(cells)).interpolation == "bilinear"
+    assert build_paintable_raster(HALL.with_density(cells)).interpolation == "bilinear"
 
 
 def test_its_size():
@@ -180,11 +191,13 @@ def test_in_the_window(tmp_path):
         assert driver.viewer.message == "density lowered"
         assert high > 1.1 and value_at(driver.session, (4.8, 3.2)) < 0.9
         assert not driver.same(plain)
-        assert {pane.setup.environment for pane in driver.session.panes} == {driver.session.environment}
+        assert {pane.setup.environment for pane in driver.session.timeline.panes} == {
+            driver.session.displayed.environment
+        }
         driver.key("ctrl+shift+s")
-        assert load_map(driver.viewer.map_name) == driver.session.environment
+        assert load_map(driver.viewer.map_name) == driver.session.displayed.environment
         driver.key("ctrl+z", 2)
-        assert driver.session.environment.density is None
+        assert driver.session.displayed.environment.density is None
         assert "φ" not in driver.window.canvas._scenes[0].cost
         driver.key("ctrl+y")
         driver.frames(3)

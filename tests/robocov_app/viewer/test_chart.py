@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from robocov_app.render.canvas import Canvas
 from robocov_app.viewer.chart import curve_colors, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.controller_choice import ControllerChoice
 
 
 @pytest.fixture
@@ -26,9 +26,9 @@ def driver(tmp_path: Path) -> Iterator[Driver]:
 
 
 def played(driver: Driver, frames: int = 60) -> None:
-    driver.session.playing = True
+    driver.session.playback.is_playing = True
     driver.frames(frames)
-    driver.session.playing = False
+    driver.session.playback.is_playing = False
     driver.frames(8)
 
 
@@ -81,10 +81,10 @@ def test_times_keep_apart_in_a_narrow_chart(
 def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
     played(driver)
     chart = driver.window.chart
-    for time in (0.0, 0.3, driver.session.end):
+    for time in (0.0, 0.3, driver.session.timeline.end_time):
         assert chart.time_at(chart.column(time)) == pytest.approx(time, abs=1e-9)
     assert chart.time_at(-100.0) == 0.0
-    assert chart.time_at(1e5) == driver.session.end
+    assert chart.time_at(1e5) == driver.session.timeline.end_time
 
 
 def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> None:
@@ -92,9 +92,9 @@ def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> 
     window = driver.window
     left, top, width, height = window.layout.chart
     picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
-    for pane in driver.session.panes:
-        color = np.array(curve_colors(driver.session.panes, window.theme)[pane.number])
-        assert (np.abs(picture - color).max(axis=2) < 12).sum() > 20, pane.law.name
+    for pane in driver.session.timeline.panes:
+        color = np.array(curve_colors(driver.session.timeline.panes, window.theme)[pane.number])
+        assert (np.abs(picture - color).max(axis=2) < 12).sum() > 20, pane.controller.name
 
 
 def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
         ControllerChoice("rpf"),
         ControllerChoice("rpf"),
     ) as driver:
-        colors = set(curve_colors(driver.session.panes, driver.window.theme).values())
+        colors = set(curve_colors(driver.session.timeline.panes, driver.window.theme).values())
         assert len(colors) == 4
 
 
@@ -116,7 +116,7 @@ def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.fail_robot(1))
     driver.frames(8)
     after = pixels(window.screen)
-    column = round(window.chart.column(driver.session.end))
+    column = round(window.chart.column(driver.session.timeline.end_time))
     _, top, _, height = window.layout.chart
     middle = top + height // 2
     changed = np.abs(after[middle].astype(int) - before[middle]).max(axis=1)
@@ -126,12 +126,12 @@ def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
 
 def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> None:
     played(driver)
-    first, second = driver.session.panes
-    last = first.curve.last_time
-    values = {pane.number: pane.curve.value[-1] for pane in (first, second)}
-    second.curve.add(last + 0.01, 99.0)
-    driver.session._run.step += 60
-    time, known = driver.session.compared()
+    first, second = driver.session.timeline.panes
+    last = first.distance_curve.last_time
+    values = {pane.number: pane.distance_curve.values[-1] for pane in (first, second)}
+    second.distance_curve.add(last + 0.01, 99.0)
+    driver.session.timeline.run.step += 60
+    time, known = driver.session.displayed.get_costs()
     assert time == last
     assert known == pytest.approx(values)
 
@@ -141,7 +141,7 @@ def test_what_is_of_the_past_is_shown_at_once_also_at_one_second(driver: Driver)
     _, top, width, height = driver.window.layout.chart
     live = pixels(driver.window.screen)[top : top + height, width - 150 : width].copy()
     # one second exactly is as true as true is
-    driver.session.look_at(1.0)
-    assert driver.session.time == 1.0 and not driver.session.live
+    driver.session.show_time(1.0)
+    assert driver.session.displayed.time == 1.0 and not driver.session.timeline.is_live
     driver.frames(1)
     assert not np.array_equal(pixels(driver.window.screen)[top : top + height, width - 150 : width], live)

@@ -15,13 +15,18 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.viewer.session.file import load_session
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import Workspace, recoverable, recovered
+from robocov_app.viewer.session.workspace import SessionWorkspace, find_recoverable_drafts, recover_draft
 
 ROOM = Environment("room", ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)))
 
 
 def state(session: Session) -> tuple[list[np.ndarray], float, tuple[int, ...], int]:
-    return positions_of(session), session.end, session.numbers, len(session.environment.obstacles)
+    return (
+        positions_of(session),
+        session.timeline.end_time,
+        session.displayed.numbers,
+        len(session.displayed.environment.obstacles),
+    )
 
 
 def assert_same(one: tuple, other: tuple) -> None:
@@ -31,16 +36,16 @@ def assert_same(one: tuple, other: tuple) -> None:
 
 
 def play(driver: Driver) -> None:
-    driver.session.playing = True
+    driver.session.playback.is_playing = True
     driver.frames(10)
-    driver.session.playing = False
+    driver.session.playback.is_playing = False
 
 
 @pytest.mark.slow
 def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     left = tmp_path / "left"
     with opened(tmp_path, RAPF, environment=ROOM, robots=4) as driver:
-        driver.viewer.workspace = Workspace(driver.session, left)
+        driver.viewer.workspace = SessionWorkspace(driver.session, left)
         play(driver)
         driver.key("w")
         driver.click_at((3.0, 0.02))
@@ -58,12 +63,22 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
         driver.key("k")  # compare: all begin anew
         play(driver)
         compared = state(driver.session)
-        assert [len(driver.session.document.branches()), len(driver.session.panes)] == [2, 2]
+        assert [
+            len(driver.session.timeline.document.list_branches()),
+            len(driver.session.timeline.panes),
+        ] == [
+            2,
+            2,
+        ]
         undone = 0
-        while driver.session.head.parent is not None:
+        while driver.session.timeline.head.parent is not None:
             driver.key("ctrl+z")
             undone += 1
-        assert undone == 2 and driver.session.end == 0.2 and not driver.session.environment.obstacles
+        assert (
+            undone == 2
+            and driver.session.timeline.end_time == 0.2
+            and not driver.session.displayed.environment.obstacles
+        )
         for _ in range(undone):
             driver.key("ctrl+y")
         assert_same(state(driver.session), compared)
@@ -77,17 +92,21 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
         last = state(driver.session)
         workspace = driver.viewer.workspace
         workspace._when = -1e9
-        workspace.keep({})
+        workspace.save_draft({})
         assert workspace._autosaver.flush()
         workspace._autosaver._lock.close()  # kill -9
-    (found,) = recoverable(left)
-    again, _ = recovered(found, (), left)
+    (found,) = find_recoverable_drafts(left)
+    again, _ = recover_draft(found, (), left)
     assert_same(state(again.session), last)
-    branch = next(each for each in again.session.document.branches() if each.words == "robot 2 failed")
-    again.session.enter(branch.node)
+    branch = next(
+        each
+        for each in again.session.timeline.document.list_branches()
+        if each.description == "robot 2 failed"
+    )
+    again.session.seek(branch.node)
     assert_same(state(again.session), failed)
     again.close()
-    assert_same(state(Session.opened(load_session(file))), compared)
+    assert_same(state(Session.open(load_session(file))), compared)
     small = ["--lattice", "16", "--size", "320x240", "--fps", "5", "--video", "--json"]
     assert main(["run", str(file), "--all-branches", "--out", str(tmp_path / "told"), *small]) == 0
     stories = json.loads(capsys.readouterr().out)["stories"]

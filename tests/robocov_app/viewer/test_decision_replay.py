@@ -5,8 +5,8 @@ import pytest
 from touched_run import LLOYD, RAPF, RPF, begun, stepped
 
 from robocov_app.viewer.session import decision_replay as module
-from robocov_app.viewer.session.decision_replay import replayed_snapshot
-from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.decision_replay import rebuild_snapshot
 
 MINE = """
 from dataclasses import dataclass
@@ -54,13 +54,13 @@ def file(tmp_path_factory):
 @pytest.mark.parametrize("law", [RAPF, RPF, LLOYD])
 def test_the_past_is_explained_as_it_was(law):
     session = begun(law)
-    pane = session.panes[0]
+    pane = session.timeline.panes[0]
     seen = []
     for _ in range(20):
         seen.append(pane.simulation.observe_and_decide())
-        session.step()
+        session.playback.step()
     for k in (13, 2, 19, 0):
-        told = replayed_snapshot(session.history[k].states[0], session.history.time(k))
+        told = rebuild_snapshot(session.timeline.history[k].states[0], session.timeline.history.get_time(k))
         assert told.time == pytest.approx(seen[k].time)
         for name in ("positions", "velocities", "obstacle_points"):
             np.testing.assert_array_equal(getattr(told.seen, name), getattr(seen[k].seen, name))
@@ -72,16 +72,18 @@ def test_a_controller_may_remember_what_it_did(file):
     session = stepped(begun(ControllerChoice(f"{file}:Counting")), 10)
     for k in (3, 8):
         for _ in range(3):
-            told = replayed_snapshot(session.history[k].states[0], session.history.time(k))
+            told = rebuild_snapshot(
+                session.timeline.history[k].states[0], session.timeline.history.get_time(k)
+            )
             assert told.decision.forces[0, 0] == k + 1.0
 
 
 @pytest.mark.parametrize("way", range(5))
 def test_a_controller_that_fails_decided_nothing(file, way):
     session = stepped(begun(ControllerChoice(f"{file}:Late", {"way": float(way)})), 3)
-    state = session.history[2].states[0]
-    assert replayed_snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
-    told = replayed_snapshot(state, 1.0)
+    state = session.timeline.history[2].states[0]
+    assert rebuild_snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
+    told = rebuild_snapshot(state, 1.0)
     assert told.decision.forces.tolist() == np.zeros((3, 2)).tolist()
     assert told.decision.goals is None
     np.testing.assert_array_equal(told.positions, state.positions)
@@ -92,10 +94,10 @@ def test_panes_do_not_take_turns_in_preparing_the_map(monkeypatch):
     made = []
     real = module.RangeSensor
     monkeypatch.setattr(module, "RangeSensor", lambda pieces, movers=(): made.append(1) or real(pieces))
-    module.sensor_in.cache_clear()
-    session.look_at(0.0)
+    module.get_sensor.cache_clear()
+    session.show_time(0.0)
     for _ in range(5):
-        for pane in session.panes:
-            session.snapshot(pane)
+        for pane in session.timeline.panes:
+            session.displayed.get_snapshot(pane)
     assert len(made) == 1
-    module.sensor_in.cache_clear()
+    module.get_sensor.cache_clear()

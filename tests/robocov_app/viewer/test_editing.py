@@ -18,15 +18,15 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
 from robocov_app.viewer.session.map_edits import (
-    SHORTEST,
-    circle_of,
-    moved,
-    obstacle_at,
-    polygon_of,
-    wall_of,
-    with_obstacle,
-    with_replaced,
-    words_for,
+    MIN_SHAPE_SIZE_M,
+    add_obstacle,
+    build_circle,
+    build_polygon,
+    build_wall,
+    describe_obstacle,
+    find_obstacle,
+    move_obstacle,
+    replace_obstacles,
 )
 
 SQUARE = ((0, 0), (8, 0), (8, 8), (0, 8))
@@ -41,43 +41,43 @@ points = st.tuples(places, places)
 
 def test_one_more_one_less():
     circle = CircleObstacle((1.0, 6.0), 0.4)
-    more = with_obstacle(YARD, circle)
+    more = add_obstacle(YARD, circle)
     assert more.obstacles == (BLOCK, PILLAR, WALL, circle)
     assert YARD.obstacles == (BLOCK, PILLAR, WALL)
-    assert with_replaced(more, 3, 1) == YARD
-    assert with_replaced(YARD, 1, 1).obstacles == (BLOCK, WALL)
+    assert replace_obstacles(more, 3, 1) == YARD
+    assert replace_obstacles(YARD, 1, 1).obstacles == (BLOCK, WALL)
     assert (more.name, more.boundary, more.starts) == (YARD.name, YARD.boundary, YARD.starts)
 
 
 @given(st.integers(0, 2), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_an_obstacle_moves_and_comes_back(index, dx, dy):
-    there = with_replaced(YARD, index, 1, [moved(YARD.obstacles[index], dx, dy)])
+    there = replace_obstacles(YARD, index, 1, [move_obstacle(YARD.obstacles[index], dx, dy)])
     assert [k for k in range(3) if k != index and there.obstacles[k] != YARD.obstacles[k]] == []
     was, now = YARD.obstacles[index].polygon, there.obstacles[index].polygon
     assert now.area == pytest.approx(was.area, rel=1e-3)
     assert now.centroid.x - was.centroid.x == pytest.approx(dx, abs=1e-4)
     assert now.centroid.y - was.centroid.y == pytest.approx(dy, abs=1e-4)
-    back = with_replaced(there, index, 1, [moved(there.obstacles[index], -dx, -dy)])
+    back = replace_obstacles(there, index, 1, [move_obstacle(there.obstacles[index], -dx, -dy)])
     assert back.obstacles[index].polygon.equals_exact(was, 1e-3)
 
 
 def test_names_and_widths_move_along():
-    assert moved(PILLAR, 1.0, 0.5) == CircleObstacle((6.0, 5.5), 1.0, "pillar")
-    assert moved(WALL, 0.5, 0.00001).points == ((6.5, 1), (6.5, 3), (7.5, 3))
-    assert moved(BLOCK, 1, 0).holes == (((2.5, 1.5), (3.5, 1.5), (3.5, 2.5), (2.5, 2.5)),)
+    assert move_obstacle(PILLAR, 1.0, 0.5) == CircleObstacle((6.0, 5.5), 1.0, "pillar")
+    assert move_obstacle(WALL, 0.5, 0.00001).points == ((6.5, 1), (6.5, 3), (7.5, 3))
+    assert move_obstacle(BLOCK, 1, 0).holes == (((2.5, 1.5), (3.5, 1.5), (3.5, 2.5), (2.5, 2.5)),)
 
 
 @given(st.lists(points, min_size=1, max_size=6), st.integers(0, 2))
 def test_what_is_edited_is_as_a_file_would_give_it(corners, kind):
     try:
         drawn = (
-            polygon_of(corners)
+            build_polygon(corners)
             if kind == 0
-            else wall_of(corners, 0.1)
+            else build_wall(corners, 0.1)
             if kind == 1
-            else circle_of(corners[0], corners[-1])
+            else build_circle(corners[0], corners[-1])
         )
-        edited = with_obstacle(YARD, drawn)
+        edited = add_obstacle(YARD, drawn)
     except MapError as error:
         assert "\n" not in str(error)
         assert not str(error).startswith("map:")
@@ -88,7 +88,7 @@ def test_what_is_edited_is_as_a_file_would_give_it(corners, kind):
 
 def test_a_map_without_free_space_is_refused():
     with pytest.raises(MapError, match=r"^obstacles: no free space is left inside the boundary"):
-        with_obstacle(YARD, CircleObstacle((4, 4), 20.0))
+        add_obstacle(YARD, CircleObstacle((4, 4), 20.0))
 
 
 class TestStarts:
@@ -111,48 +111,48 @@ class TestStarts:
         [((1, 1), "a"), ((7, 7), "ab"), ((7, 1), "the hall"), ((1, 7), "a.b"), ((4, 4.4), "given")],
     )
     def test_what_covers_a_start_takes_that_one_away(self, center, gone):
-        covered = with_obstacle(self.YARD, CircleObstacle(center, 0.8))
+        covered = add_obstacle(self.YARD, CircleObstacle(center, 0.8))
         assert set(self.YARD.starts) - set(covered.starts) == {gone}
         assert list(covered.starts) == [name for name in self.YARD.starts if name != gone]
 
     def test_several_at_once(self):
-        covered = with_obstacle(self.YARD, PolygonObstacle(((0, 0), (8, 0), (8, 6), (0, 6))))
+        covered = add_obstacle(self.YARD, PolygonObstacle(((0, 0), (8, 0), (8, 6), (0, 6))))
         assert list(covered.starts) == ["ab", "a.b", "uniform"]
 
     def test_all_but_a_crack(self):
-        crack = with_obstacle(self.YARD, PolygonObstacle(((0, 0), (8, 0), (8, 7.99), (0, 7.99))))
+        crack = add_obstacle(self.YARD, PolygonObstacle(((0, 0), (8, 0), (8, 7.99), (0, 7.99))))
         assert dict(crack.starts) == {}
 
 
 class TestObstacleAt:
     def test_under_the_point(self):
-        assert obstacle_at(YARD, (1.2, 2.0)) == 0
-        assert obstacle_at(YARD, (5.5, 5.5)) == 1
-        assert obstacle_at(YARD, (6.05, 2.0)) == 2
-        assert obstacle_at(YARD, (4.0, 7.0)) is None
+        assert find_obstacle(YARD, (1.2, 2.0)) == 0
+        assert find_obstacle(YARD, (5.5, 5.5)) == 1
+        assert find_obstacle(YARD, (6.05, 2.0)) == 2
+        assert find_obstacle(YARD, (4.0, 7.0)) is None
         # a courtyard is no obstacle
-        assert obstacle_at(YARD, (2.0, 2.0)) is None
-        assert obstacle_at(Environment("empty", SQUARE), (1.0, 1.0), 5.0) is None
+        assert find_obstacle(YARD, (2.0, 2.0)) is None
+        assert find_obstacle(Environment("empty", SQUARE), (1.0, 1.0), 5.0) is None
 
     def test_within_reach(self):
-        assert obstacle_at(YARD, (3.2, 2.0), 0.1) is None
-        assert obstacle_at(YARD, (3.2, 2.0), 0.3) == 0
+        assert find_obstacle(YARD, (3.2, 2.0), 0.1) is None
+        assert find_obstacle(YARD, (3.2, 2.0), 0.3) == 0
 
     def test_the_topmost(self):
-        assert obstacle_at(with_obstacle(YARD, CircleObstacle((5, 5), 0.5)), (5, 5)) == 3
+        assert find_obstacle(add_obstacle(YARD, CircleObstacle((5, 5), 0.5)), (5, 5)) == 3
 
     def test_rather_what_is_under_the_point_than_what_is_near(self):
-        near = with_obstacle(YARD, CircleObstacle((5, 6.3), 0.2))
-        assert obstacle_at(near, (5.0, 5.95), 0.3) == 1
-        assert obstacle_at(near, (5.0, 6.09), 0.3) == 3
+        near = add_obstacle(YARD, CircleObstacle((5, 6.3), 0.2))
+        assert find_obstacle(near, (5.0, 5.95), 0.3) == 1
+        assert find_obstacle(near, (5.0, 6.09), 0.3) == 3
 
 
 class TestDrawn:
     def test_polygons(self):
-        triangle = polygon_of([(0.0, 0.0), (1.0, 0.0), (0.0, 1.00004)])
+        triangle = build_polygon([(0.0, 0.0), (1.0, 0.0), (0.0, 1.00004)])
         assert triangle == PolygonObstacle(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
         # a click on the first corner, and one that was a double
-        assert polygon_of([(0, 0), (1, 0), (1, 0), (0, 1), (0, 0)]) == triangle
+        assert build_polygon([(0, 0), (1, 0), (1, 0), (0, 1), (0, 0)]) == triangle
 
     @pytest.mark.parametrize(
         "corners",
@@ -167,40 +167,40 @@ class TestDrawn:
     )
     def test_a_polygon_encloses_something(self, corners):
         with pytest.raises(MapError, match="three corners that enclose something"):
-            polygon_of(corners)
+            build_polygon(corners)
 
     @pytest.mark.parametrize(
         "corners", [[(0, 0), (2, 2), (2, 0), (0, 2)], [(0, 0), (4, 0), (4, 2), (1, -1), (0, 3)]]
     )
     def test_an_outline_does_not_cross_itself(self, corners):
         with pytest.raises(MapError, match="crosses itself"):
-            polygon_of(corners)
+            build_polygon(corners)
 
     def test_walls(self):
-        assert wall_of([(0, 0), (0, 0), (1.00001, 0)], 0.3) == WallObstacle(((0.0, 0.0), (1.0, 0.0)), 0.3)
+        assert build_wall([(0, 0), (0, 0), (1.00001, 0)], 0.3) == WallObstacle(((0.0, 0.0), (1.0, 0.0)), 0.3)
 
     def test_a_wall_may_go_all_the_way_round(self):
-        round_trip = wall_of([(1, 1), (3, 1), (3, 3), (1, 3), (1, 1)], 0.2)
+        round_trip = build_wall([(1, 1), (3, 1), (3, 3), (1, 3), (1, 1)], 0.2)
         assert len(round_trip.points) == 5
-        assert round_trip.polygon.covers(wall_of([(1, 2.8), (1, 1.2)], 0.2).polygon)
+        assert round_trip.polygon.covers(build_wall([(1, 2.8), (1, 1.2)], 0.2).polygon)
 
     @pytest.mark.parametrize("line", [[], [(0, 0)], [(0, 0), (0.01, 0)], [(1, 1), (1, 1)]])
     def test_a_wall_has_a_length(self, line):
         with pytest.raises(MapError, match="two points that are apart"):
-            wall_of(line, 0.1)
+            build_wall(line, 0.1)
 
     @given(points, st.floats(0.0, 10.0), st.floats(0.0, 2 * math.pi))
     def test_circles(self, center, radius, angle):
         rim = center[0] + radius * math.cos(angle), center[1] + radius * math.sin(angle)
-        assume(abs(radius - SHORTEST) > 1e-6)
-        if radius < SHORTEST:
+        assume(abs(radius - MIN_SHAPE_SIZE_M) > 1e-6)
+        if radius < MIN_SHAPE_SIZE_M:
             with pytest.raises(MapError, match="drag from its middle"):
-                circle_of(center, rim)
+                build_circle(center, rim)
         else:
-            circle = circle_of(center, rim)
+            circle = build_circle(center, rim)
             assert circle.radius == pytest.approx(radius, abs=1e-4)
             assert circle.center == pytest.approx(center, abs=1e-4)
 
 
 def test_words():
-    assert [words_for(each) for each in YARD.obstacles] == ["polygon", "circle “pillar”", "wall"]
+    assert [describe_obstacle(each) for each in YARD.obstacles] == ["polygon", "circle “pillar”", "wall"]

@@ -19,8 +19,8 @@ from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.display import open_display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import Launcher, Settings
-from robocov_app.viewer.session.scenario import ControllerChoice
-from robocov_app.viewer.session.workspace import Workspace, recoverable
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.workspace import SessionWorkspace, find_recoverable_drafts
 from robocov_app.viewer.status import cursor_words, facts, suggestion
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))
@@ -46,38 +46,41 @@ def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, 
         driver.frames(2)
         driver.window._ask_costs = lambda: None  # type: ignore[method-assign]  # no answer comes any more
         for _ in range(90):
-            session.step()
+            session.playback.step()
         words.clear()
         driver.settle()
-        for pane in session.panes:
-            value = f"{pane.curve.value[-1]:.3f}"
-            assert session.end - pane.curve.last_time > 1.0
-            caption = f"mean distance {value} m at {pane.curve.last_time:.1f} s"
+        for pane in session.timeline.panes:
+            value = f"{pane.distance_curve.values[-1]:.3f}"
+            assert session.timeline.end_time - pane.distance_curve.last_time > 1.0
+            caption = f"mean distance {value} m at {pane.distance_curve.last_time:.1f} s"
             assert caption in words and any(value in each and each != caption for each in words)
 
 
 def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session, window = driver.session, driver.window
-        wanted = {pane.number: pane.curve.at(0.0) for pane in session.panes}
-        for pane in session.panes:
+        wanted = {pane.number: pane.distance_curve.interpolate(0.0) for pane in session.timeline.panes}
+        for pane in session.timeline.panes:
             pane.curves["distance"].__init__()  # as if the worker had not begun yet
         for _ in range(90):
-            session.step()
+            session.playback.step()
         window.update(0.0)
         for playing in (True, False):
-            session.playing = playing
+            session.playback.is_playing = playing
             for _ in range(12):
                 window.update(1 / 50)
-                assert all(abs(each.time - session.time) < 0.1 for each in window.viewer.costs.known.values())
-        for pane in session.panes:
-            times, values = pane.curve.time, pane.curve.value
+                assert all(
+                    abs(each.time - session.displayed.time) < 0.1
+                    for each in window.viewer.costs.known.values()
+                )
+        for pane in session.timeline.panes:
+            times, values = pane.distance_curve.times, pane.distance_curve.values
             assert times[0] == 0.0 and np.diff(times).max() < 0.7 and values[0] == wanted[pane.number]
 
 
 def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
-        other = driver.session.panes[1]
+        other = driver.session.timeline.panes[1]
         other.simulation = other.simulation.with_changes(positions=other.simulation.positions + [0.3, 0.0])
         driver.viewer.costs.forget()
         said = []
@@ -101,23 +104,23 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
         driver.frames(2)
         words.clear()
         driver.settle()
-        for pane in driver.session.panes:
-            value = f"{pane.curve.at(0.0):.3f} m"
+        for pane in driver.session.timeline.panes:
+            value = f"{pane.distance_curve.interpolate(0.0):.3f} m"
             assert any(value in each for each in words), (size, boxes)
         columns = len({left for left, *_ in boxes})
         assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
         low, high = (
             driver.window.canvas.to_pixel((0.0, y), 0)[1]
-            for y in driver.session.environment.region.bounds[1::2]
+            for y in driver.session.displayed.environment.region.bounds[1::2]
         )
         across = (
             driver.window.canvas.to_pixel((1.0, 0.0), 0)[0] - driver.window.canvas.to_pixel((0.0, 0.0), 0)[0]
         )
-        bounds = driver.session.environment.region.bounds
+        bounds = driver.session.displayed.environment.region.bounds
         assert low - high > 0.65 * boxes[0][3] or across * (bounds[2] - bounds[0]) > 0.85 * boxes[0][2]
         (left, _, width, _), scale = driver.window.layout.chart, driver.window.layout.scale
         room = left + width - driver.window.chart._span[1] - 9 * scale
-        name = max((pane.law.label for pane in driver.session.panes), key=len)
+        name = max((pane.controller.label for pane in driver.session.timeline.panes), key=len)
         assert (
             text_width(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True) <= room
         )
@@ -127,8 +130,8 @@ def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
     tmp_path: Path, words: list[str]
 ) -> None:
     with opened(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
-        for pane, value in zip(driver.session.panes, (1.856, 4.023), strict=True):
-            pane.curve.add(0.0, value)
+        for pane, value in zip(driver.session.timeline.panes, (1.856, 4.023), strict=True):
+            pane.distance_curve.add(0.0, value)
         words.clear()
         driver.window.draw()
         assert "RAPF  4.023  +117 %" in words
@@ -146,7 +149,7 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
     with opened(tmp_path) as driver:
         viewer, session = driver.viewer, driver.session
         assert suggestion(viewer) == ""
-        session.settled = True
+        session.timeline.is_settled = True
         assert suggestion(viewer).startswith(
             "The team has settled. Try:\ndraw a wall in a doorway (W) · drag a robot"
         )
@@ -154,15 +157,15 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
         driver.window._patient = False
         driver.settle()
         assert not driver.same(before)
-        session.settled = False
+        session.timeline.is_settled = False
         assert suggestion(viewer), "it does not blink while somebody sways"
         session.fail_robot(2)
         assert suggestion(viewer) == ""  # something is going on again
-        session.settled = True
+        session.timeline.is_settled = True
         assert "fail" not in suggestion(viewer)  # that is known now
-        session.look_at(0.0)
+        session.show_time(0.0)
         driver.window.do("suggestions")
-        session.look_at(session.end)
+        session.show_time(session.timeline.end_time)
         assert suggestion(viewer) == ""
 
 
@@ -181,7 +184,7 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
     for chosen, lesson in (("return", True), ("escape", False)):
         folder = tmp_path / chosen
         launcher = opened_for_a_person(monkeypatch, folder, offers_lesson=True)
-        launcher.session.playing = True
+        launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.asked, Question)
             assert [answer.text for answer in window.dialogs.asked.answers] == [
@@ -189,13 +192,13 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
                 "Just let me play",
             ]
             window.frame(0.5)
-            assert window.viewer.session.time == 0.0  # nobody looks at the team yet
+            assert window.viewer.session.displayed.time == 0.0  # nobody looks at the team yet
             key = pygame.K_RETURN if chosen == "return" else pygame.K_ESCAPE
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
             window.frame(0.0)
             assert window.dialogs.asked is None and (window.tour is not None) is lesson
             window.frame(0.5)
-            assert window.viewer.session.time > 0.0
+            assert window.viewer.session.displayed.time > 0.0
         with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.asked is None
 
@@ -205,9 +208,9 @@ def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
 ) -> None:
     monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
     for _ in range(2):
-        workspace = Workspace(stepped(begun(), 5), tmp_path / "drafts")
+        workspace = SessionWorkspace(stepped(begun(), 5), tmp_path / "drafts")
         workspace.session.fail_robot(2)
-        workspace.keep({})
+        workspace.save_draft({})
         workspace.close()
     everybody = (1, 2, 3)
     for chosen, left, numbers in (
@@ -216,17 +219,17 @@ def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
         (pygame.K_r, 0, (1, 3)),
     ):
         launcher = opened_for_a_person(monkeypatch, tmp_path, offers_lesson=True)
-        launcher.session.playing = True
+        launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.asked, Question)
             assert "1 touch, never saved" in window.dialogs.asked.words
             window.frame(0.5)
-            assert window.viewer.session.time == 0.0
+            assert window.viewer.session.displayed.time == 0.0
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=chosen, mod=0, unicode="", scancode=0))
             window.frame(0.0)
-            assert window.viewer.session.numbers == numbers
+            assert window.viewer.session.displayed.numbers == numbers
             assert (window.dialogs.asked is not None) is (left == 1)  # the next one is offered
-            assert len(recoverable(tmp_path / "drafts")) == left
+            assert len(find_recoverable_drafts(tmp_path / "drafts")) == left
 
 
 def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -287,11 +290,19 @@ def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
             driver.settle()
 
         dropped("other.json")
-        assert viewer.map_name == str(tmp_path / "other.json") and viewer.session.numbers == (1, 2, 3)
+        assert viewer.map_name == str(tmp_path / "other.json") and viewer.session.displayed.numbers == (
+            1,
+            2,
+            3,
+        )
         dropped("story.robocov")
-        assert viewer.session.numbers == (1, 3) and viewer.workspace.path == tmp_path / "story.robocov"
+        assert (
+            viewer.session.displayed.numbers == (1, 3) and viewer.workspace.path == tmp_path / "story.robocov"
+        )
         dropped("bad.robocov")
-        assert viewer.trouble and "bad.robocov" in viewer.message and viewer.session.numbers == (1, 3)
+        assert (
+            viewer.trouble and "bad.robocov" in viewer.message and viewer.session.displayed.numbers == (1, 3)
+        )
 
 
 def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -307,11 +318,11 @@ def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_pat
 def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         viewer, session = driver.viewer, driver.session
-        session.playing = True
+        session.playback.is_playing = True
         driver.frames(20)
         session.fail_robot(2)
         driver.frames(20)
-        failed = session.head
+        failed = session.timeline.head
         viewer.look_at(0.2)
         session.fail_robot(3)
         driver.frames(20)
@@ -321,8 +332,10 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         lines = asked.options("")
         assert [line.text for line in lines][-1].endswith("robot 3 failed  (here)")
         assert all("RAPF" in line.aside and " m" in line.aside for line in lines)
-        ends = np.array([pane.curve.at(session.end) for pane in session.panes])
-        assert lines[-1].aside == f"{session.end:.1f} s · RAPF {ends[0]:.3f} m"
+        ends = np.array(
+            [pane.distance_curve.interpolate(session.timeline.end_time) for pane in session.timeline.panes]
+        )
+        assert lines[-1].aside == f"{session.timeline.end_time:.1f} s · RAPF {ends[0]:.3f} m"
         driver.type("robot 2")
         driver.key("return")
-        assert session.head is failed
+        assert session.timeline.head is failed

@@ -14,7 +14,7 @@ from driven_window import KEYS, MODIFIERS, Driver, opened, typed
 from touched_run import RAPF, RPF, too_deep
 
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.session.scenario import MOST_PANES
+from robocov_app.viewer.session.scenario import MAX_PANES
 from robocov_app.viewer.window import Window
 
 EVENTS, BATCH, DRAWN = 5_000, 10, 12
@@ -88,8 +88,8 @@ class Monkey:
     def tame(self) -> None:
         """Keep the run small, so that there is time for many events."""
         session = self.driver.session
-        large = session.scenario.robots > 5 or len(session.numbers) > 6
-        if large or len(session.environment.obstacles) > 20:
+        large = session.timeline.scenario.robots > 5 or len(session.displayed.numbers) > 6
+        if large or len(session.displayed.environment.obstacles) > 20:
             self.driver.viewer.attempt(lambda: self.driver.viewer.open_map("square"))
             self.driver.viewer.attempt(lambda: self.driver.viewer.restart(robots=2))
 
@@ -168,8 +168,8 @@ class Monkey:
         boxes = [*layout.panes, layout.track, layout.chart, layout.panel, layout.panel]
         if what > 0.7 and window._arranged and window.canvas._scenes:
             session = self.driver.session
-            pane = rng.randrange(min(len(session.panes), len(layout.panes)))
-            x, y = rng.choice(session.positions(session.panes[pane]).tolist())
+            pane = rng.randrange(min(len(session.timeline.panes), len(layout.panes)))
+            x, y = rng.choice(session.displayed.get_positions(session.timeline.panes[pane]).tolist())
             at = self.driver.pixel((x, y), pane)
             return round(at[0]) + rng.randint(-3, 3), round(at[1]) + rng.randint(-3, 3)
         left, top, wide, high = rng.choice(boxes)
@@ -224,22 +224,24 @@ def limited(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def check(driver: Driver) -> None:
     """Fail unless the state is one that can be."""
     session, window = driver.session, driver.window
-    assert 1 <= len(session.panes) <= MOST_PANES == 4
-    numbers = session.panes[0].numbers
+    assert 1 <= len(session.timeline.panes) <= MAX_PANES == 4
+    numbers = session.timeline.panes[0].numbers
     assert len(numbers) >= 1 and list(numbers) == sorted(set(numbers))
-    for pane in session.panes:
+    for pane in session.timeline.panes:
         assert pane.numbers == numbers
-        assert pane.setup.failed.keys() == session.panes[0].setup.failed.keys()
-        assert pane.setup.environment is session.panes[0].setup.environment
+        assert pane.setup.failed.keys() == session.timeline.panes[0].setup.failed.keys()
+        assert pane.setup.environment is session.timeline.panes[0].setup.environment
         assert pane.simulation.positions.shape == (len(numbers), 2)
         assert np.isfinite(pane.simulation.positions).all() and np.isfinite(pane.simulation.velocities).all()
-        assert pane.time == pytest.approx(session.end, abs=1e-6)
-        assert (np.diff(pane.curve.time) > 0).all() and pane.curve.last_time <= session.end + 1e-6
+        assert pane.time == pytest.approx(session.timeline.end_time, abs=1e-6)
+        assert (
+            np.diff(pane.distance_curve.times) > 0
+        ).all() and pane.distance_curve.last_time <= session.timeline.end_time + 1e-6
     assert too_deep(session) < 0.01
-    assert 0.0 <= session.time <= session.end + 1e-9
-    assert 0 <= driver.viewer.active < MOST_PANES
+    assert 0.0 <= session.displayed.time <= session.timeline.end_time + 1e-9
+    assert 0 <= driver.viewer.active < MAX_PANES
     assert window.panel.tab in ("parameters", "show", "robot", "keep")
-    assert len(window.layout.panes) == len(session.panes)
+    assert len(window.layout.panes) == len(session.timeline.panes)
 
 
 @pytest.mark.slow
@@ -266,8 +268,8 @@ def usual(driver: Driver) -> None:
     driver.post(pygame.WINDOWFOCUSLOST)  # so that no key is held any more
     driver.key("escape", 6)
     viewer.panel, window.scale, viewer.shown = True, 1.0, {"robots", "obstacles", "boundary"}
-    while len(driver.session.panes) > 1:
-        driver.session.remove_pane(driver.session.panes[-1])
+    while len(driver.session.timeline.panes) > 1:
+        driver.session.remove_pane(driver.session.timeline.panes[-1])
     viewer.attempt(lambda: viewer.open_map("square"))
     typed(viewer, "robots 2")
     for name in ("radius 0.1", "max_speed 1", "speed 1", "controller rapf"):
@@ -276,17 +278,17 @@ def usual(driver: Driver) -> None:
     driver.settle()
     driver.push("tool:hand")
     driver.key("f")
-    driver.session.playing = False
+    driver.session.playback.is_playing = False
     driver.settle()
     driver.drag(driver.robot(1), driver.pixel((5.0, 5.0)))
-    pane = driver.session.panes[0]
+    pane = driver.session.timeline.panes[0]
     assert np.allclose(pane.simulation.positions[0], (5.0, 5.0), atol=0.05)
     assert window.panel.tab == "robot"
     driver.push("pause")
     driver.frames(5)
-    assert driver.session.playing and driver.session.end > 0.0
+    assert driver.session.playback.is_playing and driver.session.timeline.end_time > 0.0
     driver.turn("parameters")
     driver.write("k_rep", "0.75")
     driver.key("return")
-    assert pane.law.value("k_rep") == 0.75
+    assert pane.controller.get_value("k_rep") == 0.75
     check(driver)

@@ -17,19 +17,19 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.settings import VideoSettings
 from robocov_app.viewer.headless import parts_of, story_frames
-from robocov_app.viewer.session.changes import Place
+from robocov_app.viewer.session.edits import PlaceRobot
 from robocov_app.viewer.session.file import load_session, save_session
-from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.run_saver import RunSaver
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import RunSaver
 
 SMALL = ["--lattice", "16", "--size", "320x240"]
 
 
 def saved(session: Session, folder: Path) -> str:
-    session.stow()
+    session.timeline.cache_present()
     path = folder / "story.robocov"
-    save_session(path, session.document, session.head, session.step_now, {})
+    save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     return str(path)
 
 
@@ -39,7 +39,7 @@ def played() -> Session:
     session.fail_robot(2)
     stepped(session, 12)
     session.undo()
-    session.edit(with_obstacle(HALL, CircleObstacle((1.5, 3.0), 0.3)), "circle drawn")
+    session.edit_map(add_obstacle(HALL, CircleObstacle((1.5, 3.0), 0.3)), "circle drawn")
     stepped(session, 12).add_robot((5.0, 3.0))
     return stepped(session, 12)
 
@@ -67,7 +67,7 @@ def test_a_story_is_saved_with_its_parts_costs_and_film(
     assert [part["words"] for part in answer["parts"]] == ["begun", "circle drawn", "robot 4 joined"]
     assert [part["from_s"] for part in answer["parts"]] == pytest.approx([0.0, 0.2, 0.4])
     last = Record.load(out / "03-robot-4-joined" / "lloyd")
-    np.testing.assert_array_equal(last.positions[-1], session.panes[1].simulation.positions)
+    np.testing.assert_array_equal(last.positions[-1], session.timeline.panes[1].simulation.positions)
     assert len(last.team) == 4 and last.session["began_at_s"] == pytest.approx(0.4)
     rows = (out / "cost.csv").read_text().splitlines()
     assert rows[0].startswith("controller,time_s,") and {row.split(",")[0] for row in rows[1:]} == {
@@ -75,7 +75,7 @@ def test_a_story_is_saved_with_its_parts_costs_and_film(
         "lloyd",
     }
     assert (out / "comparison.mp4").stat().st_size > 1000
-    assert load_session(out / "session.robocov").step == session.step_now
+    assert load_session(out / "session.robocov").step == session.timeline.step
 
 
 @pytest.mark.slow
@@ -115,8 +115,10 @@ def test_a_report_takes_stories_and_sessions(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) -> None:
     session, film = played(), VideoSettings(size=(640, 360), fps=10, speed=1.0)
-    parts = parts_of(session.document, session.head, session.step_now)
-    frames = list(story_frames(session.document, session.head, session.step_now, parts, [], film))
+    parts = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
+    frames = list(
+        story_frames(session.timeline.document, session.timeline.head, session.timeline.step, parts, [], film)
+    )
     assert {frame.shape for frame in frames} == {(360, 640, 3)}
     first, last = frames[0].astype(int), frames[-1].astype(int)
     header = first[:20]
@@ -128,13 +130,13 @@ def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) ->
 
 def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
     session = stepped(begun(RAPF), 6)
-    session.playing = True
+    session.playback.is_playing = True
     for k in range(6):
-        session.grab(2, (3.0 + 0.1 * k, 3.0))
-        session.advance(1 / 60)
+        session.drag_robot(2, (3.0 + 0.1 * k, 3.0))
+        session.playback.advance(1 / 60)
     session.release()
     stepped(session, 6)
-    (part,) = parts_of(session.document, session.head, session.step_now)
+    (part,) = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
     record = record_of(session)
     assert part.begin == 0 and len(record) == 19
     (touch,) = record.session["touched"]
@@ -148,10 +150,10 @@ def test_what_was_plotted_is_there_again(tmp_path: Path) -> None:
     with_curves(session, 200)
     session.fail_robot(1)
     with_curves(session, 30)
-    again = Session.opened(load_session(Path(saved(session, tmp_path))))
-    curve = again.panes[0].curve
+    again = Session.open(load_session(Path(saved(session, tmp_path))))
+    curve = again.timeline.panes[0].distance_curve
     assert 30 < len(curve) <= 61 and curve.last_time == pytest.approx(229 / 60, abs=1e-3)
-    assert curve.at(2.0) == pytest.approx(1.0, abs=1e-3)
+    assert curve.interpolate(2.0) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,10 +163,12 @@ def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(replay, "_open_window", lambda _, session, file: seen.append((session, file)) or 0)
     assert main(["replay", path]) == 0
     ((session, file),) = seen
-    assert str(file) == path and session.time == 0.0 and session.playing
+    assert str(file) == path and session.displayed.time == 0.0 and session.playback.is_playing
     for _ in range(60):
-        session.advance(1 / 60)
-    assert session.at_end_of_record and not session.playing, "it stops where the story does"
+        session.playback.advance(1 / 60)
+    assert session.timeline.is_at_record_end and not session.playback.is_playing, (
+        "it stops where the story does"
+    )
     assert main(["replay", path, "--video", "--out", str(tmp_path / "film")]) == 2
 
 
@@ -186,7 +190,7 @@ def test_a_run_is_saved_by_another_process_and_nothing_else_stays(
 
 def test_a_robot_that_is_put_elsewhere_does_not_travel_there() -> None:
     session = stepped(begun(RAPF), 12)
-    session.do(Place(2, (5.0, 3.0)), "hand", "robot 2 placed")
+    session.apply(PlaceRobot(2, (5.0, 3.0)), "hand", "robot 2 placed")
     stepped(session, 12)
     record = record_of(session)
     assert len(record) == 25

@@ -22,7 +22,7 @@ from robocov_app.commands.demo import Arguments, build_session
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.viewer.launch import NO_DISPLAY, Launcher
-from robocov_app.viewer.session.clock import FRAME_BUDGET
+from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 
 SHORT = ("--lattice", "8", "--size", "900x600")
 
@@ -158,11 +158,15 @@ def test_the_session_starts_with_the_options() -> None:
     given = {"robots": 4, "start": "kitchen", "seed": 7, "dt": 0.05, "radius": 0.15, "speed": 2.0}
     options = Arguments(controllers=("rpf", "lloyd"), gains=("k_rep=2",), paused=True, **given)
     session = build_session(options)
-    assert [pane.law.name for pane in session.panes] == ["rpf", "lloyd"]
-    assert session.panes[0].law.value("k_rep") == 2.0
-    scenario = session.scenario
+    assert [pane.controller.name for pane in session.timeline.panes] == ["rpf", "lloyd"]
+    assert session.timeline.panes[0].controller.get_value("k_rep") == 2.0
+    scenario = session.timeline.scenario
     assert (scenario.robots, scenario.start_name, scenario.seed, scenario.dt) == (4, "kitchen", 7, 0.05)
-    assert scenario.limits.radius == 0.15 and session.clock.speed == 2.0 and not session.playing
+    assert (
+        scenario.properties.radius == 0.15
+        and session.playback.clock.speed == 2.0
+        and not session.playback.is_playing
+    )
 
 
 def test_the_display_ends_also_when_something_fails() -> None:
@@ -198,7 +202,7 @@ def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> 
     asked["without"] = frozenset({"cells"})
     with Launcher(begun(), "hall", tmp_path, lattice=4, **asked).window() as window:
         assert window.viewer.shown == {"robots", "scan"} and window.viewer.theme == "dark"
-        assert window.viewer.session.clock.budget == FRAME_BUDGET, "people look at it"
+        assert window.viewer.session.playback.clock.budget == FRAME_BUDGET_S, "people look at it"
         window.viewer.shown.add("trails")
     settings = json.loads(kept.read_text())
     assert [settings[name] for name in ("theme", "width", "height", "scale")] == ["light", 1000, 700, None]
@@ -217,5 +221,5 @@ def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
     )
     with asked.window() as window:
         assert "scan" in window.viewer.shown and "cells" not in window.viewer.shown
-        assert math.isinf(window.viewer.session.clock.budget), "nobody does"
+        assert math.isinf(window.viewer.session.playback.clock.budget), "nobody does"
         window.close()

@@ -8,12 +8,13 @@ import pytest
 
 from robocov.mapfile import load_map
 from robocov_app.viewer.launch import Launcher
-from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 
 
 def words(tmp_path: Path, *laws: str) -> list[str]:
-    session = Session(Scenario(load_map("square"), tuple(ControllerChoice(law) for law in laws)))
+    session = Session(SessionScenario(load_map("square"), tuple(ControllerChoice(law) for law in laws)))
     with Launcher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
         for _ in range(10):
             window.frame(1 / 30)

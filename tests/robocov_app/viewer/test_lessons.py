@@ -17,7 +17,7 @@ from robocov_app.cli import main
 from robocov_app.render.picture import pane_layers, standard_layers
 from robocov_app.viewer import lessons
 from robocov_app.viewer.lessons import PLAIN, checked, load_lesson
-from robocov_app.viewer.session.file import dumped, session_json
+from robocov_app.viewer.session.file import build_session_content, format_session
 from robocov_app.viewer.session.session import Session
 
 LAYERS = {layer.name for layer in (*standard_layers(), *pane_layers())}
@@ -32,7 +32,11 @@ def short(tmp_path: Path, **changes: object) -> Path:
     stepped(session, 20)
     session.restart(start="far")
     stepped(session, 10)
-    content = json.loads(dumped(session_json(session.document, session.head, session.step_now, {})))
+    content = json.loads(
+        format_session(
+            build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
+        )
+    )
     first = {"title": "Failure", "text": "One fails.", "touch": 1, "until": {"step": 30}}
     question = {"text": "What now?", "answers": ["Nothing", "Much"], "right": 2, "why": "So it is."}
     task = {"text": "drag robot 1.", "until": {"robot": 1, "inside": [0, 0, 2, 2]}, "done": "Well done."}
@@ -69,19 +73,19 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         lesson, viewer = driver.window.tour, driver.viewer
         assert lesson is not None and lesson.chapter.title == "Failure" and viewer.session is not before
         driver.frames(6)
-        assert viewer.session.numbers == (1, 2, 3)
+        assert viewer.session.displayed.numbers == (1, 2, 3)
         driver.frames(30)
-        assert viewer.session.numbers == (1, 3), "at its step, however long frames take"
-        assert lesson.state == "ended" and not viewer.session.playing
+        assert viewer.session.displayed.numbers == (1, 3), "at its step, however long frames take"
+        assert lesson.state == "ended" and not viewer.session.playback.is_playing
         lesson.skip(1)
         assert lesson.state == "asks" and lesson.asks == ["What now?", "1  Nothing", "2  Much"]
         driver.frames(10)
-        assert viewer.session.time == 0.0, "it waits for an answer"
+        assert viewer.session.displayed.time == 0.0, "it waits for an answer"
         driver.key("1")
         assert lesson.state == "plays" and lesson.answer == 1
         driver.frames(30)
         assert lesson.state == "task" and lesson.asks == ["Now you: drag robot 1."]
-        viewer.session.place(1, (1.0, 1.0))
+        viewer.session.place_robot(1, (1.0, 1.0))
         driver.frames(2)
         assert lesson.state == "ended"
         assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
@@ -89,11 +93,13 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         assert lesson.state == "ended" and not lesson.done, "there is something to read"
         driver.key("space")
         lesson.advance(100.0)
-        assert lesson.state == "ended" and not viewer.session.playing, "it is paused between chapters too"
+        assert lesson.state == "ended" and not viewer.session.playback.is_playing, (
+            "it is paused between chapters too"
+        )
         driver.key("space")
         assert not lesson.held
         driver.key("escape")
-        assert driver.window.tour is None and viewer.session is before and before.numbers == (1, 2)
+        assert driver.window.tour is None and viewer.session is before and before.displayed.numbers == (1, 2)
 
 
 def test_its_end_is_told_and_nobody_is_asked_who_was_not(tmp_path: Path) -> None:
@@ -114,13 +120,13 @@ def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
         driver.window.start_lesson(short(tmp_path))
         lesson = driver.window.tour
         driver.key("space")
-        assert lesson.state == "plays" and not driver.viewer.session.playing
+        assert lesson.state == "plays" and not driver.viewer.session.playback.is_playing
         driver.frames(60)
-        assert lesson.number == 0 and driver.viewer.session.time < 0.1
+        assert lesson.number == 0 and driver.viewer.session.displayed.time < 0.1
         driver.key("n")
         assert lesson.state == "left" and driver.window.tour is lesson
         driver.key("f2")
-        assert lesson.state == "plays" and driver.viewer.session.time == 0.0
+        assert lesson.state == "plays" and driver.viewer.session.displayed.time == 0.0
         driver.key("right")
         assert lesson.number == 1
         driver.key("left")
@@ -138,7 +144,7 @@ def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_
         assert (lesson.number, lesson.state) == (1, "asks")
         driver.key("space")
         driver.frames(10)
-        assert driver.session.time == 0.0 and "what you expect" in driver.viewer.message
+        assert driver.session.displayed.time == 0.0 and "what you expect" in driver.viewer.message
         driver.click(*driver.window._spots[1][0].center)
         assert (lesson.answer, lesson.state) == (2, "plays")
         driver.frames(30)
@@ -211,18 +217,18 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_a_script_goes_the_same_way_bit_for_bit() -> None:
     session = stepped(begun(), 10)
-    session.playing = True
+    session.playback.is_playing = True
     for k in range(10):
-        session.grab(2, (3.0 + 0.05 * k, 3.0))
-        session.advance(1 / 60)
+        session.drag_robot(2, (3.0 + 0.05 * k, 3.0))
+        session.playback.advance(1 / 60)
     session.release()
     stepped(session, 10)
-    end, went = session.step_now, session.panes[0].simulation.positions.copy()
-    twin = Session(session.document.nodes[0].scenario)
-    twin.document, twin.head = session.document, session.document.nodes[0]
-    twin.enter(twin.head, 0)
-    twin.remake()
-    twin.follow(session.head)
-    while twin.step_now < end:
-        twin.step()
-    np.testing.assert_array_equal(twin.panes[0].simulation.positions, went)
+    end, went = session.timeline.step, session.timeline.panes[0].simulation.positions.copy()
+    twin = Session(session.timeline.document.nodes[0].scenario)
+    twin.timeline.document, twin.timeline.head = session.timeline.document, session.timeline.document.nodes[0]
+    twin.seek(twin.timeline.head, 0)
+    twin.timeline.finish_seek()
+    twin.timeline.follow(session.timeline.head)
+    while twin.timeline.step < end:
+        twin.playback.step()
+    np.testing.assert_array_equal(twin.timeline.panes[0].simulation.positions, went)

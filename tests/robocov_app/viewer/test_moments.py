@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from touched_run import HALL, RAPF
 
 from robocov.environment import CircleObstacle
-from robocov_app.viewer.session import moments as module
-from robocov_app.viewer.session.moments import History, Moment, PaneSetup, State
-from robocov_app.viewer.session.scenario import TeamSpec
+from robocov_app.viewer.session import history as module
+from robocov_app.viewer.session.history import RunHistory
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.states import PaneSetup, PaneState, RunState
 
 DT = 1 / 60
 FEWEST = 24
@@ -19,29 +20,31 @@ ONE = 700 + 2 * 16
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    monkeypatch.setattr(module, "_FEWEST", FEWEST)
+    monkeypatch.setattr(module, "MIN_STATES", FEWEST)
 
 
 def setup(failed=None) -> PaneSetup:
-    return PaneSetup(HALL, RAPF, TeamSpec(), (1,), failed or {})
+    return PaneSetup(HALL, RAPF, RobotProperties(), (1,), failed or {})
 
 
 THEN = setup()
 
 
-def moment(step, there=THEN, n=1, memory=None, pane=0) -> Moment:
-    return Moment(step, {pane: State(there, np.full((n, 2), float(step)), np.zeros((n, 2)), memory)}, None)
+def moment(step, there=THEN, n=1, memory=None, pane=0) -> RunState:
+    return RunState(
+        step, {pane: PaneState(there, np.full((n, 2), float(step)), np.zeros((n, 2)), memory)}, None
+    )
 
 
-def filled(steps, most=60 * ONE, there=lambda step: THEN) -> History:
-    history = History(DT, most)
+def filled(steps, most=60 * ONE, there=lambda step: THEN) -> RunHistory:
+    history = RunHistory(DT, most)
     for step in range(steps):
-        history.add(moment(step, there(step)))
+        history.append(moment(step, there(step)))
     return history
 
 
 def taken(history) -> int:
-    return sum(700 * len(each.states) + 32 * len(each.states[0].positions) for each in history.moments)
+    return sum(700 * len(each.states) + 32 * len(each.states[0].positions) for each in history.states)
 
 
 def powers_of_two(numbers) -> bool:
@@ -54,7 +57,7 @@ def test_moments_come_back_in_their_order():
     assert history.steps == [0, 1, 2, 3, 4]
     assert history[3].step == 3
     assert history.last.step == 4
-    assert history.time(3) == 3 * DT
+    assert history.get_time(3) == 3 * DT
     assert history.thinned == 0
 
 
@@ -87,8 +90,8 @@ def runs(draw):
 @settings(max_examples=200)
 def test_whatever_happens_nothing_gets_out_of_order(run):
     most = 80 * ONE
-    history, step, there, n, touched = History(DT, most), 0, THEN, 1, set()
-    history.add(moment(0))
+    history, step, there, n, touched = RunHistory(DT, most), 0, THEN, 1, set()
+    history.append(moment(0))
     for kind, number in run:
         if kind == "robots":
             n = number
@@ -98,16 +101,16 @@ def test_whatever_happens_nothing_gets_out_of_order(run):
             touched |= {step}
         for _ in range(number if kind == "step" else 1):
             step += 1
-            history.add(moment(step, there, n))
+            history.append(moment(step, there, n))
         assert history.last.step == step
         assert len(history.last.states[0].positions) == n
         assert (np.diff(history.steps) > 0).all()
         assert taken(history) <= most or len(history) <= FEWEST
         assert history.steps[0] == 0
         for time in (-1.0, 0.0, 0.37 * step * DT, step * DT, 1e9):
-            k = history.at(time)
-            assert k == 0 or history.time(k) <= time + 1e-6
-            assert k == len(history) - 1 or history.time(k + 1) > time
+            k = history.find_index(time)
+            assert k == 0 or history.get_time(k) <= time + 1e-6
+            assert k == len(history) - 1 or history.get_time(k + 1) > time
     if len(touched) < 8:
         assert touched <= set(history.steps)
 
@@ -132,39 +135,44 @@ def test_a_run_that_is_touched_all_the_time_is_thinned_too():
 
 
 def test_few_moments_are_kept_however_large_they_are():
-    history = History(DT, 1000)
+    history = RunHistory(DT, 1000)
     for step in range(100):
-        history.add(moment(step, n=50))
+        history.append(moment(step, n=50))
         assert len(history) <= FEWEST
     assert len(history) >= FEWEST // 2
     assert history.steps[0] == 0
 
 
 def test_a_larger_team_takes_more():
-    small, large = History(DT, 60 * ONE), History(DT, 60 * ONE)
+    small, large = RunHistory(DT, 60 * ONE), RunHistory(DT, 60 * ONE)
     for step in range(50):
-        small.add(moment(step))
-        large.add(moment(step, n=100))
+        small.append(moment(step))
+        large.append(moment(step, n=100))
     assert len(small) == 50
     assert len(large) < 30
 
 
 @pytest.mark.parametrize(
     "memory",
-    [np.zeros(5000), {"map": np.zeros(5000)}, [(np.zeros(2500), np.zeros(2500))], TeamSpec(np.zeros(5000))],
+    [
+        np.zeros(5000),
+        {"map": np.zeros(5000)},
+        [(np.zeros(2500), np.zeros(2500))],
+        RobotProperties(np.zeros(5000)),
+    ],
 )
 def test_what_controllers_remember_counts(memory):
-    history = History(DT, 60 * ONE)
+    history = RunHistory(DT, 60 * ONE)
     for step in range(50):
-        history.add(moment(step, memory=memory))
+        history.append(moment(step, memory=memory))
     assert len(history) < 30
 
 
 def test_what_refers_to_itself_is_counted_once_or_so():
     memory = {"word": "x" * 100, "number": 3, "nothing": None}
     memory["itself"] = memory
-    history = History(DT)
-    history.add(moment(0, memory=memory))
+    history = RunHistory(DT)
+    history.append(moment(0, memory=memory))
     assert len(history) == 1
 
 
@@ -172,11 +180,11 @@ def test_the_last_moment_not_after_a_time():
     history = filled(2000, 100 * ONE)
     steps = np.array(history.steps)
     for step in (0, 1, 2, 3, 500, 777, 1555, 1990, 1999):
-        assert history.steps[history.at(step * DT)] == steps[steps <= step].max()
+        assert history.steps[history.find_index(step * DT)] == steps[steps <= step].max()
         # times come from other sums, too
-        assert history.at(step * DT - 1e-12) == history.at(step * DT)
-    assert history.at(-3.0) == 0
-    assert history.at(1e9) == len(history) - 1
+        assert history.find_index(step * DT - 1e-12) == history.find_index(step * DT)
+    assert history.find_index(-3.0) == 0
+    assert history.find_index(1e9) == len(history) - 1
 
 
 def test_the_newest_is_replaced_when_something_was_touched():
@@ -198,19 +206,19 @@ def test_the_newest_is_replaced_when_something_was_touched():
 def test_what_is_left_out_takes_no_room(steps, k):
     history = filled(steps, 60 * ONE)
     k = min(k, len(history) - 1)
-    twin, before = history.until(k), history.steps[:]
+    twin, before = history.copy_until(k), history.steps[:]
     assert history.steps == before
     assert twin.steps == before[: k + 1]
     assert twin._bytes == taken(twin)
     for step in range(twin.last.step + 1, twin.last.step + 200):
-        twin.add(moment(step))
+        twin.append(moment(step))
     assert taken(twin) <= 60 * ONE
 
 
 def test_a_history_of_its_own_leaves_the_other_as_it_is():
     history = filled(10)
-    twin = history.until(4)
-    twin.add(moment(5, setup()))
+    twin = history.copy_until(4)
+    twin.append(moment(5, setup()))
     assert len(history) == 10
     assert history[5] is not twin[5]
     assert twin.dt == history.dt
@@ -218,11 +226,11 @@ def test_a_history_of_its_own_leaves_the_other_as_it_is():
 
 def test_failed_robots_are_solid():
     there = setup({2: (1.0, 1.0), 5: (2.0, 3.0)})
-    assert setup().solid is HALL
-    assert there.solid.obstacles[: len(HALL.obstacles)] == HALL.obstacles
-    assert there.solid.obstacles[len(HALL.obstacles) :] == (
+    assert setup().sensed_environment is HALL
+    assert there.sensed_environment.obstacles[: len(HALL.obstacles)] == HALL.obstacles
+    assert there.sensed_environment.obstacles[len(HALL.obstacles) :] == (
         CircleObstacle((1.0, 1.0), 0.1),
         CircleObstacle((2.0, 3.0), 0.1),
     )
     # what is derived from it is so once
-    assert there.solid is there.solid
+    assert there.sensed_environment is there.sensed_environment

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robocov_app.viewer.session.file import dumped, load_session, session_json
+from robocov_app.viewer.session.file import build_session_content, format_session, load_session
 from robocov_app.viewer.session.session import Session
 
 DATA_FOLDER = Path(__file__).parents[2] / "data"
@@ -20,19 +20,19 @@ TOLERANCE_M = 1e-6
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_file_that_is_read_and_written_again_stays_the_same(file: Path) -> None:
     saved = load_session(file)
-    content = session_json(saved.document, saved.head, saved.step, saved.view)
+    content = build_session_content(saved.document, saved.head, saved.step, saved.view)
     content["robocov"] = json.loads(file.read_text())["robocov"]
-    assert dumped(content) == file.read_text()
+    assert format_session(content) == file.read_text()
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_every_branch_of_an_old_file_ends_where_it_ended(file: Path) -> None:
-    session = Session.opened(load_session(file))
+    session = Session.open(load_session(file))
     ends = json.loads(file.with_suffix(".ends.json").read_text())
-    assert len(ends) == len(session.document.branches())
+    assert len(ends) == len(session.timeline.document.list_branches())
     for number, positions_by_pane in ends.items():
-        session.enter(session.document.nodes[int(number)])
-        assert {str(pane.number) for pane in session.panes} == set(positions_by_pane)
-        for pane in session.panes:
+        session.seek(session.timeline.document.nodes[int(number)])
+        assert {str(pane.number) for pane in session.timeline.panes} == set(positions_by_pane)
+        for pane in session.timeline.panes:
             expected = positions_by_pane[str(pane.number)]
             np.testing.assert_allclose(pane.simulation.positions, expected, atol=TOLERANCE_M)

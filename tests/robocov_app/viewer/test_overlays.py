@@ -81,9 +81,9 @@ def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_
         window = driver.window
         driver.viewer.hand.selected = 1
         window.panel.show_tab("robot")
-        driver.session.playing = True
+        driver.session.playback.is_playing = True
         driver.frames(30)
-        driver.session.playing = False
+        driver.session.playback.is_playing = False
         driver.frames(15)
         left, top, width, height = window.layout.panel
         driver.move(left + width // 2, top + height - 40)

@@ -9,13 +9,20 @@ from touched_run import HALL, LLOYD, RAPF, RPF
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
 from robocov.observation import Decision
-from robocov_app.viewer.session.moments import PaneSetup
-from robocov_app.viewer.session.pane import SENSED_EVERY, Continuation, Pane, begun, resumed
-from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.pane import (
+    STEPS_BETWEEN_SENSED_POINTS,
+    Continuation,
+    Pane,
+    resume_simulation,
+    start_simulation,
+)
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.states import PaneSetup
 
 DT = 1 / 60
 PLACES = np.array([[1.0, 1.0], [1.6, 1.0], [1.0, 2.0]])
-THEN = PaneSetup(HALL, RAPF, TeamSpec(), (1, 2, 3), {})
+THEN = PaneSetup(HALL, RAPF, RobotProperties(), (1, 2, 3), {})
 
 MINE = """
 from dataclasses import dataclass
@@ -56,11 +63,11 @@ def own(tmp_path_factory) -> ControllerChoice:
 
 
 def lane_in(setup, number=0) -> Pane:
-    return Pane(number, setup, begun(setup, PLACES, DT))
+    return Pane(number, setup, start_simulation(setup, PLACES, DT))
 
 
 def lane_of(law=RAPF, steps=0, **changes) -> Pane:
-    pane = lane_in(replace(THEN, law=law, **changes), number=7)
+    pane = lane_in(replace(THEN, controller=law, **changes), number=7)
     for _ in range(steps):
         pane.step()
     return pane
@@ -68,23 +75,23 @@ def lane_of(law=RAPF, steps=0, **changes) -> Pane:
 
 def test_a_lane_begins_at_its_starts():
     pane = lane_of()
-    assert (pane.number, pane.law, pane.numbers, pane.time) == (7, RAPF, (1, 2, 3), 0.0)
-    assert (pane.row(1), pane.row(3), pane.row(9)) == (0, 2, None)
+    assert (pane.number, pane.controller, pane.numbers, pane.time) == (7, RAPF, (1, 2, 3), 0.0)
+    assert (pane.get_row(1), pane.get_row(3), pane.get_row(9)) == (0, 2, None)
     np.testing.assert_array_equal(pane.starts, PLACES)
     np.testing.assert_array_equal(pane.trail.positions, [PLACES])
-    assert len(pane.curve) == len(pane.sensed) == 0
+    assert len(pane.distance_curve) == len(pane.sensed) == 0
     with pytest.raises(StartError, match="outside the boundary"):
-        begun(THEN, PLACES - 5.0, DT)
+        start_simulation(THEN, PLACES - 5.0, DT)
 
 
 def test_it_steps_as_the_simulation_does():
     pane = lane_of(steps=30)
-    twin = begun(THEN, PLACES, DT)
+    twin = start_simulation(THEN, PLACES, DT)
     for _ in range(30):
         twin.step()
     np.testing.assert_array_equal(pane.simulation.positions, twin.positions)
     assert pane.time == pytest.approx(0.5)
-    assert pane.trail.time[-1] == pytest.approx(0.5)
+    assert pane.trail.times[-1] == pytest.approx(0.5)
     assert len(pane.trail) == 16
     forces = pane.simulation.observe_and_decide().decision.forces
     np.testing.assert_array_equal(forces, twin.observe_and_decide().decision.forces)
@@ -94,18 +101,19 @@ def test_what_is_sensed_is_noted_now_and_then():
     pane = lane_of(steps=1)
     assert len(pane.sensed) == 3
     np.testing.assert_array_equal(
-        pane.sensed.until(0.0)[0], begun(THEN, PLACES, DT).observe_and_decide().seen.obstacle_points
+        pane.sensed.until(0.0)[0],
+        start_simulation(THEN, PLACES, DT).observe_and_decide().seen.obstacle_points,
     )
-    slow = lane_of(steps=SENSED_EVERY)
+    slow = lane_of(steps=STEPS_BETWEEN_SENSED_POINTS)
     assert slow.sensed.until(1.0)[1].tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize("law", [RAPF, RPF, LLOYD])
 def test_it_goes_on_from_a_state_as_it_did(law):
     pane = lane_of(law, steps=25)
-    state, step = pane.state(), 25
+    state, step = pane.build_state(), 25
     assert state.memory is None
-    twin = resumed(state, DT, step)
+    twin = resume_simulation(state, DT, step)
     assert twin.time == pane.time
     for _ in range(40):
         pane.step()
@@ -116,13 +124,13 @@ def test_it_goes_on_from_a_state_as_it_did(law):
 
 def test_so_it_does_with_a_controller_that_changes_what_it_remembers(own):
     pane = lane_of(own, steps=25)
-    state, step = pane.state(), 25
+    state, step = pane.build_state(), 25
     assert state.memory["steps"] == 25
     for _ in range(40):
         pane.step()
     assert state.memory["steps"] == 25
     for _ in range(2):
-        twin = resumed(state, DT, step)
+        twin = resume_simulation(state, DT, step)
         for _ in range(40):
             twin.step()
         np.testing.assert_array_equal(twin.positions, pane.simulation.positions)
@@ -131,7 +139,7 @@ def test_so_it_does_with_a_controller_that_changes_what_it_remembers(own):
 def changed(pane, **changes) -> Pane:
     """Change a pane's circumstances."""
     wanted = Continuation(replace(pane.setup, **changes))
-    pane.take(wanted.setup, pane.changed(wanted))
+    pane.adopt(wanted.setup, pane.build_changed_simulation(wanted))
     return pane
 
 
@@ -139,9 +147,9 @@ class TestChanges:
     def test_nothing_changes_until_it_is_taken(self):
         pane = lane_of(steps=10)
         before = pane.simulation
-        simulation = pane.changed(Continuation(replace(pane.setup, law=LLOYD)))
+        simulation = pane.build_changed_simulation(Continuation(replace(pane.setup, controller=LLOYD)))
         assert pane.simulation is before
-        assert pane.law == RAPF
+        assert pane.controller == RAPF
         assert simulation.time == before.time
         np.testing.assert_array_equal(simulation.positions, before.positions)
 
@@ -157,15 +165,15 @@ class TestChanges:
     def test_another_controller_takes_over_in_flight(self):
         pane = lane_of(steps=30)
         velocities = pane.simulation.velocities
-        changed(pane, law=LLOYD)
+        changed(pane, controller=LLOYD)
         np.testing.assert_array_equal(pane.simulation.velocities, velocities)
         assert pane.simulation.controller.name == "lloyd"
 
     def test_the_same_controller_goes_on_remembering(self, own):
-        pane = changed(lane_of(own, steps=30), limits=TeamSpec(viscosity=1.0))
-        assert pane.state().memory["steps"] == 30
-        pane = changed(pane, law=own.with_gain("push", 2.0))
-        assert pane.state().memory["steps"] == 0
+        pane = changed(lane_of(own, steps=30), properties=RobotProperties(viscosity=1.0))
+        assert pane.build_state().memory["steps"] == 30
+        pane = changed(pane, controller=own.with_gain("push", 2.0))
+        assert pane.build_state().memory["steps"] == 0
 
     def test_an_obstacle_pushes_robots_away(self):
         pane = lane_of(steps=30)
@@ -186,15 +194,15 @@ class TestChanges:
         broken = ControllerChoice(own.name.replace("Mine", "Broken"))
         for changes, error in (
             ({"environment": narrow}, StartError),
-            ({"limits": TeamSpec(radius=1.5)}, StartError),
-            ({"limits": TeamSpec(radius=-1.0)}, ParameterError),
-            ({"law": ControllerChoice("nobody")}, ParameterError),
-            ({"law": broken}, ParameterError),
+            ({"properties": RobotProperties(radius=1.5)}, StartError),
+            ({"properties": RobotProperties(radius=-1.0)}, ParameterError),
+            ({"controller": ControllerChoice("nobody")}, ParameterError),
+            ({"controller": broken}, ParameterError),
         ):
             with pytest.raises(error):
                 changed(pane, **changes)
             assert pane.simulation is before
-            assert pane.setup.law == RAPF
+            assert pane.setup.controller == RAPF
             assert len(pane.trail) == rows
 
     def test_trail_and_starts_follow_the_robots(self):
@@ -205,7 +213,7 @@ class TestChanges:
             np.vstack([pane.simulation.positions[[0, 2]], (5.0, 3.0)]),
             np.zeros((3, 2)),
         )
-        pane.take(wanted.setup, pane.changed(wanted))
+        pane.adopt(wanted.setup, pane.build_changed_simulation(wanted))
         np.testing.assert_array_equal(pane.trail.positions[:, :2], trail[:, [0, 2]])
         assert np.isnan(pane.trail.positions[:-1, 2]).all()
         assert pane.trail.positions[-1, 2].tolist() == [5.0, 3.0]

@@ -12,21 +12,22 @@ from robocov.controllers.gains import Gain, gain, get_gains
 from robocov.errors import ParameterError
 from robocov.team import UNITS
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
-from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.robot_properties import RobotProperties
 
 LAWS = [ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")]
 GAINS = [each for law in LAWS for each in gain_parameters(law)]
-ALL = [each for each in [*GAINS, *limit_parameters(TeamSpec())] if isinstance(each, Parameter)]
+ALL = [each for each in [*GAINS, *limit_parameters(RobotProperties())] if isinstance(each, Parameter)]
 
 
 class Odd:
     """A law with any gains."""
 
     def __init__(self, **gains: Gain) -> None:
-        self.known = gains
+        self.available_gains = gains
 
-    def value(self, name: str) -> float | None:
-        return self.known[name].default
+    def get_value(self, name: str) -> float | None:
+        return self.available_gains[name].default
 
 
 def odd(default, low, high, *, optional=False) -> Parameter:
@@ -36,11 +37,11 @@ def odd(default, low, high, *, optional=False) -> Parameter:
 
 def test_every_gain_has_its_slider():
     for law in LAWS:
-        assert [each.name for each in gain_parameters(law)] == list(law.known)
+        assert [each.name for each in gain_parameters(law)] == list(law.available_gains)
     rapf = {each.name: each for each in gain_parameters(ControllerChoice("rapf", {"k_rep": 0.7}))}
     assert (rapf["k_rep"].value, rapf["k_rep"].default) == (
         0.7,
-        ControllerChoice("rapf").known["k_rep"].default,
+        ControllerChoice("rapf").available_gains["k_rep"].default,
     )
     assert rapf["k_rep"].meaning
 
@@ -64,26 +65,26 @@ def test_gains_that_are_words_have_all_of_them():
             picked.read(wrong)
     for word in picked.offered:
         law = ControllerChoice("rapf").with_gain("target", word)
-        assert law.value("target") == word
+        assert law.get_value("target") == word
         assert law.gains == ({} if word == "centroid" else {"target": word})
     near = Pick("n", "n", "", "on", "on", ("on", "once"))
     assert near.read("on") == "on" and near.read("onc") == "once"
 
 
 def test_kinematics_are_a_track_width():
-    unicycle = with_limit(TeamSpec(radius=0.2), "team.kinematics", "unicycle")
-    assert unicycle.team(2).track_width.tolist() == [pytest.approx(0.32)] * 2
+    unicycle = with_limit(RobotProperties(radius=0.2), "team.kinematics", "unicycle")
+    assert unicycle.build_team(range(1, 3)).track_width.tolist() == [pytest.approx(0.32)] * 2
     assert [each.value for each in limit_parameters(unicycle) if isinstance(each, Pick)] == ["unicycle"]
-    assert with_limit(unicycle, "kinematics", "point") == TeamSpec(radius=0.2)
+    assert with_limit(unicycle, "kinematics", "point") == RobotProperties(radius=0.2)
 
 
 def test_every_limit_but_the_mass_has_its_slider():
-    names = [each.name for each in limit_parameters(TeamSpec())]
+    names = [each.name for each in limit_parameters(RobotProperties())]
     of_unicycles = {"track_width", "turning_rate"}  # as the kinematics have them
     assert {name.removeprefix("team.") for name in names} == set(UNITS) - {"mass"} - of_unicycles | {
         "kinematics"
     }
-    for each in limit_parameters(TeamSpec(sensing_range=math.inf, radius=0.3)):
+    for each in limit_parameters(RobotProperties(sensing_range=math.inf, radius=0.3)):
         if each.name == "team.sensing_range":
             assert (each.value, each.default, each.optional) == (None, 3.0, True)
         if each.name == "team.radius":
@@ -106,7 +107,7 @@ def test_all_that_a_slider_gives_is_taken(parameter):
         assert value >= before
         before = value
         if parameter.name.startswith("team."):
-            with_limit(TeamSpec(), parameter.name, parameter.at(k / 100)).team(2)
+            with_limit(RobotProperties(), parameter.name, parameter.at(k / 100)).build_team(range(1, 3))
     for law in LAWS:
         if parameter in gain_parameters(law):
             for k in range(11):
@@ -207,11 +208,11 @@ def test_with_no_limit_allowed_the_message_says_so():
 
 
 def test_limits_one_by_one():
-    limits = with_limit(TeamSpec(), "team.sensing_range", None)
-    assert limits == TeamSpec(sensing_range=math.inf)
-    assert with_limit(limits, "radius", 0.2) == TeamSpec(radius=0.2, sensing_range=math.inf)
+    limits = with_limit(RobotProperties(), "team.sensing_range", None)
+    assert limits == RobotProperties(sensing_range=math.inf)
+    assert with_limit(limits, "radius", 0.2) == RobotProperties(radius=0.2, sensing_range=math.inf)
     with pytest.raises(ParameterError, match=r"team\.radius: expected a number .* got inf m"):
-        with_limit(limits, "radius", None).team(1)
+        with_limit(limits, "radius", None).build_team(range(1, 2))
 
 
 def test_gains_of_a_law_of_ones_own():

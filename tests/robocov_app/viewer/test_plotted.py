@@ -11,38 +11,43 @@ from driven_window import opened
 from robocov.cost import CoverageCost
 from robocov.team import Team
 from robocov_app.viewer.session.curves import DISTANCE, TIME
-from robocov_app.viewer.session.scenario import TeamSpec
+from robocov_app.viewer.session.robot_properties import RobotProperties
 
 FAST = Team.homogeneous(2, max_speed=1.0)
 SLOW = Team.homogeneous(1, max_speed=0.25)
-MIXED = TeamSpec.of(Team.concatenate([FAST, SLOW]))
+MIXED = RobotProperties.from_team(Team.concatenate([FAST, SLOW]))
 
 
 def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path: Path) -> None:
-    with opened(tmp_path, limits=MIXED) as driver:
-        session, pane = driver.session, driver.session.panes[0]
-        np.testing.assert_array_equal(session.setup(pane).speeds, [1.0, 1.0, 0.25])
-        session.playing = True
+    with opened(tmp_path, properties=MIXED) as driver:
+        session, pane = driver.session, driver.session.timeline.panes[0]
+        np.testing.assert_array_equal(session.displayed.get_setup(pane).speed_limits, [1.0, 1.0, 0.25])
+        session.playback.is_playing = True
         driver.frames(20)
-        session.playing = False
+        session.playback.is_playing = False
         driver.frames(2)
-        places = session.positions(pane)
-        expected = CoverageCost(session.environment, 16)(places, np.array([1.0, 1.0, 0.25])).mean_time
-        assert pane.curves["time"].value[-1] == expected
-        assert session.compared("time") == (session.time, {pane.number: pytest.approx(expected)})
+        places = session.displayed.get_positions(pane)
+        expected = CoverageCost(session.displayed.environment, 16)(
+            places, np.array([1.0, 1.0, 0.25])
+        ).mean_time
+        assert pane.curves["time"].values[-1] == expected
+        assert session.displayed.get_costs("time") == (
+            session.displayed.time,
+            {pane.number: pytest.approx(expected)},
+        )
         # who has failed does not come, but who is left is still told of
         session.fail_robot(3)
         driver.frames(2)
-        assert session.setup(pane).speeds.tolist() == [1.0, 1.0]
-        assert pane.curves["time"].value[-1] == pytest.approx(pane.curve.value[-1])
+        assert session.displayed.get_setup(pane).speed_limits.tolist() == [1.0, 1.0]
+        assert pane.curves["time"].values[-1] == pytest.approx(pane.distance_curve.values[-1])
 
 
 def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
-    with opened(tmp_path, limits=MIXED) as driver:
+    with opened(tmp_path, properties=MIXED) as driver:
         chart = driver.window.chart
-        driver.session.playing = True
+        driver.session.playback.is_playing = True
         driver.frames(20)
-        driver.session.playing = False
+        driver.session.playback.is_playing = False
         driver.frames(8)
         assert chart.plotted is DISTANCE
         before = driver.picture()
@@ -54,25 +59,25 @@ def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
         driver.click(left + width / 2, top + 6)
         assert chart.plotted is DISTANCE
         # the click was none on the time line
-        assert driver.session.live
+        assert driver.session.timeline.is_live
 
 
 def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
-    with opened(tmp_path, limits=MIXED) as driver:
-        driver.session.playing = True
+    with opened(tmp_path, properties=MIXED) as driver:
+        driver.session.playback.is_playing = True
         driver.frames(60)
-        driver.session.playing = False
-        driver.session.look_at(0.4)
+        driver.session.playback.is_playing = False
+        driver.session.show_time(0.4)
         driver.session.branch()
-        assert [ghost.of for ghost in driver.session.ghosts] == ["distance", "time"]
-        pane = driver.session.panes[0]
-        assert pane.curve.last_time <= 0.4 + 1e-6 and pane.curves["time"].last_time <= 0.4 + 1e-6
+        assert [ghost.quantity for ghost in driver.session.timeline.ghosts] == ["distance", "time"]
+        pane = driver.session.timeline.panes[0]
+        assert pane.distance_curve.last_time <= 0.4 + 1e-6 and pane.curves["time"].last_time <= 0.4 + 1e-6
 
 
 def test_where_all_are_equally_fast_there_is_no_choice(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.frames(3)
-        assert driver.session.setup(driver.session.panes[0]).speeds is None
+        assert driver.session.displayed.get_setup(driver.session.timeline.panes[0]).speed_limits is None
         driver.key("y")
         assert driver.window.chart.plotted is DISTANCE
         assert "equally fast" in driver.viewer.message

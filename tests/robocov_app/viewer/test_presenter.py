@@ -12,7 +12,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, viewer_of
 
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.viewer.session.clock import SPEEDS
-from robocov_app.viewer.session.scenario import MOST_ROBOTS
+from robocov_app.viewer.session.scenario import MAX_ROBOTS
 
 # playing
 
@@ -20,41 +20,43 @@ from robocov_app.viewer.session.scenario import MOST_ROBOTS
 def test_pausing_playing_and_single_steps() -> None:
     viewer = viewer_of()
     do(viewer, "pause")
-    assert viewer.session.playing
+    assert viewer.session.playback.is_playing
     do(viewer, "step")
-    assert not viewer.session.playing and viewer.session.end == pytest.approx(viewer.session.scenario.dt)
+    assert not viewer.session.playback.is_playing and viewer.session.timeline.end_time == pytest.approx(
+        viewer.session.timeline.scenario.dt
+    )
 
 
 def test_settling_plays_until_asked_again() -> None:
     viewer = viewer_of()
     do(viewer, "settle")
-    assert viewer.session.playing and viewer.session.stop_when_settled
+    assert viewer.session.playback.is_playing and viewer.session.playback.stop_when_settled
     do(viewer, "pause")
-    assert not viewer.session.playing and not viewer.session.stop_when_settled
+    assert not viewer.session.playback.is_playing and not viewer.session.playback.stop_when_settled
     do(viewer, "settle")
     do(viewer, "settle")
-    assert viewer.session.playing and not viewer.session.stop_when_settled
+    assert viewer.session.playback.is_playing and not viewer.session.playback.stop_when_settled
 
 
 def test_speeds_go_by_steps_and_stop_at_both_ends() -> None:
     viewer = viewer_of()
-    seen = [viewer.session.clock.speed]
+    seen = [viewer.session.playback.clock.speed]
     for _ in SPEEDS:
         do(viewer, "faster")
-        seen.append(viewer.session.clock.speed)
+        seen.append(viewer.session.playback.clock.speed)
     assert seen[:2] == [1.0, 2.0] and seen[-2:] == [math.inf, math.inf]
     assert viewer.message == "speed max"
     for _ in SPEEDS:
         do(viewer, "slower")
-    assert viewer.session.clock.speed == SPEEDS[0]
+    assert viewer.session.playback.clock.speed == SPEEDS[0]
 
 
 def test_a_typed_speed_between_the_steps_goes_on_to_the_next_of_them() -> None:
     viewer = viewer_of()
     typed(viewer, "speed 3.3")
-    assert viewer.session.clock.speed == 3.3
+    assert viewer.session.playback.clock.speed == 3.3
     do(viewer, "faster")
-    assert viewer.session.clock.speed == 8.0
+    assert viewer.session.playback.clock.speed == 8.0
 
 
 def test_restarting_keeps_controller_and_gains() -> None:
@@ -62,20 +64,20 @@ def test_restarting_keeps_controller_and_gains() -> None:
     typed(viewer, "k_rep 2")
     do(viewer, "step")
     do(viewer, "restart")
-    assert viewer.session.end == 0.0 and viewer.pane.law.value("k_rep") == 2.0
+    assert viewer.session.timeline.end_time == 0.0 and viewer.pane.controller.get_value("k_rep") == 2.0
 
 
 def test_another_seed_gives_other_starts_and_another_start_too() -> None:
     viewer = viewer_of()
-    places = [viewer.session.positions(viewer.pane).copy()]
+    places = [viewer.session.displayed.get_positions(viewer.pane).copy()]
     for action in ("seed:next", "start:next", "start:next"):
         do(viewer, action)
-        places.append(viewer.session.positions(viewer.pane).copy())
+        places.append(viewer.session.displayed.get_positions(viewer.pane).copy())
         assert not np.allclose(places[-1], places[-2])
-    assert viewer.session.scenario.start_name == "spread"
+    assert viewer.session.timeline.scenario.start_name == "spread"
     for _ in range(2):
         do(viewer, "start:next")
-    assert viewer.session.scenario.start_name == "corner"
+    assert viewer.session.timeline.scenario.start_name == "corner"
 
 
 def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_on() -> None:
@@ -83,19 +85,19 @@ def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_o
     viewer.tools["circle"].press(viewer.session, (5.2, 3.2), 0.1, None)
     viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (5.2, 3.75)))
     assert viewer.message.endswith("it covers the start far") and "far" not in viewer.starts()
-    assert viewer.session.scenario.start_name == "far"
+    assert viewer.session.timeline.scenario.start_name == "far"
     do(viewer, "start:next")
-    assert not viewer.trouble and viewer.session.scenario.start_name == "corner"
+    assert not viewer.trouble and viewer.session.timeline.scenario.start_name == "corner"
 
 
 def test_more_and_fewer_robots() -> None:
     viewer = viewer_of(robots=2)
     do(viewer, "more")
-    assert viewer.session.scenario.robots == 3 and len(viewer.session.numbers) == 3
+    assert viewer.session.timeline.scenario.robots == 3 and len(viewer.session.displayed.numbers) == 3
     for _ in range(3):
         do(viewer, "fewer")
-    assert viewer.session.scenario.robots == 1 and viewer.trouble
-    assert viewer.message == f"robots: expected a whole number from 1 to {MOST_ROBOTS}, got 0"
+    assert viewer.session.timeline.scenario.robots == 1 and viewer.trouble
+    assert viewer.message == f"robots: expected a whole number from 1 to {MAX_ROBOTS}, got 0"
 
 
 def test_robots_without_room_are_told_and_nothing_changes() -> None:
@@ -114,9 +116,12 @@ def test_maps_are_turned_through_both_ways() -> None:
     typed(viewer, "map rooms")
     names = list(list_bundled_maps())
     do(viewer, "map:next")
-    assert viewer.map_name == names[names.index("rooms") + 1] and viewer.session.environment.name != HALL.name
+    assert (
+        viewer.map_name == names[names.index("rooms") + 1]
+        and viewer.session.displayed.environment.name != HALL.name
+    )
     do(viewer, "map:previous")
-    assert viewer.map_name == "rooms" and viewer.session.scenario.start_name == "corridor"
+    assert viewer.map_name == "rooms" and viewer.session.timeline.scenario.start_name == "corridor"
 
 
 def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> None:
@@ -125,7 +130,7 @@ def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> N
     for name in ("nowhere", str(tmp_path / "x.json"), str(tmp_path)):
         viewer.attempt(lambda name=name: viewer.open_map(name))
         assert viewer.trouble and viewer.message and viewer.map_name == "hall"
-        assert viewer.session.environment is HALL
+        assert viewer.session.displayed.environment is HALL
         viewer.trouble = False
 
 
@@ -144,7 +149,7 @@ def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> Non
     do(viewer, "save:map")
     first = tmp_path / "hall-1.json"
     assert viewer.message == f"map saved: {first}" and viewer.map_name == str(first)
-    assert load_map(str(first)).obstacles == viewer.session.environment.obstacles
+    assert load_map(str(first)).obstacles == viewer.session.displayed.environment.obstacles
     do(viewer, "save:map")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hall-1.json", "hall-2.json"]
 
@@ -165,16 +170,16 @@ def test_looking_back_and_forth() -> None:
         do(viewer, "step")
     session = viewer.session
     do(viewer, "back")
-    assert session.time == pytest.approx(119 / 60) and not session.live
+    assert session.displayed.time == pytest.approx(119 / 60) and not session.timeline.is_live
     do(viewer, "back:second")
-    assert session.time == pytest.approx(59 / 60, abs=1e-6)
+    assert session.displayed.time == pytest.approx(59 / 60, abs=1e-6)
     do(viewer, "forward:second")
     do(viewer, "forward")
-    assert session.live
+    assert session.timeline.is_live
     do(viewer, "first")
-    assert session.time == 0.0
+    assert session.displayed.time == 0.0
     do(viewer, "live")
-    assert session.live and session.time == pytest.approx(2.0)
+    assert session.timeline.is_live and session.displayed.time == pytest.approx(2.0)
 
 
 def test_branching_goes_on_from_the_past_and_at_the_present_says_how() -> None:
@@ -182,10 +187,14 @@ def test_branching_goes_on_from_the_past_and_at_the_present_says_how() -> None:
     for _ in range(30):
         do(viewer, "step")
     do(viewer, "branch:here")
-    assert "go back first" in viewer.message and not viewer.session.playing
+    assert "go back first" in viewer.message and not viewer.session.playback.is_playing
     do(viewer, "first")
     do(viewer, "branch:here")
-    assert viewer.session.playing and viewer.session.end == 0.0 and "ghost" in viewer.message
+    assert (
+        viewer.session.playback.is_playing
+        and viewer.session.timeline.end_time == 0.0
+        and "ghost" in viewer.message
+    )
 
 
 # panes
@@ -195,8 +204,8 @@ def test_panes_come_with_controllers_that_are_not_there_yet_and_go() -> None:
     viewer = viewer_of(RPF)
     for count in (2, 3, 4):
         do(viewer, "pane:add")
-        assert len(viewer.session.panes) == count and viewer.active == count - 1
-    names = [pane.law.name for pane in viewer.session.panes]
+        assert len(viewer.session.timeline.panes) == count and viewer.active == count - 1
+    names = [pane.controller.name for pane in viewer.session.timeline.panes]
     assert names[0] == "rpf" and len(set(names)) == 4
     do(viewer, "pane:add")
     assert viewer.trouble and "4" in viewer.message
@@ -204,35 +213,35 @@ def test_panes_come_with_controllers_that_are_not_there_yet_and_go() -> None:
     assert viewer.active == 0
     for count in (3, 2, 1):
         do(viewer, "pane:remove")
-        assert len(viewer.session.panes) == count
+        assert len(viewer.session.timeline.panes) == count
     viewer.trouble = False
     do(viewer, "pane:remove")
-    assert viewer.trouble and len(viewer.session.panes) == 1
+    assert viewer.trouble and len(viewer.session.timeline.panes) == 1
 
 
 def test_the_chosen_pane_is_one_that_there_is() -> None:
     viewer = viewer_of(RAPF, RPF)
     viewer.active = 1
-    viewer.session.remove_pane(viewer.session.panes[1])
-    assert viewer.pane is viewer.session.panes[0] and viewer.active == 0
+    viewer.session.remove_pane(viewer.session.timeline.panes[1])
+    assert viewer.pane is viewer.session.timeline.panes[0] and viewer.active == 0
 
 
 def test_controllers_take_turns() -> None:
     viewer = viewer_of()
     seen = []
     for _ in range(len(viewer.laws)):
-        seen.append(viewer.pane.law.name)
+        seen.append(viewer.pane.controller.name)
         do(viewer, "law")
-    assert sorted(seen) == sorted(viewer.laws) and viewer.pane.law.name == seen[0]
+    assert sorted(seen) == sorted(viewer.laws) and viewer.pane.controller.name == seen[0]
 
 
 def test_choosing_the_controller_that_is_there_keeps_its_gains() -> None:
     viewer = viewer_of(RAPF, RPF)
     typed(viewer, "k_rep 2")
     viewer.set_law(0, "rapf")
-    assert viewer.session.panes[0].law.value("k_rep") == 2.0
+    assert viewer.session.timeline.panes[0].controller.get_value("k_rep") == 2.0
     viewer.set_law(1, "lloyd")
-    assert viewer.active == 1 and viewer.pane.law == LLOYD
+    assert viewer.active == 1 and viewer.pane.controller == LLOYD
 
 
 # robots
@@ -258,11 +267,11 @@ def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
         assert viewer.trouble and "no robot is chosen" in viewer.message
     viewer.hand.selected = 2
     do(viewer, "robot:fail")
-    assert viewer.session.numbers == (1, 3) and viewer.selected == 2
+    assert viewer.session.displayed.numbers == (1, 3) and viewer.selected == 2
     do(viewer, "robot:fail")
-    assert viewer.session.numbers == (1, 2, 3)
+    assert viewer.session.displayed.numbers == (1, 2, 3)
     do(viewer, "robot:remove")
-    assert viewer.session.numbers == (1, 3) and viewer.selected is None
+    assert viewer.session.displayed.numbers == (1, 3) and viewer.selected is None
 
 
 def test_undo_says_what_began_anew_and_the_map_has_its_name_again() -> None:
@@ -291,11 +300,15 @@ def test_undo_and_redo_say_what_they_did() -> None:
     assert viewer.message == "nothing to redo"
     viewer.session.add_robot((5.0, 3.0))
     do(viewer, "undo")
-    assert viewer.message == "undone: robot 4 joined; back at 0.0 s" and viewer.session.numbers == (1, 2, 3)
+    assert viewer.message == "undone: robot 4 joined; back at 0.0 s" and viewer.session.displayed.numbers == (
+        1,
+        2,
+        3,
+    )
     do(viewer, "undo")
     assert viewer.message == "nothing to undo; Alt ← leads to other branches"
     do(viewer, "redo")
-    assert viewer.message == "done again: robot 4 joined" and viewer.session.numbers == (1, 2, 3, 4)
+    assert viewer.message == "done again: robot 4 joined" and viewer.session.displayed.numbers == (1, 2, 3, 4)
 
 
 # tools

@@ -15,7 +15,7 @@ from robocov.errors import InputError, ParameterError, RobocovError
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import SAID_FOR, Presenter, plain
-from robocov_app.viewer.session.scenario import MOST_ROBOTS
+from robocov_app.viewer.session.scenario import MAX_ROBOTS
 
 # what is shown
 
@@ -60,7 +60,7 @@ def test_a_new_map_is_told_to_the_cost() -> None:
     do(viewer, "step")
     assert told == []
     viewer.attempt(lambda: viewer.open_map("square"))
-    assert told == [viewer.session.environment]
+    assert told == [viewer.session.displayed.environment]
 
 
 # gains and limits
@@ -71,8 +71,11 @@ def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
     viewer.active = 1
     viewer.set_parameter("k_rep", 1.5)
     viewer.set_parameter("team.max_speed", 0.7)
-    assert [pane.law.value("k_rep") for pane in viewer.session.panes] == [RAPF.value("k_rep"), 1.5]
-    assert all(pane.setup.limits.max_speed == 0.7 for pane in viewer.session.panes)
+    assert [pane.controller.get_value("k_rep") for pane in viewer.session.timeline.panes] == [
+        RAPF.get_value("k_rep"),
+        1.5,
+    ]
+    assert all(pane.setup.properties.max_speed == 0.7 for pane in viewer.session.timeline.panes)
     names = [each.name for each in viewer.parameters()]
     assert "k_att" not in names and "team.radius" in names
 
@@ -80,7 +83,7 @@ def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
 def test_no_limit_can_be_set_where_there_may_be_none() -> None:
     viewer = viewer_of()
     typed(viewer, "sensing_range none")
-    assert viewer.pane.setup.limits.sensing_range == math.inf
+    assert viewer.pane.setup.properties.sensing_range == math.inf
     with pytest.raises(ParameterError, match="expected a number"):
         typed(viewer, "max_speed none")
 
@@ -92,7 +95,7 @@ def test_no_limit_can_be_set_where_there_may_be_none() -> None:
 def test_gains_can_be_typed(text: str) -> None:
     viewer = viewer_of()
     typed(viewer, text)
-    assert viewer.pane.law.value("k_rep") == 0.5
+    assert viewer.pane.controller.get_value("k_rep") == 0.5
 
 
 def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
@@ -100,18 +103,18 @@ def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
     typed(viewer, "robots 4")
     typed(viewer, "seed 7")
     typed(viewer, "start far")
-    scenario = viewer.session.scenario
+    scenario = viewer.session.timeline.scenario
     assert (scenario.robots, scenario.seed, scenario.start_name) == (4, 7, "far")
     typed(viewer, "controller rpf")
-    assert viewer.pane.law == RPF
+    assert viewer.pane.controller == RPF
     typed(viewer, "speed max")
-    assert math.isinf(viewer.session.clock.speed)
+    assert math.isinf(viewer.session.playback.clock.speed)
     typed(viewer, "speed 4×")
-    assert viewer.session.clock.speed == 4.0
+    assert viewer.session.playback.clock.speed == 4.0
     for _ in range(60):
-        viewer.session.step()
+        viewer.session.playback.step()
     typed(viewer, "time 0.5")
-    assert viewer.session.time == pytest.approx(0.5)
+    assert viewer.session.displayed.time == pytest.approx(0.5)
     typed(viewer, "robot 3")
     assert viewer.selected == 3
     typed(viewer, "branch 1")
@@ -136,10 +139,10 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
     )
     viewer = viewer_of()
     typed(viewer, f"controller {mine}:Still")
-    assert viewer.laws[-1] == f"{mine}:Still" == viewer.pane.law.name
-    viewer.session.step()
+    assert viewer.laws[-1] == f"{mine}:Still" == viewer.pane.controller.name
+    viewer.session.playback.step()
     do(viewer, "law")
-    assert viewer.pane.law.name == viewer.laws[0]
+    assert viewer.pane.controller.name == viewer.laws[0]
 
 
 @pytest.mark.parametrize(
@@ -153,7 +156,7 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
         "robots many",
         "robots 1.5",
         "robots -3",
-        f"robots {MOST_ROBOTS + 1}",
+        f"robots {MAX_ROBOTS + 1}",
         "seed -1",
         "seed x",
         "start nowhere",
@@ -192,7 +195,7 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
 def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> None:
     viewer = viewer_of()
     for _ in range(3):
-        viewer.session.step()
+        viewer.session.playback.step()
     before = all_told(viewer.session), viewer.map_name, viewer.hand.selected, list(viewer.laws)
     viewer.attempt(lambda: typed(viewer, text))
     assert viewer.trouble, text

@@ -19,9 +19,10 @@ from touched_run import (
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
-from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.pane import resumed
-from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.pane import resume_simulation
+from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.session import Session
 
 # beginning anew
@@ -29,91 +30,98 @@ from robocov_app.viewer.session.session import Session
 
 def test_it_begins_anew_as_it_began():
     session = begun(RAPF, LLOYD)
-    start = session.positions(session.panes[0]).copy()
+    start = session.displayed.get_positions(session.timeline.panes[0]).copy()
     stepped(session, 20)
     session.fail_robot(1)
     session.add_robot((3.0, 3.0))
-    serial = session.serial
+    serial = session.timeline.past_version
     session.restart()
-    assert session.serial == serial + 1
-    assert (session.time, session.history.steps, session.live) == (0.0, [0], True)
+    assert session.timeline.past_version == serial + 1
+    assert (session.displayed.time, session.timeline.history.steps, session.timeline.is_live) == (
+        0.0,
+        [0],
+        True,
+    )
     assert robots_of(session) == ((1, 2, 3), ())
-    for pane in session.panes:
-        np.testing.assert_array_equal(session.positions(pane), start)
-    assert list(session.events) == list(session.ghosts) == []
+    for pane in session.timeline.panes:
+        np.testing.assert_array_equal(session.displayed.get_positions(pane), start)
+    assert list(session.timeline.events) == list(session.timeline.ghosts) == []
     assert session.undo() == "begun anew"
-    assert robots_of(session) == ((2, 3, 4), (1,)) and session.time == 20 / 60
+    assert robots_of(session) == ((2, 3, 4), (1,)) and session.displayed.time == 20 / 60
 
 
 def test_everything_can_be_undone_to_the_first_moment_also_restarts() -> None:
     session = begun()
-    session.edit(with_obstacle(session.environment, CircleObstacle((5.2, 0.4), 0.2)), "circle drawn")
+    session.edit_map(
+        add_obstacle(session.displayed.environment, CircleObstacle((5.2, 0.4), 0.2)), "circle drawn"
+    )
     session.add_robot((3.4, 3.0))
     session.restart(seed=3)
     assert robots_of(session) == ((1, 2, 3), ())
     assert [session.undo() for _ in range(4)] == ["seed 3", "robot 4 joined", "circle drawn", None]
-    assert session.environment is HALL and session.head.parent is None
+    assert session.displayed.environment is HALL and session.timeline.head.parent is None
     assert [session.redo() for _ in range(4)] == ["circle drawn", "robot 4 joined", "seed 3", None]
-    assert session.scenario.seed == 3 and robots_of(session) == ((1, 2, 3), ())
+    assert session.timeline.scenario.seed == 3 and robots_of(session) == ((1, 2, 3), ())
 
 
 def test_it_begins_anew_with_changes():
     session = begun(RAPF)
     session.restart(robots=5)
-    assert session.numbers == (1, 2, 3, 4, 5)
+    assert session.displayed.numbers == (1, 2, 3, 4, 5)
     session.restart(start="far", seed=4)
     np.testing.assert_array_equal(
-        session.positions(session.panes[0]), HALL.start("far").sample(5, seed=4, radius=0.1)
+        session.displayed.get_positions(session.timeline.panes[0]),
+        HALL.start("far").sample(5, seed=4, radius=0.1),
     )
-    session.restart(laws=(RPF, LLOYD), limits=TeamSpec(radius=0.15))
-    assert [pane.law for pane in session.panes] == [RPF, LLOYD]
-    assert session.scenario.start == "far"
+    session.restart(controllers=(RPF, LLOYD))
+    assert [pane.controller for pane in session.timeline.panes] == [RPF, LLOYD]
+    assert session.timeline.scenario.start == "far"
     other = Environment("other", ((0, 0), (9, 0), (9, 9), (0, 9)))
     session.restart(environment=other)
-    assert session.environment is other
-    assert session.scenario.start_name == "uniform"
+    assert session.displayed.environment is other
+    assert session.timeline.scenario.start_name == "uniform"
 
 
 def test_what_was_chosen_stays_chosen():
     session = begun(RAPF, RPF)
-    session.set_law(session.panes[0], LLOYD)
-    session.set_limits(TeamSpec(radius=0.2))
-    session.edit(with_pillar(), "circle drawn")
+    session.set_controller(session.timeline.panes[0], LLOYD)
+    session.set_properties(RobotProperties(radius=0.2))
+    session.edit_map(with_pillar(), "circle drawn")
     session.restart()
-    assert [pane.law for pane in session.panes] == [LLOYD, RPF]
-    assert session.panes[0].setup.limits == TeamSpec(radius=0.2)
-    assert session.environment.obstacles[-1] == PILLAR
+    assert [pane.controller for pane in session.timeline.panes] == [LLOYD, RPF]
+    assert session.timeline.panes[0].setup.properties == RobotProperties(radius=0.2)
+    assert session.displayed.environment.obstacles[-1] == PILLAR
 
 
 def test_also_while_the_past_is_looked_at():
     session = stepped(begun(RAPF), 10)
-    session.edit(with_pillar(), "circle drawn")
-    session.set_law(session.panes[0], LLOYD)
+    session.edit_map(with_pillar(), "circle drawn")
+    session.set_controller(session.timeline.panes[0], LLOYD)
     stepped(session, 10)
-    session.look_at(0.0)
-    assert session.environment is HALL
+    session.show_time(0.0)
+    assert session.displayed.environment is HALL
     session.restart()
-    assert session.environment.obstacles[-1] == PILLAR
-    assert session.panes[0].law == LLOYD
+    assert session.displayed.environment.obstacles[-1] == PILLAR
+    assert session.timeline.panes[0].controller == LLOYD
 
 
 def test_a_start_that_was_covered_is_not_gone_back_to():
     session = begun(start="far")
-    session.edit(with_obstacle(HALL, CircleObstacle((5.2, 3.2), 0.6)), "circle drawn")
-    assert "far" not in session.environment.starts
+    session.edit_map(add_obstacle(HALL, CircleObstacle((5.2, 3.2), 0.6)), "circle drawn")
+    assert "far" not in session.displayed.environment.starts
     session.restart()
-    assert session.scenario.start is None
-    assert session.scenario.start_name == "corner"
+    assert session.timeline.scenario.start is None
+    assert session.timeline.scenario.start_name == "corner"
 
 
 def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
     given_starts = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 3.0]])
-    session = stepped(begun(given=given_starts), 10)
-    session.restart(laws=(RPF,))
-    np.testing.assert_array_equal(session.positions(session.panes[0]), given_starts)
+    session = stepped(begun(given_starts=given_starts), 10)
+    session.restart(controllers=(RPF,))
+    np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[0]), given_starts)
     session.restart(seed=1)
-    assert session.scenario.given is None
-    assert np.abs(session.positions(session.panes[0]) - given_starts).max() > 0.1
+    assert session.timeline.scenario.given_starts is None
+    assert np.abs(session.displayed.get_positions(session.timeline.panes[0]) - given_starts).max() > 0.1
 
 
 @pytest.mark.parametrize(
@@ -122,10 +130,8 @@ def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
         {"robots": 0},
         {"robots": 700},
         {"start": "nowhere"},
-        {"laws": (ControllerChoice("nobody"),)},
-        {"laws": ()},
-        {"limits": TeamSpec(radius=3.0)},
-        {"limits": TeamSpec(max_speed=-1.0)},
+        {"controllers": (ControllerChoice("nobody"),)},
+        {"controllers": ()},
         {"dt": 7.0},
         {"seed": -1},
     ],
@@ -133,7 +139,7 @@ def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
 def test_what_cannot_be_begun_leaves_all_as_it_is(changes):
     session = stepped(begun(RAPF, LLOYD), 12)
     session.fail_robot(2)
-    session.look_at(0.1)
+    session.show_time(0.1)
     before = all_told(session)
     with pytest.raises((StartError, ParameterError)):
         session.restart(**changes)
@@ -145,76 +151,76 @@ def test_what_cannot_be_begun_leaves_all_as_it_is(changes):
 
 def test_another_controller_takes_over_in_one_pane():
     session = stepped(begun(RAPF, RAPF), 20)
-    session.set_law(session.panes[1], LLOYD)
-    assert [pane.law for pane in session.panes] == [RAPF, LLOYD]
-    assert session.scenario.laws == (RAPF, LLOYD)
-    assert session.events[-1].text == "Lloyd takes over"
-    session.set_law(session.panes[0], RAPF.with_gain("k_rep", 0.5))
-    assert session.events[-1].text == "RAPF: k_rep = 0.5"
-    assert len(session.history) == 21
+    session.set_controller(session.timeline.panes[1], LLOYD)
+    assert [pane.controller for pane in session.timeline.panes] == [RAPF, LLOYD]
+    assert session.timeline.scenario.controllers == (RAPF, LLOYD)
+    assert session.timeline.events[-1].text == "Lloyd takes over"
+    session.set_controller(session.timeline.panes[0], RAPF.with_gain("k_rep", 0.5))
+    assert session.timeline.events[-1].text == "RAPF: k_rep = 0.5"
+    assert len(session.timeline.history) == 21
     stepped(session, 20)
 
 
 def test_the_same_controller_again_is_no_event():
     session = stepped(begun(RAPF), 10)
-    session.look_at(0.0)
+    session.show_time(0.0)
     before = all_told(session)
-    session.set_law(session.panes[0], ControllerChoice("rapf"))
-    session.set_limits(TeamSpec())
+    session.set_controller(session.timeline.panes[0], ControllerChoice("rapf"))
+    session.set_properties(RobotProperties())
     assert all_told(session) == before
 
 
 def test_what_was_then_counts_not_what_is_now():
     session = stepped(begun(), 20)
-    session.set_limits(TeamSpec(max_speed=0.5))
-    session.set_law(session.panes[0], LLOYD)
+    session.set_properties(RobotProperties(max_speed=0.5))
+    session.set_controller(session.timeline.panes[0], LLOYD)
     stepped(session, 20)
-    session.look_at(0.1)
-    session.set_limits(TeamSpec(max_speed=0.5))
-    assert session.live
-    assert session.panes[0].setup.limits.max_speed == 0.5
-    assert session.panes[0].law == RAPF
-    assert session.end == pytest.approx(0.1)
+    session.show_time(0.1)
+    session.set_properties(RobotProperties(max_speed=0.5))
+    assert session.timeline.is_live
+    assert session.timeline.panes[0].setup.properties.max_speed == 0.5
+    assert session.timeline.panes[0].controller == RAPF
+    assert session.timeline.end_time == pytest.approx(0.1)
 
 
 def test_limits_are_those_of_all():
     session = stepped(begun(RAPF, LLOYD), 20)
-    session.set_limits(TeamSpec(max_speed=0.3, communication_range=0.5))
-    for pane in session.panes:
+    session.set_properties(RobotProperties(max_speed=0.3, communication_range=0.5))
+    for pane in session.timeline.panes:
         assert pane.simulation.team.max_speed.tolist() == [0.3] * 3
         assert not pane.simulation.observe_and_decide().seen.neighbors.is_complete
-    assert session.events[-1].kind == "limits"
+    assert session.timeline.events[-1].kind == "limits"
     before = all_told(session)
-    for limits in (TeamSpec(max_speed=0.0), TeamSpec(radius=1.9)):
+    for limits in (RobotProperties(max_speed=0.0), RobotProperties(radius=1.9)):
         with pytest.raises((ParameterError, StartError)):
-            session.set_limits(limits)
+            session.set_properties(limits)
         assert all_told(session) == before
 
 
 def test_larger_robots_make_room_for_each_other():
     session = begun(robots=6)
-    session.set_limits(TeamSpec(radius=0.3))
-    places = session.positions(session.panes[0])
+    session.set_properties(RobotProperties(radius=0.3))
+    places = session.displayed.get_positions(session.timeline.panes[0])
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     assert apart[np.triu_indices(6, 1)].min() >= 0.6
     assert too_deep(session) <= 0.0
 
 
 def test_unicycles_go_on_from_any_moment_bit_for_bit() -> None:
-    session = begun(RAPF, limits=TeamSpec(track_width=0.16))
+    session = begun(RAPF, properties=RobotProperties(track_width=0.16))
     stepped(session, 60)
-    wanted, steering = positions_of(session), session.panes[0].simulation.steering
-    again = Session(session.document.nodes[0].scenario)
+    wanted, steering = positions_of(session), session.timeline.panes[0].simulation.steering
+    again = Session(session.timeline.document.nodes[0].scenario)
     stepped(again, 60)
     assert [each.tobytes() for each in positions_of(again)] == [each.tobytes() for each in wanted]
-    state = session.panes[0].state()
-    going_on = resumed(state, session.history.dt, 60)
-    session.panes[0].simulation.step()
+    state = session.timeline.panes[0].build_state()
+    going_on = resume_simulation(state, session.timeline.history.dt, 60)
+    session.timeline.panes[0].simulation.step()
     going_on.step()
-    assert going_on.positions.tobytes() == session.panes[0].simulation.positions.tobytes()
+    assert going_on.positions.tobytes() == session.timeline.panes[0].simulation.positions.tobytes()
     assert going_on.steering is not None and steering is not None
     assert (going_on.steering != steering).any()
     # who stays keeps its heading when another one leaves
-    now = session.panes[0].simulation.steering
+    now = session.timeline.panes[0].simulation.steering
     session.fail_robot(1)
-    assert now is not None and (session.panes[0].simulation.steering == now[1:]).all()
+    assert now is not None and (session.timeline.panes[0].simulation.steering == now[1:]).all()

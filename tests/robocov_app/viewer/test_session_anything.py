@@ -13,16 +13,16 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, step
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov_app.viewer.session.map_edits import moved, with_obstacle, with_replaced
-from robocov_app.viewer.session.scenario import TeamSpec
-from robocov_app.viewer.session.session import MOST_GHOSTS
+from robocov_app.viewer.session.ghosts import MAX_GHOST_BRANCHES
+from robocov_app.viewer.session.map_edits import add_obstacle, move_obstacle, replace_obstacles
+from robocov_app.viewer.session.robot_properties import RobotProperties
 
 # anything
 
 points = st.tuples(st.floats(-0.5, 6.5), st.floats(-0.5, 4.5))
 laws = st.sampled_from([RAPF, RPF, LLOYD, RAPF.with_gain("k_rep", 1.0)])
 some_limits = st.builds(
-    TeamSpec,
+    RobotProperties,
     radius=st.sampled_from([0.05, 0.1, 0.25]),
     max_speed=st.sampled_from([0.5, 1.0, 4.0]),
     sensing_range=st.sampled_from([0.3, 3.0, np.inf]),
@@ -56,24 +56,24 @@ class Anything(RuleBasedStateMachine):
 
     @rule(playing=st.booleans())
     def pause(self, playing):
-        self.session.playing = playing
+        self.session.playback.is_playing = playing
 
     @rule(seconds=st.floats(0.0, 0.2))
     def pass_time(self, seconds):
-        self.session.advance(seconds)
+        self.session.playback.advance(seconds)
 
     @rule(k=st.integers(0, 9), point=points)
     def grab(self, k, point):
-        self.attempt(lambda: self.session.grab(self.number(k), point))
+        self.attempt(lambda: self.session.drag_robot(self.number(k), point))
 
     @rule()
     def release(self):
         self.session.release()
-        assert self.session.hand is None
+        assert self.session.timeline.drag is None
 
     @rule(k=st.integers(0, 9), point=points)
     def place(self, k, point):
-        self.attempt(lambda: self.session.place(self.number(k), point))
+        self.attempt(lambda: self.session.place_robot(self.number(k), point))
 
     @rule(point=points)
     def add_robot(self, point):
@@ -95,54 +95,54 @@ class Anything(RuleBasedStateMachine):
     def draw(self, point, radius):
         def draw():
             circle = CircleObstacle(point, radius)
-            self.session.edit(with_obstacle(self.session.environment, circle), "circle drawn")
+            self.session.edit_map(add_obstacle(self.session.displayed.environment, circle), "circle drawn")
 
         self.attempt(draw)
 
     @rule(k=st.integers(0, 9), by=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
     def move_obstacle(self, k, by):
-        there = self.session.environment
+        there = self.session.displayed.environment
         if there.obstacles:
             k %= len(there.obstacles)
             self.attempt(
-                lambda: self.session.edit(
-                    with_replaced(there, k, 1, [moved(there.obstacles[k], *by)]), "moved"
+                lambda: self.session.edit_map(
+                    replace_obstacles(there, k, 1, [move_obstacle(there.obstacles[k], *by)]), "moved"
                 )
             )
 
     @rule(k=st.integers(0, 9))
     def delete_obstacle(self, k):
-        there = self.session.environment
+        there = self.session.displayed.environment
         if there.obstacles:
             k %= len(there.obstacles)
-            self.attempt(lambda: self.session.edit(with_replaced(there, k, 1), "deleted"))
+            self.attempt(lambda: self.session.edit_map(replace_obstacles(there, k, 1), "deleted"))
 
     @rule(redo=st.booleans())
     def undo(self, redo):
-        self.session.look_at(1e9)
+        self.session.show_time(1e9)
         self.attempt(self.session.redo if redo else self.session.undo)
 
     @rule(k=st.integers(0, 3), law=laws)
     def set_law(self, k, law):
-        pane = self.session.panes[k % len(self.session.panes)]
-        self.attempt(lambda: self.session.set_law(pane, law))
+        pane = self.session.timeline.panes[k % len(self.session.timeline.panes)]
+        self.attempt(lambda: self.session.set_controller(pane, law))
 
-    @rule(limits=some_limits)
+    @rule(properties=some_limits)
     def set_limits(self, limits):
-        self.attempt(lambda: self.session.set_limits(limits))
+        self.attempt(lambda: self.session.set_properties(limits))
 
     @rule(part=st.floats(0.0, 1.0))
     def look_at(self, part):
-        self.session.look_at(part * self.session.end)
+        self.session.show_time(part * self.session.timeline.end_time)
 
     @rule(by=st.integers(-8, 8))
     def look_by(self, by):
-        self.session.look_by(by)
+        self.session.show_offset(by)
 
     @rule()
     def branch(self):
         self.attempt(self.session.branch)
-        assert self.session.live
+        assert self.session.timeline.is_live
 
     @rule(robots=st.integers(1, 6) | st.none())
     def restart(self, robots):
@@ -150,74 +150,83 @@ class Anything(RuleBasedStateMachine):
 
     @rule(law=laws)
     def add_pane(self, law):
-        if len(self.session.panes) < 3:
+        if len(self.session.timeline.panes) < 3:
             self.attempt(lambda: self.session.add_pane(law))
 
     @rule(k=st.integers(0, 3))
     def remove_pane(self, k):
-        if len(self.session.panes) > 1:
-            self.session.remove_pane(self.session.panes[k % len(self.session.panes)])
+        if len(self.session.timeline.panes) > 1:
+            self.session.remove_pane(self.session.timeline.panes[k % len(self.session.timeline.panes)])
 
     @invariant()
     def lanes_are_alike(self):
         if not hasattr(self, "session"):
             return
         session = self.session
-        first = session.panes[0].setup
+        first = session.timeline.panes[0].setup
         assert len(first.numbers) >= 1
         assert list(first.numbers) == sorted(set(first.numbers))
         assert not set(first.numbers) & set(first.failed)
-        for pane in session.panes:
+        for pane in session.timeline.panes:
             there = pane.setup
             assert there.numbers == first.numbers
             assert set(there.failed) == set(first.failed)
             assert there.environment is first.environment
-            assert there.limits == first.limits
+            assert there.properties == first.properties
             count = len(there.numbers)
             for rows in (pane.simulation.positions, pane.starts, pane.trail.positions[-1]):
                 assert rows.shape == (count, 2)
                 assert np.isfinite(rows).all()
             assert len(pane.simulation.team) == count
-        assert len({pane.number for pane in session.panes}) == len(session.panes)
-        assert session.scenario.environment is first.environment
-        assert session.scenario.laws == tuple(pane.law for pane in session.panes)
-        assert session.scenario.limits == first.limits
+        assert len({pane.number for pane in session.timeline.panes}) == len(session.timeline.panes)
+        assert session.timeline.scenario.environment is first.environment
+        assert session.timeline.scenario.controllers == tuple(
+            pane.controller for pane in session.timeline.panes
+        )
+        assert session.timeline.scenario.properties == first.properties
 
     @invariant()
     def times_are_consistent(self):
         if not hasattr(self, "session"):
             return
         session = self.session
-        assert 0.0 <= session.time <= session.end
-        assert session.live == (session.time == session.end)
-        assert (np.diff(session.history.steps) > 0).all()
-        assert session.history.time(len(session.history) - 1) == session.end
-        for pane in session.panes:
-            assert pane.time == pytest.approx(session.end, abs=1e-9)
-            assert (np.diff(pane.trail.time) > 0).all()
-            assert pane.trail.time[-1] <= session.end + 1e-9
-            last = session.history.last.states[pane.number]
+        assert 0.0 <= session.displayed.time <= session.timeline.end_time
+        assert session.timeline.is_live == (session.displayed.time == session.timeline.end_time)
+        assert (np.diff(session.timeline.history.steps) > 0).all()
+        assert (
+            session.timeline.history.get_time(len(session.timeline.history) - 1) == session.timeline.end_time
+        )
+        for pane in session.timeline.panes:
+            assert pane.time == pytest.approx(session.timeline.end_time, abs=1e-9)
+            assert (np.diff(pane.trail.times) > 0).all()
+            assert pane.trail.times[-1] <= session.timeline.end_time + 1e-9
+            last = session.timeline.history.last.states[pane.number]
             np.testing.assert_array_equal(last.positions, pane.simulation.positions)
             np.testing.assert_array_equal(last.velocities, pane.simulation.velocities)
             assert last.setup is pane.setup
-        assert len(session.ghosts) <= 2 * MOST_GHOSTS * len(session.panes)
-        times = [event.time for event in session.events]
+        assert len(session.timeline.ghosts) <= 2 * MAX_GHOST_BRANCHES * len(session.timeline.panes)
+        times = [event.time for event in session.timeline.events]
         assert times == sorted(times)
-        assert not times or times[-1] <= session.end
-        assert session.hand is None or (session.live and session.hand[0] in session.numbers)
+        assert not times or times[-1] <= session.timeline.end_time
+        assert session.timeline.drag is None or (
+            session.timeline.is_live and session.timeline.drag[0] in session.displayed.numbers
+        )
 
     @invariant()
     def what_is_looked_at_can_be_shown(self):
         if not hasattr(self, "session"):
             return
-        for pane in self.session.panes:
-            there, snapshot = self.session.setup(pane), self.session.snapshot(pane)
-            assert snapshot.time == pytest.approx(self.session.time, abs=1e-9)
-            np.testing.assert_array_equal(snapshot.positions, self.session.positions(pane))
-            trail, times = self.session.trail(pane)
+        for pane in self.session.timeline.panes:
+            there, snapshot = (
+                self.session.displayed.get_setup(pane),
+                self.session.displayed.get_snapshot(pane),
+            )
+            assert snapshot.time == pytest.approx(self.session.displayed.time, abs=1e-9)
+            np.testing.assert_array_equal(snapshot.positions, self.session.displayed.get_positions(pane))
+            trail, times = self.session.displayed.get_trail(pane)
             assert trail.shape[1:] == snapshot.positions.shape == (len(there.numbers), 2)
             assert len(trail) == len(times) >= 1
-            assert times[-1] <= self.session.time + 1e-6
+            assert times[-1] <= self.session.displayed.time + 1e-6
 
     @invariant()
     def robots_are_where_there_is_room(self):
@@ -237,11 +246,11 @@ undoable = st.tuples(
 
 def touched(session, kind, point, k) -> None:
     working, failed = robots_of(session)
-    obstacles = len(session.environment.obstacles)
+    obstacles = len(session.displayed.environment.obstacles)
     if kind == "draw":
-        session.edit(with_obstacle(session.environment, CircleObstacle(point, 0.2)), "drawn")
+        session.edit_map(add_obstacle(session.displayed.environment, CircleObstacle(point, 0.2)), "drawn")
     elif kind == "delete" and obstacles:
-        session.edit(with_replaced(session.environment, k % obstacles, 1), "deleted")
+        session.edit_map(replace_obstacles(session.displayed.environment, k % obstacles, 1), "deleted")
     elif kind == "add":
         session.add_robot(point)
     elif kind == "remove":
@@ -263,15 +272,15 @@ def test_who_takes_all_back_has_the_same_map_and_the_same_robots(touches):
         # the last robot that works; a map that cannot be
         with suppress(ParameterError, MapError):
             touched(session, *touch)
-    end = robots_of(session), session.environment
+    end = robots_of(session), session.displayed.environment
     while session.undo() is not None:
         pass
     assert robots_of(session) == ((1, 2, 3), ())
-    assert session.environment == HALL
+    assert session.displayed.environment == HALL
     while session.redo() is not None:
         pass
-    assert (robots_of(session), session.environment) == end
-    assert {pane.numbers for pane in session.panes} == {session.numbers}
+    assert (robots_of(session), session.displayed.environment) == end
+    assert {pane.numbers for pane in session.timeline.panes} == {session.displayed.numbers}
 
 
 @given(
@@ -286,12 +295,12 @@ def test_however_it_came_so_far_from_there_it_goes_the_same_way_again(touches, c
     for touch in touches:
         with suppress(ParameterError, MapError):
             touched(session, *touch)
-    since = session.end
+    since = session.timeline.end_time
     stepped(session, steps)
-    end, went = session.end, [pane.simulation.positions for pane in session.panes]
-    session.look_at(max(end - back / 60, since))
+    end, went = session.timeline.end_time, [pane.simulation.positions for pane in session.timeline.panes]
+    session.show_time(max(end - back / 60, since))
     session.branch()
-    while session.end < end:
-        session.step()
-    for pane, before in zip(session.panes, went, strict=True):
+    while session.timeline.end_time < end:
+        session.playback.step()
+    for pane, before in zip(session.timeline.panes, went, strict=True):
         np.testing.assert_array_equal(pane.simulation.positions, before)

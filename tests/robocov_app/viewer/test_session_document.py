@@ -21,11 +21,13 @@ from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import InputError, MapError, RobocovError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
-from robocov_app.viewer.session import session as module
-from robocov_app.viewer.session.changes import SetDensity
-from robocov_app.viewer.session.file import dumped, load_session, save_session, session_json, session_schema
-from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session import playback as module
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.edits import SetDensity
+from robocov_app.viewer.session.file import build_session_content, format_session, load_session, save_session
+from robocov_app.viewer.session.file_models import build_session_schema
+from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.session import Session
 
 ATLAS = ControllerChoice("atlas")
@@ -58,16 +60,18 @@ touches = st.lists(
 
 def touched(session: Session, kind: str, point: tuple[float, float], k: int) -> None:
     """Do something with a session, as far as it can be done."""
-    numbers = session.numbers
+    numbers = session.displayed.numbers
     with suppress(RobocovError):
         if kind == "drag":
-            session.playing = True
+            session.playback.is_playing = True
             for _ in range(k):
-                session.grab(numbers[k % len(numbers)], point)
-                session.advance(1 / 60)
+                session.drag_robot(numbers[k % len(numbers)], point)
+                session.playback.advance(1 / 60)
             session.release()
         elif kind == "draw":
-            session.edit(with_obstacle(session.environment, CircleObstacle(point, 0.2)), "circle drawn")
+            session.edit_map(
+                add_obstacle(session.displayed.environment, CircleObstacle(point, 0.2)), "circle drawn"
+            )
         elif kind == "fail":
             session.fail_robot(numbers[k % len(numbers)])
         elif kind == "join":
@@ -75,13 +79,15 @@ def touched(session: Session, kind: str, point: tuple[float, float], k: int) -> 
         elif kind == "leave":
             session.remove_robot(numbers[k % len(numbers)])
         elif kind == "gain":
-            session.set_law(session.panes[0], session.panes[0].law.with_gain("k_rep", k / 5))
+            session.set_controller(
+                session.timeline.panes[0], session.timeline.panes[0].controller.with_gain("k_rep", k / 5)
+            )
         elif kind == "limits":
-            session.set_limits(TeamSpec(max_speed=k / 5))
+            session.set_properties(RobotProperties(max_speed=k / 5))
         elif kind == "paint":
             session.paint((point,), 0.7, lowers=k % 2 == 0, stroke=k)
         elif kind == "past":
-            session.look_at(session.end * k / 10)
+            session.show_time(session.timeline.end_time * k / 10)
         elif kind == "restart":
             session.restart(seed=k)
         else:
@@ -91,13 +97,17 @@ def touched(session: Session, kind: str, point: tuple[float, float], k: int) -> 
 
 def again(session: Session) -> Session:
     """Return a session made of what a file of it holds, at the same moment, with nothing else known."""
-    text = dumped(session_json(session.document, session.head, session.step_now, {"theme": "dark"}))
+    text = format_session(
+        build_session_content(
+            session.timeline.document, session.timeline.head, session.timeline.step, {"theme": "dark"}
+        )
+    )
     path = Path("again.robocov")
-    from robocov_app.viewer.session.file import session_of
+    from robocov_app.viewer.session.file import parse_session
 
-    saved = session_of(json.loads(text), str(path))
+    saved = parse_session(json.loads(text), str(path))
     assert saved.view == {"theme": "dark"}
-    return Session.opened(saved)
+    return Session.open(saved)
 
 
 @pytest.mark.slow
@@ -112,30 +122,31 @@ def test_every_story_is_made_again_bit_for_bit(story, laws, moving):
     session = stepped(begun(*laws, environment=environment, robots=4, start="spread"), 5)
     for touch in story:
         touched(session, *touch)
-    session.look_at(session.end)
+    session.show_time(session.timeline.end_time)
     twin = again(session)
-    assert twin.end == session.end and twin.events == session.events
+    assert twin.timeline.end_time == session.timeline.end_time
+    assert twin.timeline.events == session.timeline.events
     for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
-    here = session.head, session.step_now
-    for branch in session.document.branches():
-        session.enter(branch.node)
-        twin.enter(twin.document.nodes[branch.node.number])
+    here = session.timeline.head, session.timeline.step
+    for branch in session.timeline.document.list_branches():
+        session.seek(branch.node)
+        twin.seek(twin.timeline.document.nodes[branch.node.number])
         for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
             np.testing.assert_array_equal(mine, theirs)
-    session.enter(*here)
+    session.seek(*here)
 
 
 @pytest.mark.parametrize("how", ["undo", "branch", "touch"])
 def test_a_run_that_goes_on_amid_a_drag_is_made_again_bit_for_bit(how: str) -> None:
     """What is left of the drag is played as it was; who touches something there has let go."""
     session = stepped(begun(RAPF), 5)
-    session.playing = True
+    session.playback.is_playing = True
     for k in range(60):
-        session.grab(2, (1.0 + k / 20, 2.0))
-        session.advance(1 / 60)
+        session.drag_robot(2, (1.0 + k / 20, 2.0))
+        session.playback.advance(1 / 60)
     session.release()
-    session.look_at(0.5)
+    session.show_time(0.5)
     if how == "branch":
         session.branch()
     else:
@@ -144,7 +155,7 @@ def test_a_run_that_goes_on_amid_a_drag_is_made_again_bit_for_bit(how: str) -> N
     if how == "undo":
         session.undo()
     stepped(session, 80)
-    assert session.hand is None
+    assert session.timeline.drag is None
     twin = again(session)
     for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
@@ -154,7 +165,7 @@ def test_all_of_a_gesture_while_paused_is_kept() -> None:
     """Dabs add up; robots that were slowed down by a limit do not become faster with the next."""
     session = stepped(begun(RAPF), 25)
     for speed in (1.0, 0.05, 1.0):
-        session.set_limits(TeamSpec(max_speed=speed, radius=0.11))
+        session.set_properties(RobotProperties(max_speed=speed, radius=0.11))
     for x in (1.0, 2.0, 3.0):
         session.paint(((x, 2.0),), 0.7, lowers=False, stroke=1)
     stepped(session, 20)
@@ -165,18 +176,18 @@ def test_all_of_a_gesture_while_paused_is_kept() -> None:
 def test_any_density_is_in_the_file_and_out_of_it() -> None:
     session = stepped(begun(RAPF), 5)
     for density in (Gaussians((Gaussian((2.0, 2.0), 0.5, 3.0),), 0.2), None):
-        session.do(SetDensity(density), "density", "density changed")
+        session.apply(SetDensity(density), "density", "density changed")
         stepped(session, 5)
         twin = again(session)
-        assert twin.environment.density == density
+        assert twin.displayed.environment.density == density
         np.testing.assert_array_equal(positions_of(twin)[0], positions_of(session)[0])
 
 
 def test_limits_hold_for_controllers_without_memory_also_when_a_moment_is_resumed() -> None:
     session = stepped(begun(LLOYD), 5)
-    session.set_limits(TeamSpec(max_speed=0.5))
+    session.set_properties(RobotProperties(max_speed=0.5))
     stepped(session, 10)
-    session.look_at(7 / 60)
+    session.show_time(7 / 60)
     session.branch()
     stepped(session, 20)
     for mine, theirs in zip(positions_of(again(session)), positions_of(session), strict=True):
@@ -194,42 +205,51 @@ def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -
         seed=3,
     )
     session = stepped(begun(RAPF, robots=4, conditions=conditions), 40)
-    session.edit(with_obstacle(HALL, CircleObstacle((2.0, 3.0), 0.3)), "circle drawn")
+    session.edit_map(add_obstacle(HALL, CircleObstacle((2.0, 3.0), 0.3)), "circle drawn")
     stepped(session, 40)
-    assert [event.text for event in session.events] == ["robot 2 failed", "circle drawn", "robot 4 joined"]
+    assert [event.text for event in session.timeline.events] == [
+        "robot 2 failed",
+        "circle drawn",
+        "robot 4 joined",
+    ]
     path = tmp_path / "story.robocov"
-    save_session(path, session.document, session.head, session.step_now, {})
+    save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     script = (
         "import sys; from pathlib import Path\n"
         "from robocov_app.viewer.session.file import load_session\n"
         "from robocov_app.viewer.session.session import Session\n"
-        "session = Session.opened(load_session(Path(sys.argv[1])))\n"
-        "sys.stdout.write(session.panes[0].simulation.positions.tobytes().hex())\n"
+        "session = Session.open(load_session(Path(sys.argv[1])))\n"
+        "sys.stdout.write(session.timeline.panes[0].simulation.positions.tobytes().hex())\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True
     )
-    assert done.stdout.endswith(session.panes[0].simulation.positions.tobytes().hex())
+    assert done.stdout.endswith(session.timeline.panes[0].simulation.positions.tobytes().hex())
 
 
 def test_branches_are_a_tree_that_can_be_walked() -> None:
     session = stepped(begun(RAPF), 10)
     session.fail_robot(1)
     with_curves(session, 20)
-    failed = session.head
-    assert session.undo() == "robot 1 failed" and session.time == 10 / 60
+    failed = session.timeline.head
+    assert session.undo() == "robot 1 failed" and session.displayed.time == 10 / 60
     session.add_robot((3.0, 3.0))
     with_curves(session, 30)
-    assert [branch.words for branch in session.document.branches()] == ["robot 1 failed", "robot 4 joined"]
-    (ghost,) = session.ghosts
-    assert ghost.node == failed.number and ghost.time[-1] == pytest.approx(29 / 60)
-    session.enter(session.document.nodes[ghost.node])
-    assert session.numbers == (2, 3) and session.time == 30 / 60
-    assert session.panes[0].curve.last_time == pytest.approx(29 / 60), "its curve is there again"
-    assert [ghost.node for ghost in session.ghosts] == [2]
-    session.look_at(5 / 60)
-    session.set_law(session.panes[0], LLOYD)
-    assert len(session.document.branches()) == 3, "nothing is lost by a touch in the past"
+    assert [branch.description for branch in session.timeline.document.list_branches()] == [
+        "robot 1 failed",
+        "robot 4 joined",
+    ]
+    (ghost,) = session.timeline.ghosts
+    assert ghost.node == failed.number and ghost.times[-1] == pytest.approx(29 / 60)
+    session.seek(session.timeline.document.nodes[ghost.node])
+    assert session.displayed.numbers == (2, 3) and session.displayed.time == 30 / 60
+    assert session.timeline.panes[0].distance_curve.last_time == pytest.approx(29 / 60), (
+        "its curve is there again"
+    )
+    assert [ghost.node for ghost in session.timeline.ghosts] == [2]
+    session.show_time(5 / 60)
+    session.set_controller(session.timeline.panes[0], LLOYD)
+    assert len(session.timeline.document.list_branches()) == 3, "nothing is lost by a touch in the past"
 
 
 def test_branches_of_a_file_are_told_before_anybody_has_been_there(tmp_path: Path) -> None:
@@ -240,48 +260,49 @@ def test_branches_of_a_file_are_told_before_anybody_has_been_there(tmp_path: Pat
     session.add_robot((3.0, 3.0))
     with_curves(session, 20)
     path = tmp_path / "story.robocov"
-    save_session(path, session.document, session.head, session.step_now, {})
-    opened = Session.opened(load_session(path))
-    told = [branch.told(opened.scenario.dt) for branch in opened.document.branches()]
+    save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
+    opened = Session.open(load_session(path))
+    branches = opened.timeline.document.list_branches()
+    told = [branch.describe_end(opened.timeline.scenario.dt) for branch in branches]
     assert sorted(told) == ["0.5 s", "0.5 s · 2.517 m"]
 
 
 def test_a_long_way_back_is_made_in_slices(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_SLICE", 0.0)
+    monkeypatch.setattr(module, "SEEK_SLICE_S", 0.0)
     session = stepped(begun(RAPF), 400)
     session.fail_robot(1)
     stepped(session, 5)
-    for node in session.document.nodes:
-        node.kept = []
-    last, session.history = session.history.last, session.history.until(0)
-    session.history.add(last)
-    before = session.time
-    session.clock.budget = 0.008
-    session.enter(session.document.nodes[0], 390)
+    for node in session.timeline.document.nodes:
+        node.cached_states = []
+    last, session.timeline.history = session.timeline.history.last, session.timeline.history.copy_until(0)
+    session.timeline.history.append(last)
+    before = session.displayed.time
+    session.playback.clock.budget = 0.008
+    session.seek(session.timeline.document.nodes[0], 390)
     slices = 0
-    while session.time == before and session.numbers == (2, 3):
-        session.advance(1 / 60)
+    while session.displayed.time == before and session.displayed.numbers == (2, 3):
+        session.playback.advance(1 / 60)
         slices += 1
     assert slices > 300
-    assert session.time == pytest.approx(390 / 60) and session.numbers == (1, 2, 3)
+    assert session.displayed.time == pytest.approx(390 / 60) and session.displayed.numbers == (1, 2, 3)
 
 
 def test_a_file_is_small_and_says_what_it_is(tmp_path: Path) -> None:
     rooms = load_map("rooms")
     session = stepped(begun(RAPF, environment=rooms, robots=6), 30)
-    session.playing = True
+    session.playback.is_playing = True
     for k in range(60):
-        session.grab(2, (3.0 + 0.01 * k, 2.0))
-        session.advance(1 / 60)
+        session.drag_robot(2, (3.0 + 0.01 * k, 2.0))
+        session.playback.advance(1 / 60)
     session.release()
     path = tmp_path / "story.robocov"
-    save_session(path, session.document, session.head, session.step_now, {})
+    save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     assert path.stat().st_size < 3000
     content = json.loads(path.read_text())
     assert content["maps"][0]["bundled"] == "rooms" and content["format"] == "robocov-session"
     import jsonschema
 
-    jsonschema.Draft202012Validator(session_schema()).validate(content)
+    jsonschema.Draft202012Validator(build_session_schema()).validate(content)
     (tmp_path / "changed.robocov").write_text(path.read_text().replace(content["maps"][0]["digest"], "0"))
     with pytest.raises(MapError, match=r'maps\[0\]\.digest: expected that of the map as it is now, got "0"'):
         load_session(tmp_path / "changed.robocov")
@@ -312,7 +333,11 @@ def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, place,
     session = stepped(begun(RAPF), 10)
     session.fail_robot(1)
     stepped(session, 20)
-    content = json.loads(dumped(session_json(session.document, session.head, session.step_now, {})))
+    content = json.loads(
+        format_session(
+            build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
+        )
+    )
     at = content
     for key in place[:-1]:
         at = at[key]
@@ -328,7 +353,11 @@ def test_what_cannot_be_done_again_is_said_with_the_file_and_the_touch(tmp_path:
     session = stepped(begun(RAPF), 10)
     session.fail_robot(1)
     stepped(session, 20)
-    content = json.loads(dumped(session_json(session.document, session.head, session.step_now, {})))
+    content = json.loads(
+        format_session(
+            build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
+        )
+    )
     content["touches"][1]["changes"][0]["robot"] = 77
     path = tmp_path / "story.robocov"
     path.write_text(json.dumps(content))
@@ -346,7 +375,7 @@ def test_a_controller_of_ones_own_is_never_run_because_a_file_says_so(tmp_path: 
     name = f"{mine}:Mine"
     session = stepped(begun(ControllerChoice(name)), 5)
     path = tmp_path / "story.robocov"
-    save_session(path, session.document, session.head, session.step_now, {})
+    save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     with pytest.raises(InputError, match=f"open the session with --controller .*{mine.name}:Mine"):
         load_session(path)
-    assert Session.opened(load_session(path, [name])).end == session.end
+    assert Session.open(load_session(path, [name])).timeline.end_time == session.timeline.end_time

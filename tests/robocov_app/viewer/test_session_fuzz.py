@@ -13,9 +13,10 @@ from touched_run import LLOYD, RAPF, begun, positions_of
 from robocov.conditions import Conditions, Failure
 from robocov.environment import CircleObstacle
 from robocov.errors import RobocovError
-from robocov_app.viewer.session.file import dumped, session_json, session_of
-from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.file import build_session_content, format_session, parse_session
+from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.session import Session
 
 KINDS = (
@@ -40,14 +41,14 @@ class Monkey:
         return self.random.uniform(0.2, 5.8), self.random.uniform(0.2, 3.8)
 
     def play(self, steps: int) -> None:
-        self.session.playing = True
+        self.session.playback.is_playing = True
         for _ in range(steps):
             self.session._play_on()
 
     def hold(self) -> None:
-        number = self.random.choice(self.session.numbers)
+        number = self.random.choice(self.session.displayed.numbers)
         for _ in range(self.random.randint(1, 20)):
-            self.session.grab(number, self.point())
+            self.session.drag_robot(number, self.point())
             self.play(1)
 
     def paint(self) -> None:
@@ -64,12 +65,12 @@ class Monkey:
             if kind == "drag":
                 s.release()
         elif kind == "draw":
-            s.edit(with_obstacle(s.environment, CircleObstacle(self.point(), 0.2)), "drawn")
+            s.edit(add_obstacle(s.environment, CircleObstacle(self.point(), 0.2)), "drawn")
         elif kind == "revive":
             s.revive_robot(r.choice([*s.setup(s.panes[0]).failed, 9]))
         elif kind == "enter":
-            branch = r.choice(s.document.branches())
-            s.enter(branch.node, r.randint(branch.node.begin, branch.node.end))
+            branch = r.choice(s.document.list_branches())
+            s.enter(branch.node, r.randint(branch.node.first_step, branch.node.last_step))
         elif kind in ("past", "branch"):
             s.look_at(s.end * r.random())
             if kind == "branch":
@@ -80,8 +81,10 @@ class Monkey:
                 "join": lambda: s.add_robot(self.point()),
                 "leave": lambda: s.remove_robot(r.choice(s.numbers)),
                 "place": lambda: s.place(r.choice(s.numbers), self.point()),
-                "gain": lambda: s.set_law(s.panes[0], s.panes[0].law.with_gain("k_rep", r.uniform(0, 2))),
-                "limits": lambda: s.set_limits(TeamSpec(max_speed=r.uniform(0.2, 2))),
+                "gain": lambda: s.set_law(
+                    s.panes[0], s.panes[0].controller.with_gain("k_rep", r.uniform(0, 2))
+                ),
+                "limits": lambda: s.set_limits(RobotProperties(max_speed=r.uniform(0.2, 2))),
                 "paint": self.paint,
                 "undo": s.undo,
                 "redo": s.redo,
@@ -101,18 +104,20 @@ def test_a_random_story_is_made_again_bit_for_bit(seed: int) -> None:
         with suppress(RobocovError):
             monkey.act(monkey.random.choice(KINDS))
         monkey.play(monkey.random.randint(0, 12))
-    session.look_at(session.end)
-    text = dumped(session_json(session.document, session.head, session.step_now, {}))
-    twin = Session.opened(session_of(json.loads(text), "twin"))
+    session.show_time(session.timeline.end_time)
+    text = format_session(
+        build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
+    )
+    twin = Session.open(parse_session(json.loads(text), "twin"))
     compare(session, twin)
-    for branch in session.document.branches():
-        for one, node in ((session, branch.node), (twin, twin.document.nodes[branch.node.number])):
-            one.enter(node)
-            one.remake()
+    for branch in session.timeline.document.list_branches():
+        for one, node in ((session, branch.node), (twin, twin.timeline.document.nodes[branch.node.number])):
+            one.seek(node)
+            one.timeline.finish_seek()
         compare(session, twin)
 
 
 def compare(one: Session, other: Session) -> None:
-    assert one.hand == other.hand and len(one.panes) == len(other.panes)
+    assert one.timeline.drag == other.timeline.drag and len(one.timeline.panes) == len(other.timeline.panes)
     for mine, theirs in zip(positions_of(one), positions_of(other), strict=True):
         np.testing.assert_array_equal(mine, theirs)

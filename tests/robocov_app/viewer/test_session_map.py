@@ -8,8 +8,9 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, stepped, too_de
 
 from robocov.environment import CircleObstacle, PolygonObstacle
 from robocov.errors import ParameterError, StartError
-from robocov_app.viewer.session.map_edits import with_replaced
-from robocov_app.viewer.session.scenario import MOST_PANES, TeamSpec
+from robocov_app.viewer.session.map_edits import replace_obstacles
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.scenario import MAX_PANES
 
 # panes
 
@@ -17,27 +18,27 @@ from robocov_app.viewer.session.scenario import MOST_PANES, TeamSpec
 def test_panes_come_and_go():
     session = stepped(begun(RAPF), 10)
     session.add_pane(LLOYD)
-    assert [pane.law for pane in session.panes] == [RAPF, LLOYD]
-    assert session.time == 0.0
+    assert [pane.controller for pane in session.timeline.panes] == [RAPF, LLOYD]
+    assert session.displayed.time == 0.0
     stepped(session, 10)
-    session.remove_pane(session.panes[0])
-    assert [pane.number for pane in session.panes] == [1]
-    assert session.scenario.laws == (LLOYD,)
+    session.remove_pane(session.timeline.panes[0])
+    assert [pane.number for pane in session.timeline.panes] == [1]
+    assert session.timeline.scenario.controllers == (LLOYD,)
     stepped(session, 10)
-    session.look_at(5 / 60)
-    assert session.positions(session.panes[0]).shape == (3, 2)
+    session.show_time(5 / 60)
+    assert session.displayed.get_positions(session.timeline.panes[0]).shape == (3, 2)
     session.branch()
     stepped(session, 20)
-    assert session.panes[0].time == pytest.approx(session.end)
+    assert session.timeline.panes[0].time == pytest.approx(session.timeline.end_time)
 
 
 def test_there_are_neither_too_many_panes_nor_none():
-    session = begun(*[RAPF] * MOST_PANES)
+    session = begun(*[RAPF] * MAX_PANES)
     with pytest.raises(ParameterError, match="room for 4 controllers"):
         session.add_pane(RPF)
     session = begun(RAPF)
     with pytest.raises(ParameterError, match="the last pane stays"):
-        session.remove_pane(session.panes[0])
+        session.remove_pane(session.timeline.panes[0])
 
 
 # the map
@@ -45,46 +46,51 @@ def test_there_are_neither_too_many_panes_nor_none():
 
 def test_an_obstacle_is_drawn_and_pushes_robots():
     session = stepped(begun(RAPF, LLOYD, robots=4), 30)
-    place = tuple(np.round(session.positions(session.panes[0])[1], 3).tolist())
-    assert session.edit(with_pillar(pillar=CircleObstacle(place, 0.2)), "circle drawn") >= 1
-    assert session.environment.obstacles[-1].center == place
+    place = tuple(np.round(session.displayed.get_positions(session.timeline.panes[0])[1], 3).tolist())
+    assert session.edit_map(with_pillar(pillar=CircleObstacle(place, 0.2)), "circle drawn") >= 1
+    assert session.displayed.environment.obstacles[-1].center == place
     assert too_deep(session) <= 2e-3
-    assert session.events[-1].text == "circle drawn"
-    assert session.edit(with_pillar(session.environment, CircleObstacle((5.8, 0.2), 0.1)), "another") == 0
+    assert session.timeline.events[-1].text == "circle drawn"
+    assert (
+        session.edit_map(
+            with_pillar(session.displayed.environment, CircleObstacle((5.8, 0.2), 0.1)), "another"
+        )
+        == 0
+    )
     stepped(session, 30)
     assert too_deep(session) <= 2e-3
 
 
 def test_who_leans_on_a_wall_is_not_pushed():
     session = begun(LLOYD, robots=1)
-    session.playing = True
-    session.grab(1, (0.0, 2.0))
+    session.playback.is_playing = True
+    session.drag_robot(1, (0.0, 2.0))
     for _ in range(10):
-        session.advance(0.1)
+        session.playback.advance(0.1)
     session.release()
-    assert session.positions(session.panes[0])[0, 0] < 0.11
-    assert session.edit(with_pillar(), "circle drawn") == 0
+    assert session.displayed.get_positions(session.timeline.panes[0])[0, 0] < 0.11
+    assert session.edit_map(with_pillar(), "circle drawn") == 0
 
 
 def test_edits_are_taken_back_and_done_again():
     session = stepped(begun(RAPF, LLOYD), 10)
     first = with_pillar()
-    second = with_replaced(first, 0, 1)
-    session.edit(first, "circle drawn")
+    second = replace_obstacles(first, 0, 1)
+    session.edit_map(first, "circle drawn")
     stepped(session, 5)
-    session.edit(second, "pillar deleted")
+    session.edit_map(second, "pillar deleted")
     assert session.undo() == "pillar deleted"
-    assert session.environment == first
+    assert session.displayed.environment == first
     assert session.undo() == "circle drawn"
-    assert session.environment == HALL
-    assert session.scenario.environment == HALL
+    assert session.displayed.environment == HALL
+    assert session.timeline.scenario.environment == HALL
     stepped(session, 5)
     assert session.redo() == "circle drawn"
     assert session.redo() == "pillar deleted"
-    assert session.environment == second
-    assert [event.text for event in session.events] == ["circle drawn", "pillar deleted"]
-    assert {event.kind for event in session.events} == {"obstacle"}
-    assert {pane.setup.environment for pane in session.panes} == {session.environment}
+    assert session.displayed.environment == second
+    assert [event.text for event in session.timeline.events] == ["circle drawn", "pillar deleted"]
+    assert {event.kind for event in session.timeline.events} == {"obstacle"}
+    assert {pane.setup.environment for pane in session.timeline.panes} == {session.displayed.environment}
 
 
 def test_a_map_without_room_is_refused():
@@ -93,7 +99,7 @@ def test_a_map_without_room_is_refused():
     before = all_told(session)
     block = PolygonObstacle(((0, 0.1), (6, 0.1), (6, 4), (0, 4)))
     with pytest.raises(StartError, match="fits nowhere"):
-        session.edit(with_pillar(pillar=block), "filled")
+        session.edit_map(with_pillar(pillar=block), "filled")
     assert all_told(session) == before
 
 
@@ -104,14 +110,14 @@ def test_if_one_pane_cannot_be_changed_none_is(monkeypatch):
     def no_room(wanted):
         raise StartError("no room")
 
-    monkeypatch.setattr(session.panes[1], "changed", no_room)
-    place = tuple(session.positions(session.panes[0])[0].tolist())
+    monkeypatch.setattr(session.timeline.panes[1], "build_changed_simulation", no_room)
+    place = tuple(session.displayed.get_positions(session.timeline.panes[0])[0].tolist())
     for touch in (
-        lambda: session.edit(with_pillar(pillar=CircleObstacle(place, 0.3)), "drawn"),
-        lambda: session.set_limits(TeamSpec(radius=0.2)),
+        lambda: session.edit_map(with_pillar(pillar=CircleObstacle(place, 0.3)), "drawn"),
+        lambda: session.set_properties(RobotProperties(radius=0.2)),
         lambda: session.add_robot((3.0, 3.0)),
         lambda: session.fail_robot(1),
-        lambda: session.place(1, (5.0, 3.0)),
+        lambda: session.place_robot(1, (5.0, 3.0)),
     ):
         with pytest.raises(StartError, match="no room"):
             touch()
@@ -120,6 +126,6 @@ def test_if_one_pane_cannot_be_changed_none_is(monkeypatch):
 
 def test_the_newest_cost_of_each_pane():
     session = begun(RAPF, LLOYD)
-    session.panes[0].curve.add(0.0, 2.0)
-    assert session.panes[0].curve.at(session.time) == 2.0
-    assert np.isnan(session.panes[1].curve.at(session.time))
+    session.timeline.panes[0].distance_curve.add(0.0, 2.0)
+    assert session.timeline.panes[0].distance_curve.interpolate(session.displayed.time) == 2.0
+    assert np.isnan(session.timeline.panes[1].distance_curve.interpolate(session.displayed.time))

@@ -10,16 +10,16 @@ import pytest
 from robocov.mapfile import load_map
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import Scenario
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.status import cursor_words, facts
 
 
 @pytest.fixture
 def viewer() -> Presenter:
-    session = Session(Scenario(load_map("rooms")))
+    session = Session(SessionScenario(load_map("rooms")))
     viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "rooms")
-    viewer.costs.ask(0, 0.0, session.panes[0].simulation.positions)
+    viewer.costs.ask(0, 0.0, session.timeline.panes[0].simulation.positions)
     viewer.costs.poll()
     return viewer
 
@@ -33,22 +33,22 @@ def test_it_tells_time_cost_and_speed(viewer: Presenter) -> None:
 
 def test_an_old_cost_tells_its_time(viewer: Presenter) -> None:
     for _ in range(60):
-        viewer.session.step()
+        viewer.session.playback.step()
     assert facts(viewer, 60.0, 60.0, None)[1].endswith("(at 0.0 s)")
 
 
 def test_it_tells_of_pausing_filming_and_being_behind(viewer: Presenter) -> None:
-    viewer.session.playing = False
+    viewer.session.playback.is_playing = False
     said = facts(viewer, 60.0, 0.0, 12.4)
     assert said[0].startswith("paused · ")
     assert "● film 12 s" in said
-    viewer.session.playing = True
-    viewer.session.clock.behind = True
+    viewer.session.playback.is_playing = True
+    viewer.session.playback.clock.is_behind = True
     assert "1×, really 0.5×" in facts(viewer, 60.0, 30.0, None)
 
 
 def test_the_cursor_tells_distance_robot_and_share(viewer: Presenter) -> None:
-    place = viewer.session.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
+    place = viewer.session.timeline.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
     viewer.cursor = float(place[0]), float(place[1])
     words = cursor_words(viewer)
     assert words.startswith(f"({place[0]:.2f}, {place[1]:.2f}) m: ")
@@ -68,9 +68,9 @@ def test_a_closed_room_is_told() -> None:
     from robocov.environment import Environment, WallObstacle
 
     closed = Environment("two", ((0, 0), (4, 0), (4, 2), (0, 2)), (WallObstacle(((2, 0), (2, 2)), 0.1),))
-    session = Session(Scenario(closed, robots=1, given=np.array([[1.0, 1.0]])))
+    session = Session(SessionScenario(closed, robots=1, given_starts=np.array([[1.0, 1.0]])))
     viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "two")
-    viewer.costs.ask(0, 0.0, session.panes[0].simulation.positions)
+    viewer.costs.ask(0, 0.0, session.timeline.panes[0].simulation.positions)
     viewer.costs.poll()
     viewer.cursor = 3.0, 1.0
     assert cursor_words(viewer).endswith(": no robot can come")

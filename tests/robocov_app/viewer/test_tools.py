@@ -34,8 +34,8 @@ def dragged(tool, session, start, *points, number=None) -> str | None:
 
 
 def place_of(session, number) -> list[float]:
-    pane = session.panes[0]
-    return pane.simulation.positions[pane.row(number)].tolist()
+    pane = session.timeline.panes[0]
+    return pane.simulation.positions[pane.get_row(number)].tolist()
 
 
 def test_the_box_has_every_tool_once():
@@ -88,45 +88,45 @@ class TestHand:
 
     def test_it_throws_robots(self):
         hand, session = Hand(), begun()
-        session.playing = True
+        session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
-        assert session.hand == (2, (3.0, 3.2))
-        session.advance(0.1)
+        assert session.timeline.drag == (2, (3.0, 3.2))
+        session.playback.advance(0.1)
         hand.move(session, (3.1, 3.2))
-        assert session.hand == (2, (3.1, 3.2))
+        assert session.timeline.drag == (2, (3.1, 3.2))
         hand.release(session, (3.1, 3.2))
-        assert session.hand is None
-        assert session.events[-1].text == "robot 2 was dragged"
+        assert session.timeline.drag is None
+        assert session.timeline.events[-1].text == "robot 2 was dragged"
 
     def test_who_gives_up_lets_go(self):
         hand, session = Hand(), begun()
-        session.playing = True
+        session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
         assert hand.cancel(session)
-        assert session.hand is None
+        assert session.timeline.drag is None
         assert not hand.holds
         hand.move(session, (1.0, 1.0))
-        assert session.hand is None
+        assert session.timeline.drag is None
 
     def test_it_drags_robots_that_failed(self):
         hand, session = Hand(), begun()
         session.fail_robot(2)
-        session.playing = True
-        failed = session.panes[0].setup.failed
+        session.playback.is_playing = True
+        failed = session.timeline.panes[0].setup.failed
         dragged(hand, session, failed[2], (3.0, 3.2), number=2)
-        assert session.panes[0].setup.failed == {2: (3.0, 3.2)}
+        assert session.timeline.panes[0].setup.failed == {2: (3.0, 3.2)}
 
     def test_a_robot_that_is_gone_meanwhile(self):
         hand, session = Hand(), begun()
-        session.playing = True
+        session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
         session.remove_robot(2)
         hand.move(session, (3.0, 3.5))
         assert hand.release(session, (3.0, 3.5)) is None
-        assert session.hand is None
+        assert session.timeline.drag is None
 
     def test_it_moves_obstacles(self):
         hand, session = Hand(), begun()
@@ -137,12 +137,12 @@ class TestHand:
         preview = hand.preview(session)
         assert preview.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
         assert (preview.line, preview.words) == (((4.2, 1.2), (4.5, 2.2)), "1.04 m")
-        assert session.environment is HALL
+        assert session.displayed.environment is HALL
         assert hand.release(session, (4.5, 2.2)) == "circle “pillar” moved"
-        assert session.environment.obstacles == (preview.obstacle, HALL.obstacles[1])
+        assert session.displayed.environment.obstacles == (preview.obstacle, HALL.obstacles[1])
         assert hand.preview(session) is None
         assert session.undo() == "circle “pillar” moved"
-        assert session.environment == HALL
+        assert session.displayed.environment == HALL
 
     def test_a_click_on_an_obstacle_or_the_floor_moves_nothing(self):
         hand, session = Hand(), begun()
@@ -156,23 +156,23 @@ class TestHand:
         hand, session = Hand(), begun()
         hand.press(session, (4.2, 1.2), REACH, None)
         hand.move(session, (4.5, 2.2))
-        session.edit(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "turned round")
+        session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "turned round")
         assert hand.preview(session) is None
         assert hand.release(session, (4.5, 2.2)) is None
         hand.press(session, (4.2, 1.2), REACH, None)
         hand.move(session, (4.5, 2.2))
-        session.edit(replace(HALL, obstacles=()), "emptied")
+        session.edit_map(replace(HALL, obstacles=()), "emptied")
         assert hand.preview(session) is None
         assert hand.release(session, (4.5, 2.2)) is None
-        assert session.environment.obstacles == ()
+        assert session.displayed.environment.obstacles == ()
 
     def test_from_the_past(self):
         hand, session = Hand(), stepped(begun(), 20)
         session.fail_robot(2)
-        session.look_at(0.1)
+        session.show_time(0.1)
         dragged(hand, session, place_of(session, 1), (3.0, 3.0), number=2)
-        assert session.live
-        assert session.end == pytest.approx(0.1)
+        assert session.timeline.is_live
+        assert session.timeline.end_time == pytest.approx(0.1)
         assert place_of(session, 2) == [3.0, 3.0]
 
 
@@ -182,16 +182,16 @@ class TestPolygon:
     def test_enter_closes_it(self):
         tool, session = Polygon(), begun()
         assert clicked(tool, session, *self.CORNERS) is None
-        assert session.environment is HALL
+        assert session.displayed.environment is HALL
         assert tool.finish(session) == "polygon drawn"
-        assert session.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
+        assert session.displayed.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
         assert tool.preview(session) is None
         assert tool.finish(session) is None
 
     def test_a_click_on_the_first_corner_closes_it(self):
         tool, session = Polygon(), begun()
         assert clicked(tool, session, *self.CORNERS, (3.25, 3.2)) == "polygon drawn"
-        assert session.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
+        assert session.displayed.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
 
     def test_it_shows_what_it_would_be(self):
         tool, session = Polygon(), begun()
@@ -208,7 +208,7 @@ class TestPolygon:
     def test_a_double_click_closes_it_and_is_one_corner(self):
         tool, session = Polygon(), begun()
         assert clicked(tool, session, *self.CORNERS, self.CORNERS[-1]) == "polygon drawn"
-        assert len(session.environment.obstacles[-1].vertices) == 3
+        assert len(session.displayed.environment.obstacles[-1].vertices) == 3
 
     def test_what_is_none_is_refused(self):
         tool, session = Polygon(), begun()
@@ -231,7 +231,9 @@ class TestWall:
         assert preview.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), WALL_WIDTH)
         assert preview.words == "0.60 m, 0.1 m wide"
         assert tool.finish(session) == "wall drawn"
-        assert session.environment.obstacles[-1] == WallObstacle(((3.2, 3.2), (3.2, 3.8)), WALL_WIDTH)
+        assert session.displayed.environment.obstacles[-1] == WallObstacle(
+            ((3.2, 3.2), (3.2, 3.8)), WALL_WIDTH
+        )
         assert tool.finish(session) is None
 
     def test_a_click_on_the_last_point_ends_it(self):
@@ -244,7 +246,7 @@ class TestWall:
         assert tool.finish(session) == (
             "wall drawn; 0.5 m² cut off; a gap of 15 cm, too narrow for a robot"  # to the wall above
         )
-        assert len(session.environment.obstacles[-1].points) == 5
+        assert len(session.displayed.environment.obstacles[-1].points) == 5
 
     def test_wider_and_narrower(self):
         tool, session = Wall(), begun()
@@ -252,7 +254,7 @@ class TestWall:
         assert tool.width == 0.125
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
         tool.finish(session)
-        assert session.environment.obstacles[-1].width == 0.125
+        assert session.displayed.environment.obstacles[-1].width == 0.125
         for factor, end in ((0.8, 0.02), (1.25, 5.0)):
             for _ in range(60):
                 tool.widen(session, factor)
@@ -264,7 +266,7 @@ class TestWall:
         assert tool.preview(session).obstacle is None
         with pytest.raises(MapError, match="two points that are apart"):
             tool.finish(session)
-        assert session.environment is HALL
+        assert session.displayed.environment is HALL
 
 
 class TestCircle:
@@ -276,7 +278,7 @@ class TestCircle:
         assert tool.preview(session).words == "radius 0.30 m"
         assert tool.preview(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
         assert tool.release(session, (3.5, 3.5)) == "circle drawn"
-        assert session.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
+        assert session.displayed.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
         assert tool.release(session, (3.5, 3.5)) is None
 
     def test_a_click_is_no_circle(self):
@@ -286,7 +288,7 @@ class TestCircle:
         tool.press(session, (3.5, 3.2), REACH, None)
         assert tool.cancel(session)
         assert tool.release(session, (3.5, 3.9)) is None
-        assert session.environment is HALL
+        assert session.displayed.environment is HALL
 
 
 class TestEraser:
@@ -294,14 +296,14 @@ class TestEraser:
         session = begun()
         assert clicked(toolbox()["eraser"], session, (2.53, 3.0)) == "wall deleted"
         assert clicked(toolbox()["eraser"], session, (4.2, 1.73)) == "circle “pillar” deleted"
-        assert session.environment.obstacles == ()
+        assert session.displayed.environment.obstacles == ()
         assert clicked(toolbox()["eraser"], session, (4.2, 1.2)) is None
 
     def test_a_robot_before_an_obstacle(self):
         session = begun()
         assert clicked(toolbox()["eraser"], session, (4.2, 1.2), number=2) == "robot 2 taken out"
         assert robots_of(session) == ((1, 3), ())
-        assert session.environment is HALL
+        assert session.displayed.environment is HALL
 
     def test_the_last_robot_stays(self):
         session = begun(robots=1)
@@ -328,7 +330,7 @@ def test_robots_fail_and_work_again():
     # as it was at the moment that is looked at
     stepped(session, 5)
     session.fail_robot(3)
-    session.look_at(0.1)
+    session.show_time(0.1)
     assert clicked(tool, session, (1.0, 1.0), number=3) == "robot 3 failed"
 
 
@@ -352,11 +354,11 @@ class TestRuler:
 
 def test_it_is_told_who_was_pushed_and_which_starts_are_covered():
     session = begun(start="spread")
-    session.place(1, (5.2, 3.2))
+    session.place_robot(1, (5.2, 3.2))
     said = dragged(Circle(), session, (5.2, 3.2), (5.2, 3.75))
     assert said == "circle drawn; 1 robot pushed out of the way; it covers the start far"
-    session.place(1, (1.0, 2.5))
-    session.place(2, (1.5, 2.5))
+    session.place_robot(1, (1.0, 2.5))
+    session.place_robot(2, (1.5, 2.5))
     assert (
         dragged(Circle(), session, (1.2, 2.5), (1.2, 2.9)) == "circle drawn; 2 robots pushed out of the way"
     )
@@ -375,7 +377,7 @@ uses = st.tuples(
 @settings(max_examples=60)
 def test_however_tools_are_used_nothing_breaks(actions):
     session, tools = begun(), toolbox()
-    session.playing = True
+    session.playback.is_playing = True
     for name, action, point, number in actions:
         tool = tools[name]
         working, failed = robots_of(session)
@@ -388,7 +390,7 @@ def test_however_tools_are_used_nothing_breaks(actions):
             elif action == "undo":
                 said = session.undo()
             elif action == "step":
-                said = session.advance(0.05) and None
+                said = session.playback.advance(0.05) and None
             elif action == "cancel":
                 said = None if isinstance(tool.cancel(session), bool) else "?"
             else:

@@ -12,27 +12,28 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, step
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError, ParameterError, StartError
 from robocov.team import Team
-from robocov_app.viewer.session import changes as module
-from robocov_app.viewer.session.changes import Join, find_free_position
-from robocov_app.viewer.session.scenario import TeamSpec
+from robocov.world.free_positions import find_free_position
+from robocov_app.viewer.session import edits as module
+from robocov_app.viewer.session.edits import AddRobot
+from robocov_app.viewer.session.robot_properties import RobotProperties
 
 RADIUS = 0.1
 
 
 def joined(session, point, number) -> None:
-    session.do(Join(number, point), "robot", f"robot {number} joined")
+    session.apply(AddRobot(number, point), "robot", f"robot {number} joined")
 
 
 places = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
 
 
 def place_of(session, number, pane=0) -> list[float]:
-    its = session.panes[pane]
-    return its.simulation.positions[its.row(number)].tolist()
+    its = session.timeline.panes[pane]
+    return its.simulation.positions[its.get_row(number)].tolist()
 
 
 def failed_at(session, number, pane=0) -> tuple[float, float]:
-    return session.panes[pane].setup.failed[number]
+    return session.timeline.panes[pane].setup.failed[number]
 
 
 # where there is room
@@ -71,14 +72,14 @@ def test_a_room_that_is_full():
 
 def test_a_robot_is_placed_in_all_panes():
     session = stepped(begun(RAPF, LLOYD), 20)
-    others = [pane.simulation.positions[1:].copy() for pane in session.panes]
-    session.place(1, (5.0, 3.0))
-    for k, pane in enumerate(session.panes):
+    others = [pane.simulation.positions[1:].copy() for pane in session.timeline.panes]
+    session.place_robot(1, (5.0, 3.0))
+    for k, pane in enumerate(session.timeline.panes):
         assert place_of(session, 1, k) == [5.0, 3.0]
         assert pane.simulation.velocities[0].tolist() == [0.0, 0.0]
         np.testing.assert_array_equal(pane.simulation.positions[1:], others[k])
-    assert session.history.last.states[0].positions[0].tolist() == [5.0, 3.0]
-    assert len(session.history) == 21
+    assert session.timeline.history.last.states[0].positions[0].tolist() == [5.0, 3.0]
+    assert len(session.timeline.history) == 21
 
 
 @given(st.lists(st.tuples(st.integers(1, 6), places), min_size=1, max_size=6))
@@ -87,11 +88,11 @@ def test_wherever_robots_are_placed_they_fit(drags):
     session = begun(robots=6)
     for number, point in drags:
         others = [k for k in range(6) if k != number - 1]
-        before = session.panes[0].simulation.positions[others]
-        session.place(number, point)
-        np.testing.assert_array_equal(session.panes[0].simulation.positions[others], before)
+        before = session.timeline.panes[0].simulation.positions[others]
+        session.place_robot(number, point)
+        np.testing.assert_array_equal(session.timeline.panes[0].simulation.positions[others], before)
         assert too_deep(session) <= 1e-9
-    session.step()
+    session.playback.step()
     assert too_deep(session) < 2e-3
 
 
@@ -99,37 +100,37 @@ def test_a_robot_that_failed_is_placed_too():
     session = stepped(begun(RAPF, RPF), 10)
     session.fail_robot(2)
     session.fail_robot(3)
-    session.place(2, (5.0, 3.0))
+    session.place_robot(2, (5.0, 3.0))
     assert [failed_at(session, 2, pane) for pane in (0, 1)] == [(5.0, 3.0)] * 2
-    session.place(2, failed_at(session, 3))
+    session.place_robot(2, failed_at(session, 3))
     assert np.hypot(*np.subtract(failed_at(session, 2), failed_at(session, 3))) >= 2 * RADIUS
-    session.place(2, (9.0, 9.0))
+    session.place_robot(2, (9.0, 9.0))
     assert failed_at(session, 2) == pytest.approx((5.899, 3.899))
     assert robots_of(session) == ((1,), (2, 3))
 
 
 def test_grabbing_places_while_it_is_paused():
     session = stepped(begun(), 5)
-    session.grab(2, (3.0, 3.0))
-    assert session.hand is None
+    session.drag_robot(2, (3.0, 3.0))
+    assert session.timeline.drag is None
     assert place_of(session, 2) == [3.0, 3.0]
-    session.playing = True
-    session.grab(2, (3.2, 3.0))
+    session.playback.is_playing = True
+    session.drag_robot(2, (3.2, 3.0))
     assert place_of(session, 2) == [3.0, 3.0]
-    assert session.hand == (2, (3.2, 3.0))
+    assert session.timeline.drag == (2, (3.2, 3.0))
     # paused while it was held
-    session.playing = False
-    session.grab(2, (3.4, 3.0))
-    assert session.hand is None
+    session.playback.is_playing = False
+    session.drag_robot(2, (3.4, 3.0))
+    assert session.timeline.drag is None
     assert place_of(session, 2) == [3.4, 3.0]
 
 
 def test_what_has_failed_is_not_pulled():
     session = begun()
     session.fail_robot(2)
-    session.playing = True
-    session.grab(2, (3.0, 3.0))
-    assert session.hand is None
+    session.playback.is_playing = True
+    session.drag_robot(2, (3.0, 3.0))
+    assert session.timeline.drag is None
     assert failed_at(session, 2) == (3.0, 3.0)
 
 
@@ -138,16 +139,16 @@ def test_what_has_failed_is_not_pulled():
 
 def test_robots_join_at_rest():
     session = stepped(begun(RAPF, LLOYD), 10)
-    velocities = session.panes[0].simulation.velocities
+    velocities = session.timeline.panes[0].simulation.velocities
     assert session.add_robot((5.0, 3.0)) == 4
     assert session.add_robot((5.0, 3.0)) == 5
-    for pane in session.panes:
+    for pane in session.timeline.panes:
         assert pane.numbers == (1, 2, 3, 4, 5)
         assert pane.simulation.positions[3].tolist() == [5.0, 3.0]
         assert 2 * RADIUS <= np.hypot(*(pane.simulation.positions[4] - (5.0, 3.0))) < 2 * RADIUS + 0.01
         assert pane.simulation.velocities[3:].tolist() == [[0.0, 0.0]] * 2
-    np.testing.assert_array_equal(session.panes[0].simulation.velocities[:3], velocities)
-    assert [event.text for event in session.events] == ["robot 4 joined", "robot 5 joined"]
+    np.testing.assert_array_equal(session.timeline.panes[0].simulation.velocities[:3], velocities)
+    assert [event.text for event in session.timeline.events] == ["robot 4 joined", "robot 5 joined"]
     joined(session, (1.0, 3.0), 9)
     assert session.add_robot((1.0, 3.0)) == 10
 
@@ -194,8 +195,8 @@ def test_numbers_are_not_given_twice():
 
 
 def test_who_fails_is_not_heard_but_sensed():
-    session = begun(RPF, robots=3, given=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
-    pane = session.panes[0]
+    session = begun(RPF, robots=3, given_starts=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
+    pane = session.timeline.panes[0]
     before = pane.simulation.observe_and_decide()
     assert before.seen.neighbors.list_neighbors(0).tolist() == [1, 2]
     session.fail_robot(2)
@@ -215,12 +216,12 @@ def test_who_fails_is_not_heard_but_sensed():
 
 def test_who_failed_stands_still_and_in_the_way():
     session = stepped(begun(LLOYD, robots=2), 10)
-    session.playing = True
+    session.playback.is_playing = True
     session.fail_robot(2)
     there = failed_at(session, 2)
-    session.grab(1, there)
+    session.drag_robot(1, there)
     for _ in range(10):
-        session.advance(0.1)
+        session.playback.advance(0.1)
     assert failed_at(session, 2) == there
     assert np.hypot(*np.subtract(place_of(session, 1), there)) > 2 * RADIUS - 3e-3
     session.release()
@@ -231,13 +232,13 @@ def test_who_failed_stands_still_and_in_the_way():
 
 def test_who_fails_is_let_go():
     session = stepped(begun(), 3)
-    session.playing = True
+    session.playback.is_playing = True
     for touch in (session.fail_robot, session.remove_robot):
-        session.grab(2, (3.0, 3.0))
+        session.drag_robot(2, (3.0, 3.0))
         touch(1 if touch == session.fail_robot else 3)
-        assert session.hand is not None
+        assert session.timeline.drag is not None
         touch(2)
-        assert session.hand is None
+        assert session.timeline.drag is None
         session.undo()
         session.undo()
         assert robots_of(session) == ((1, 2, 3), ())
@@ -247,7 +248,7 @@ def test_revival_beside_an_obstacle_that_was_drawn_meanwhile():
     session = stepped(begun(), 3)
     session.fail_robot(1)
     there = failed_at(session, 1)
-    session.edit(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle(there, 0.3))), "circle drawn")
+    session.edit_map(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle(there, 0.3))), "circle drawn")
     session.revive_robot(1)
     away = np.hypot(*np.subtract(place_of(session, 1), there))
     assert 0.39 < away < 0.8
@@ -263,7 +264,7 @@ def test_what_cannot_be_changes_nothing():
     session.undo()
     session.redo()
     for paused in (True, False):
-        session.playing = not paused
+        session.playback.is_playing = not paused
         before = all_told(session)
         for touch, match in (
             (lambda: session.fail_robot(3), "robot 3 has failed already"),
@@ -271,8 +272,8 @@ def test_what_cannot_be_changes_nothing():
             (lambda: session.revive_robot(1), "robot 1 works"),
             (lambda: session.revive_robot(9), "there is no robot 9"),
             (lambda: session.remove_robot(9), "there is no robot 9"),
-            (lambda: session.place(9, (1.0, 1.0)), "there is no robot 9"),
-            (lambda: session.grab(9, (1.0, 1.0)), "there is no robot 9"),
+            (lambda: session.place_robot(9, (1.0, 1.0)), "there is no robot 9"),
+            (lambda: session.drag_robot(9, (1.0, 1.0)), "there is no robot 9"),
             (lambda: joined(session, (1.0, 1.0), 3), "there is a robot 3 already"),
         ):
             with pytest.raises(ParameterError, match=match):
@@ -295,13 +296,13 @@ def test_the_last_that_works_stays():
 
 def test_a_full_map_and_a_full_team(monkeypatch):
     cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
-    session = begun(robots=1, environment=cell, given=np.array([[0.225, 0.225]]))
+    session = begun(robots=1, environment=cell, given_starts=np.array([[0.225, 0.225]]))
     before = all_told(session)
     with pytest.raises(StartError, match="no room"):
         session.add_robot((0.1, 0.1))
     assert all_told(session) == before
     session = begun(robots=3)
-    monkeypatch.setattr(module, "MOST_ROBOTS", 3)
+    monkeypatch.setattr(module, "MAX_ROBOTS", 3)
     before = all_told(session)
     with pytest.raises(ParameterError, match="there are 3 robots already"):
         session.add_robot((3.0, 3.0))
@@ -315,16 +316,16 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
     session = stepped(begun(RAPF, LLOYD), 20)
     session.remove_robot(2)
     stepped(session, 20)
-    session.look_at(10 / 60)
-    then = session.positions(session.panes[1]).copy()
+    session.show_time(10 / 60)
+    then = session.displayed.get_positions(session.timeline.panes[1]).copy()
     # it is not there any more, but was then
     session.remove_robot(2)
-    assert session.live
-    assert session.end == pytest.approx(10 / 60)
+    assert session.timeline.is_live
+    assert session.timeline.end_time == pytest.approx(10 / 60)
     assert robots_of(session) == ((1, 3), ())
-    np.testing.assert_array_equal(session.positions(session.panes[1]), then[[0, 2]])
+    np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[1]), then[[0, 2]])
     session.undo()
-    np.testing.assert_array_equal(session.positions(session.panes[1]), then)
+    np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[1]), then)
 
 
 @pytest.mark.parametrize(
@@ -333,29 +334,31 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
         lambda session: session.fail_robot(9),
         lambda session: session.revive_robot(1),
         lambda session: session.remove_robot(4),
-        lambda session: session.place(4, (1.0, 1.0)),
+        lambda session: session.place_robot(4, (1.0, 1.0)),
         lambda session: joined(session, (1.0, 1.0), 2),
-        lambda session: session.edit(replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),)), "filled"),
-        lambda session: session.set_limits(TeamSpec(radius=2.5)),
+        lambda session: session.edit_map(
+            replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),)), "filled"
+        ),
+        lambda session: session.set_properties(RobotProperties(radius=2.5)),
     ],
 )
 def test_what_could_not_be_then_keeps_what_came_after(touch):
     session = stepped(begun(RAPF, LLOYD), 20)
-    for pane in session.panes:
+    for pane in session.timeline.panes:
         for k in range(20):
-            pane.curve.add(k / 60, 2.0)
+            pane.distance_curve.add(k / 60, 2.0)
     session.add_robot((3.0, 3.0))
     session.undo()
     session.redo()
     stepped(session, 20)
-    session.look_at(10 / 60)
-    session.playing = True
+    session.show_time(10 / 60)
+    session.playback.is_playing = True
     before = all_told(session)
     with pytest.raises((ParameterError, StartError, MapError)):
         touch(session)
     assert all_told(session) == before
-    assert not session.live
-    session.look_at(99.0)
+    assert not session.timeline.is_live
+    session.show_time(99.0)
     stepped(session, 3)
     assert robots_of(session) == ((1, 2, 3, 4), ())
 
@@ -364,39 +367,39 @@ def test_undo_is_of_the_present():
     session = stepped(begun(), 20)
     session.remove_robot(2)
     stepped(session, 20)
-    session.look_at(10 / 60)
+    session.show_time(10 / 60)
     assert robots_of(session) == ((1, 2, 3), ())
     assert session.undo() == "robot 2 taken out"
-    assert session.live
-    assert session.end == pytest.approx(20 / 60)
+    assert session.timeline.is_live
+    assert session.timeline.end_time == pytest.approx(20 / 60)
     assert robots_of(session) == ((1, 2, 3), ())
-    session.look_at(10 / 60)
+    session.show_time(10 / 60)
     assert session.redo() == "robot 2 taken out"
     assert robots_of(session) == ((1, 3), ())
-    assert session.live
+    assert session.timeline.is_live
 
 
 def test_robots_that_differ_keep_what_is_theirs():
     """Under their numbers, whether they work, fail, or work again; new ones are as the first."""
     radius, speeds = np.array([0.1, 0.3, 0.2]), np.array([1.0, 0.3, 0.3])
-    limits = TeamSpec.of(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
-    session = begun(RAPF, robots=3, limits=limits)
-    team = session.panes[0].simulation.team
+    limits = RobotProperties.from_team(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
+    session = begun(RAPF, robots=3, properties=limits)
+    team = session.timeline.panes[0].simulation.team
     assert team.radius.tolist() == radius.tolist()
-    positions = session.panes[0].simulation.positions
+    positions = session.timeline.panes[0].simulation.positions
     apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))[np.triu_indices(3, 1)]
     assert apart.min() >= 0.6, "room for the largest"
     session.fail_robot(2)
-    assert session.panes[0].simulation.team.radius.tolist() == [0.1, 0.2]
-    (wreck,) = session.panes[0].setup.solid.obstacles[len(HALL.obstacles) :]
+    assert session.timeline.panes[0].simulation.team.radius.tolist() == [0.1, 0.2]
+    (wreck,) = session.timeline.panes[0].setup.sensed_environment.obstacles[len(HALL.obstacles) :]
     assert wreck.radius == 0.3
     session.revive_robot(2)
-    assert session.panes[0].simulation.team.radius.tolist() == radius.tolist()
-    session.place(3, place_of(session, 2))
+    assert session.timeline.panes[0].simulation.team.radius.tolist() == radius.tolist()
+    session.place_robot(3, place_of(session, 2))
     gap = np.hypot(*np.subtract(place_of(session, 3), place_of(session, 2)))
     assert gap >= 0.5 - 1e-6
     session.add_robot((3.0, 2.0))
-    assert session.panes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
+    assert session.timeline.panes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
     stepped(session, 3)
-    session.set_limits(TeamSpec())
-    assert set(session.panes[0].simulation.team.radius.tolist()) == {0.1}
+    session.set_properties(RobotProperties())
+    assert set(session.timeline.panes[0].simulation.team.radius.tolist()) == {0.1}

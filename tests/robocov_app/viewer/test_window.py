@@ -24,26 +24,26 @@ from robocov_app.viewer.status import cursor_words
 def test_space_plays_and_pauses(driver: Driver) -> None:
     driver.key("space")
     driver.frames(10)
-    assert driver.session.time == pytest.approx(10 * FRAME, abs=0.02)
+    assert driver.session.displayed.time == pytest.approx(10 * FRAME, abs=0.02)
     driver.key("space")
     driver.frames(5)
-    assert driver.session.time == pytest.approx(10 * FRAME, abs=0.02)
+    assert driver.session.displayed.time == pytest.approx(10 * FRAME, abs=0.02)
 
 
 def test_buttons_play_step_settle_and_restart(driver: Driver) -> None:
     driver.push("pause")
-    assert driver.session.playing and driver.widget("button", "pause").text == "Pause"
+    assert driver.session.playback.is_playing and driver.widget("button", "pause").text == "Pause"
     driver.frames(5)
     driver.push("pause")
-    assert not driver.session.playing and driver.widget("button", "pause").text == "Play"
-    end = driver.session.end
+    assert not driver.session.playback.is_playing and driver.widget("button", "pause").text == "Play"
+    end = driver.session.timeline.end_time
     driver.push("step")
-    assert driver.session.end == pytest.approx(end + driver.session.scenario.dt)
+    assert driver.session.timeline.end_time == pytest.approx(end + driver.session.timeline.scenario.dt)
     driver.push("settle")
-    assert driver.session.stop_when_settled
+    assert driver.session.playback.stop_when_settled
     assert driver.widget("button", "settle").value
     driver.push("restart")
-    assert driver.session.end < 0.1
+    assert driver.session.timeline.end_time < 0.1
 
 
 def test_it_stops_when_the_team_has_settled(tmp_path: Path) -> None:
@@ -51,9 +51,9 @@ def test_it_stops_when_the_team_has_settled(tmp_path: Path) -> None:
         driver.key("s")
         for _ in range(2000):
             driver.window.advance(0.1)
-            if not driver.session.playing:
+            if not driver.session.playback.is_playing:
                 break
-        assert driver.session.settled
+        assert driver.session.timeline.is_settled
         assert driver.viewer.message.startswith("settled at ")
 
 
@@ -61,7 +61,7 @@ def test_twice_the_speed_is_twice_the_time(driver: Driver) -> None:
     driver.key("=")
     driver.key("space")
     driver.frames(10)
-    assert driver.session.time == pytest.approx(2 * 10 * FRAME, abs=0.03)
+    assert driver.session.displayed.time == pytest.approx(2 * 10 * FRAME, abs=0.03)
 
 
 # words, pictures, files
@@ -103,7 +103,7 @@ def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -
 @pytest.mark.slow
 def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> None:
     for _ in range(30):
-        driver.session.step()
+        driver.session.playback.step()
     driver.key("ctrl+e")
     driver.window.keeper.finish()
     driver.frames(2)
@@ -171,7 +171,7 @@ def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
     driver.type("single")
     assert [each.text for each in dialogs.asked.options("single")] == ["Single step"]
     driver.key("return")
-    assert driver.session.end > 0.0 and not dialogs.open
+    assert driver.session.timeline.end_time > 0.0 and not dialogs.open
 
 
 def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
@@ -186,18 +186,18 @@ def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
     driver.key("down", 30)
     assert asked.chosen == len(asked.options("ro")) - 1
     driver.key("escape")
-    assert not driver.window.dialogs.open and driver.session.end == 0.0
+    assert not driver.window.dialogs.open and driver.session.timeline.end_time == 0.0
 
 
 def test_values_are_set_by_typing(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("k_rep 0.5")
     driver.key("return")
-    assert driver.session.panes[0].law.value("k_rep") == 0.5
+    assert driver.session.timeline.panes[0].controller.get_value("k_rep") == 0.5
     driver.key("ctrl+k")
     driver.type("robots 5")
     driver.key("enter")
-    assert len(driver.session.numbers) == 5
+    assert len(driver.session.displayed.numbers) == 5
     driver.key("ctrl+k")
     driver.type("robots many")
     driver.key("return")
@@ -214,7 +214,7 @@ def test_a_key_that_is_held_down_saves_one_picture_but_goes_on_stepping(
         driver.post(pygame.KEYUP, key=code, mod=0, unicode=name, scancode=0)
     driver.settle()
     assert [path.name for path in tmp_path.iterdir()] == ["robocov-1.png"]
-    assert driver.session.end == pytest.approx(5 / 60)
+    assert driver.session.timeline.end_time == pytest.approx(5 / 60)
     driver.key("f12")
     assert (tmp_path / "robocov-2.png").exists()
 
@@ -243,7 +243,7 @@ def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int,
         driver.key("space")
         driver.frames(2)
         driver.push("pause")
-        assert not driver.session.playing
+        assert not driver.session.playback.is_playing
         driver.turn("keep")
         driver.click(*driver.robot(1))
         assert driver.viewer.selected == 1
@@ -258,7 +258,7 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
         driver.wheel(740, 500, -3)
     driver.write("team.radius", "0.12")
     driver.key("return")
-    assert driver.session.panes[0].setup.limits.radius == 0.12
+    assert driver.session.timeline.panes[0].setup.properties.radius == 0.12
     bar = driver.widget("bar", "parameters:rapf").rect
     driver.drag(bar.center, (bar.centerx, bar.centery - 200))
     assert driver.widget("entry", "team.radius").rect.height == 0
@@ -273,7 +273,7 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
 def test_the_lesson_is_played_and_ends_on_a_key(driver: Driver) -> None:
     shown = set(driver.viewer.shown)
     driver.key("f2")
-    assert driver.window.tour is not None and driver.viewer.session.playing
+    assert driver.window.tour is not None and driver.viewer.session.playback.is_playing
     driver.frames(5)
     driver.key("f12")
     driver.key("t")

@@ -22,10 +22,10 @@ from robocov_app.viewer.panel import TABS, law_labels
 
 def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     driver.choose("law:0", "RPF")
-    assert driver.session.panes[0].law.name == "rpf"
+    assert driver.session.timeline.panes[0].controller.name == "rpf"
     assert driver.find("entry", "k_att") is None
     driver.choose("law:0", "Lloyd")
-    assert driver.session.panes[0].law.name == "lloyd"
+    assert driver.session.timeline.panes[0].controller.name == "lloyd"
 
 
 def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path: Path) -> None:
@@ -50,24 +50,27 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
         assert len(set(items)) == len(items) == len(CONTROLLERS) + 2
         driver.key("escape")
         driver.choose("law:1", items[-1])
-        assert driver.session.panes[1].law.name == names[1]
+        assert driver.session.timeline.panes[1].controller.name == names[1]
 
 
 def test_a_map_and_a_start_are_chosen_from_their_menus(driver: Driver) -> None:
     driver.choose("map", "trap")
-    assert driver.viewer.map_name == "trap" and driver.session.environment.name == "Trap"
+    assert driver.viewer.map_name == "trap" and driver.session.displayed.environment.name == "Trap"
     driver.choose("start", "inside")
-    assert driver.session.scenario.start_name == "inside"
+    assert driver.session.timeline.scenario.start_name == "inside"
 
 
 def test_a_start_that_an_obstacle_covers_stays_in_the_menu_until_another_is_chosen(driver: Driver) -> None:
     driver.choose("start", "far")
     driver.key("c")
     driver.drag_at((5.2, 3.2), (5.2, 3.5), (5.2, 3.75))
-    assert "far" not in driver.session.environment.starts and driver.session.scenario.start_name == "far"
+    assert (
+        "far" not in driver.session.displayed.environment.starts
+        and driver.session.timeline.scenario.start_name == "far"
+    )
     driver.push("seed:next")
     driver.choose("start", "spread")
-    assert driver.session.scenario.start_name == "spread"
+    assert driver.session.timeline.scenario.start_name == "spread"
 
 
 def test_a_menu_is_closed_by_a_click_elsewhere_and_that_click_does_nothing_else(driver: Driver) -> None:
@@ -95,44 +98,46 @@ def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
     found = driver.window.panel.ui.open_list
     name = found.options[found.at((driver.at[0], step.centery))]
     driver.click(driver.at[0], step.centery)
-    assert driver.session.end == 0.0 and driver.viewer.map_name == name
+    assert driver.session.timeline.end_time == 0.0 and driver.viewer.map_name == name
 
 
 def test_a_slider_that_is_dragged_sets_its_gain_as_it_moves(driver: Driver) -> None:
     driver.slide("k_rep", 0.75)
-    value = driver.session.panes[0].law.value("k_rep")
+    value = driver.session.timeline.panes[0].controller.get_value("k_rep")
     assert value == pytest.approx(0.3 * 30**0.5, rel=0.2)
     assert driver.widget("entry", "k_rep").text == f"{value:.4g}"
-    assert driver.session.events[-1].kind == "law"
+    assert driver.session.timeline.events[-1].kind == "law"
 
 
 def test_a_click_beside_the_knob_brings_it_there(driver: Driver) -> None:
     slider = driver.widget("slider", "team.max_speed")
     driver.click(slider.rect.right - 12, slider.rect.centery)
-    assert driver.session.panes[0].setup.limits.max_speed > 4.0
+    assert driver.session.timeline.panes[0].setup.properties.max_speed > 4.0
     assert driver.knob("team.max_speed")[0].collidepoint(driver.at)
 
 
 def test_the_knob_can_be_dragged_far_beyond_its_slider(driver: Driver) -> None:
     knob, _ = driver.knob("speed")
     driver.drag(knob.center, (knob.centerx + 40, 10), (20, 590))
-    assert driver.session.clock.speed == 0.1
+    assert driver.session.playback.clock.speed == 0.1
 
 
 def test_the_speed_slider_rests_on_speeds(driver: Driver) -> None:
     driver.slide("speed", 0.81)
-    assert driver.session.clock.speed == 8.0
+    assert driver.session.playback.clock.speed == 8.0
     driver.frames(3)
     assert driver.widget("slider", "speed").value == 6
     driver.slide("speed", 1.0)
-    assert math.isinf(driver.session.clock.speed)
+    assert math.isinf(driver.session.playback.clock.speed)
 
 
 def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -> None:
     driver.write("k_rep", "1.25")
-    assert driver.session.panes[0].law.value("k_rep") != 1.25 and driver.window.panel.ui.edit
+    assert (
+        driver.session.timeline.panes[0].controller.get_value("k_rep") != 1.25 and driver.window.panel.ui.edit
+    )
     driver.key("return")
-    assert driver.session.panes[0].law.value("k_rep") == 1.25
+    assert driver.session.timeline.panes[0].controller.get_value("k_rep") == 1.25
     assert not driver.window.panel.ui.edit
     assert driver.widget("slider", "k_rep").value > 0.5
 
@@ -140,7 +145,7 @@ def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -
 def test_the_enter_of_the_key_pad_does_too(driver: Driver) -> None:
     driver.write("team.max_speed", "0.5")
     driver.key("enter")
-    assert driver.session.panes[0].setup.limits.max_speed == 0.5
+    assert driver.session.timeline.panes[0].setup.properties.max_speed == 0.5
 
 
 @pytest.mark.parametrize(("field", "text"), [("k_rep", "much"), ("team.max_speed", "-1"), ("robots", "1.5")])
@@ -166,7 +171,7 @@ def test_what_was_typed_without_enter_is_forgotten(how: str, driver: Driver) -> 
         driver.click_at(MIDDLE)
     driver.frames(2)
     assert driver.widget("entry", "k_rep").text == "0.3"
-    assert driver.session.panes[0].law == RAPF
+    assert driver.session.timeline.panes[0].controller == RAPF
 
 
 def test_keys_that_are_typed_into_a_field_are_no_shortcuts(driver: Driver) -> None:
@@ -175,7 +180,11 @@ def test_keys_that_are_typed_into_a_field_are_no_shortcuts(driver: Driver) -> No
     driver.key("space")
     driver.key("home")
     driver.key("delete")
-    assert driver.viewer.shown == shown and driver.viewer.theme == "light" and not driver.session.playing
+    assert (
+        driver.viewer.shown == shown
+        and driver.viewer.theme == "light"
+        and not driver.session.playback.is_playing
+    )
     driver.key("f1")
     assert driver.window.help
 
@@ -201,7 +210,7 @@ def test_the_reset_button_goes_back_to_the_default(driver: Driver) -> None:
     driver.settle()
     assert driver.widget("slider", "k_rep").value > 0.7
     driver.push("reset:k_rep")
-    assert driver.session.panes[0].law.value("k_rep") == 0.3
+    assert driver.session.timeline.panes[0].controller.get_value("k_rep") == 0.3
     assert driver.widget("slider", "k_rep").value == pytest.approx(0.5, abs=0.02)
     assert driver.widget("entry", "k_rep").text == "0.3"
 
@@ -209,15 +218,15 @@ def test_the_reset_button_goes_back_to_the_default(driver: Driver) -> None:
 def test_robots_and_seed_are_typed_and_counted(driver: Driver) -> None:
     driver.write("robots", "5")
     driver.key("return")
-    assert len(driver.session.numbers) == 5
+    assert len(driver.session.displayed.numbers) == 5
     driver.push("fewer")
     driver.push("more")
     driver.push("more")
-    assert driver.session.scenario.robots == 6 and driver.widget("entry", "robots").text == "6"
+    assert driver.session.timeline.scenario.robots == 6 and driver.widget("entry", "robots").text == "6"
     driver.write("seed", "41")
     driver.key("return")
     driver.push("seed:next")
-    assert driver.session.scenario.seed == 42 and driver.widget("entry", "seed").text == "42"
+    assert driver.session.timeline.scenario.seed == 42 and driver.widget("entry", "seed").text == "42"
     assert driver.widget("button", "seed:next").text == "↻"
 
 
@@ -244,16 +253,16 @@ def test_tabs_turn_pages_and_check_boxes_switch_layers(driver: Driver) -> None:
 def test_panes_are_added_up_to_four_and_closed_again(driver: Driver) -> None:
     for count in (2, 3, 4):
         driver.push("pane:add")
-        assert len(driver.session.panes) == count
+        assert len(driver.session.timeline.panes) == count
     assert driver.find("button", "pane:add") is None
     assert len({box[2:] for box in driver.window.layout.panes}) == 1
     driver.frames(3)
-    laws = [pane.law.name for pane in driver.session.panes]
+    laws = [pane.controller.name for pane in driver.session.timeline.panes]
     driver.push("close:1")
-    assert [pane.law.name for pane in driver.session.panes] == [laws[0], *laws[2:]]
+    assert [pane.controller.name for pane in driver.session.timeline.panes] == [laws[0], *laws[2:]]
     driver.push("close:0")
     driver.push("close:1")
-    assert [pane.law.name for pane in driver.session.panes] == [laws[2]]
+    assert [pane.controller.name for pane in driver.session.timeline.panes] == [laws[2]]
     assert driver.find("button", "close:0") is None
 
 
@@ -265,18 +274,20 @@ def test_the_page_is_of_the_pane_that_was_clicked(tmp_path: Path) -> None:
         assert driver.find("entry", "k_att") is None
         driver.write("k_rep", "5")
         driver.key("return")
-        assert [pane.law.value("k_rep") for pane in driver.session.panes] == [0.3, 5.0]
+        assert [pane.controller.get_value("k_rep") for pane in driver.session.timeline.panes] == [0.3, 5.0]
 
 
 def test_fail_and_remove_buttons_are_of_the_robot_that_is_asked(driver: Driver) -> None:
     driver.click(*driver.robot(2))
     driver.push("robot:fail")
-    assert driver.session.numbers == (1, 3) and driver.widget("button", "robot:fail").text == "Revive"
+    assert (
+        driver.session.displayed.numbers == (1, 3) and driver.widget("button", "robot:fail").text == "Revive"
+    )
     driver.push("robot:fail")
     assert driver.widget("button", "robot:fail").text == "Fail"
     driver.push("robot:next")
     driver.push("robot:remove")
-    assert driver.session.numbers == (1, 2)
+    assert driver.session.displayed.numbers == (1, 2)
 
 
 def test_the_panel_can_be_hidden_and_the_arena_takes_its_place(driver: Driver) -> None:
@@ -287,7 +298,7 @@ def test_the_panel_can_be_hidden_and_the_arena_takes_its_place(driver: Driver) -
     driver.key("space")
     driver.frames(3)
     driver.key("h")
-    assert not driver.window.panel.hidden and driver.session.end > 0.0
+    assert not driver.window.panel.hidden and driver.session.timeline.end_time > 0.0
 
 
 def test_pages_that_were_turned_to_before_look_as_they_did(tmp_path: Path) -> None:

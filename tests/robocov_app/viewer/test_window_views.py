@@ -14,7 +14,7 @@ from touched_run import RAPF, RPF
 
 def played(driver: Driver, steps: int) -> Driver:
     for _ in range(steps):
-        driver.session.step()
+        driver.session.playback.step()
         driver.window._ask_costs()
     driver.frames(2, 0.2)
     return driver
@@ -29,22 +29,24 @@ def at(driver: Driver, time: float) -> tuple[float, float]:
 def test_the_time_line_is_dragged_to_look_back_and_to_the_end_again(driver: Driver) -> None:
     played(driver, 120)
     driver.press(*at(driver, 1.0))
-    assert driver.session.time == pytest.approx(1.0, abs=0.05) and not driver.session.live
+    assert (
+        driver.session.displayed.time == pytest.approx(1.0, abs=0.05) and not driver.session.timeline.is_live
+    )
     driver.move(*at(driver, 0.4), held=1)
-    assert driver.session.time == pytest.approx(0.4, abs=0.05)
+    assert driver.session.displayed.time == pytest.approx(0.4, abs=0.05)
     driver.move(*at(driver, 9.0), held=1)
-    assert driver.session.live
+    assert driver.session.timeline.is_live
     driver.release()
     driver.move(*at(driver, 0.2))
-    assert driver.session.live
+    assert driver.session.timeline.is_live
 
 
 def test_a_branch_leaves_a_ghost_of_what_came_after(driver: Driver) -> None:
     played(driver, 120)
     driver.click(*at(driver, 0.5))
     driver.key("b")
-    assert driver.session.live and driver.session.playing
-    assert driver.session.end < 0.7 and len(driver.session.ghosts) == 1
+    assert driver.session.timeline.is_live and driver.session.playback.is_playing
+    assert driver.session.timeline.end_time < 0.7 and len(driver.session.timeline.ghosts) == 1
     driver.frames(3)
 
 
@@ -53,8 +55,10 @@ def test_a_touch_in_the_past_goes_on_from_there(driver: Driver) -> None:
     driver.click(*at(driver, 0.5))
     driver.key("c")
     driver.drag_at((1.0, 3.2), (1.3, 3.2))
-    assert driver.session.live and driver.session.end == pytest.approx(0.5, abs=0.05)
-    assert [event.kind for event in driver.session.events] == ["obstacle"]
+    assert driver.session.timeline.is_live and driver.session.timeline.end_time == pytest.approx(
+        0.5, abs=0.05
+    )
+    assert [event.kind for event in driver.session.timeline.events] == ["obstacle"]
 
 
 def test_what_happened_is_marked_and_told_under_the_mouse(driver: Driver) -> None:
@@ -63,7 +67,7 @@ def test_what_happened_is_marked_and_told_under_the_mouse(driver: Driver) -> Non
     quiet = driver.picture()
     driver.viewer.attempt(lambda: driver.session.fail_robot(2))
     played(driver, 60)
-    (event,) = driver.session.events
+    (event,) = driver.session.timeline.events
     assert event.time == pytest.approx(1.0) and event.text == "robot 2 failed"
     assert not driver.same(quiet)
     driver.move(*at(driver, 1.0))
@@ -73,13 +77,13 @@ def test_what_happened_is_marked_and_told_under_the_mouse(driver: Driver) -> Non
 def test_home_end_and_arrows_go_through_time(driver: Driver) -> None:
     played(driver, 120)
     driver.key("home")
-    assert driver.session.time == 0.0
+    assert driver.session.displayed.time == 0.0
     driver.key("right")
-    assert 0.0 < driver.session.time < 0.2
+    assert 0.0 < driver.session.displayed.time < 0.2
     driver.key("shift+right")
-    assert driver.session.time == pytest.approx(1.0, abs=0.2)
+    assert driver.session.displayed.time == pytest.approx(1.0, abs=0.2)
     driver.key("end")
-    assert driver.session.live
+    assert driver.session.timeline.is_live
 
 
 # camera

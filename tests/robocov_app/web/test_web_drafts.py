@@ -70,7 +70,7 @@ def test_a_served_viewer_offers_its_draft_at_the_next_start(tmp_path: Path) -> N
     with Launcher(begun(), "hall", tmp_path, lattice=4, size=(900, 600), served=True).window() as window:
         assert window.dialogs.asked.title == "Recover unsaved work?"
         window.dialogs.asked.answers[0].call()
-        assert window.viewer.session.numbers == (1, 3)
+        assert window.viewer.session.displayed.numbers == (1, 3)
         window.close()
 
 

@@ -17,7 +17,8 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import Scenario, TeamSpec
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -39,7 +40,7 @@ class PlayPresenter(Presenter):
     elsewhere = False
 
     def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
-        self.tried = session.environment
+        self.tried = session.displayed.environment
         self._title = title
         super().__init__(session, costs, shown, folder, title, list_controller_classes())
 
@@ -151,11 +152,13 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
     """
     environment = editor.sketch.build_environment()
     start = editor.start_name if editor.start_name in environment.starts else None
-    limits = TeamSpec(radius=editor.radius)
-    scenario = Scenario(environment, robots=editor.robots, start=start, seed=editor.seed, limits=limits)
+    limits = RobotProperties(radius=editor.radius)
+    scenario = SessionScenario(
+        environment, robots=editor.robots, start=start, seed=editor.seed, properties=limits
+    )
     session = Session(scenario)
     if patient:
-        session.clock.budget = float("inf")
+        session.playback.clock.budget = float("inf")
     costs = Costs(DEFAULT_LATTICE, direct=patient)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}

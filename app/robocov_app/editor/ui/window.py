@@ -351,7 +351,7 @@ class EditorWindow(BaseWindow):
         editor = self.editor
         viewer = trial.viewer
         editor.theme = viewer.theme
-        change = build_trial_change(editor.sketch, viewer.tried, viewer.session.environment)
+        change = build_trial_change(editor.sketch, viewer.tried, viewer.session.displayed.environment)
         if change is not None and not viewer.elsewhere:
             editor.apply(change)
         editor.document.keep_aside()
@@ -370,7 +370,7 @@ class EditorWindow(BaseWindow):
     def _keep_trial_draft(self, trial: PlayWindow, *, at_once: bool = False) -> None:
         viewer = trial.viewer
         if self._trial_drafts is not None and not viewer.elsewhere:
-            self._trial_drafts.update(viewer.session.environment, at_once=at_once)
+            self._trial_drafts.update(viewer.session.displayed.environment, at_once=at_once)
 
     def take(self, event: pygame.event.Event) -> None:
         """Handle an event: by the dialog, else by keys, mouse or panel."""

@@ -1,1 +1,1 @@
-"""The session: a run with its past, and every way to touch it. Knows no pygame."""
+"""The session of the window: edits, timeline, playback and files. Without pygame."""

@@ -1,49 +1,97 @@
-"""The clock: how many steps of the simulation are due, at any speed, without ever holding a frame up."""
+"""The clock: how many simulation steps are due at a speed, within the computing time of a frame."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)  # simulated seconds per second
-LONGEST_FRAME = 0.1  # longest frame, s: what it took beyond is not made up for
-FRAME_BUDGET = 0.008  # seconds of a frame that go to the steps of the simulation, where people look on
-_PATIENT = 16.0  # speed of "as fast as it goes" where no time runs out
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
+"""Selectable speeds, simulated seconds per second; infinite for as fast as possible."""
+MAX_FRAME_S = 0.1
+"""Maximum time of a frame that is simulated; what a frame took longer is not made up for."""
+FRAME_BUDGET_S = 0.008
+"""Computing time for the simulation in each frame of a window on a display."""
+MAX_SPEED_WITHOUT_BUDGET = 16.0
+"""Speed instead of an infinite one where the computing time of a frame is not limited."""
+_MAX_COMPARED_SPEED = 1e4
+_STEP_TOLERANCE = 1e-9
 
 
-def speed_words(speed: float) -> str:
+def format_speed(speed: float) -> str:
+    """Return the label of a speed."""
     return "max" if math.isinf(speed) else f"{speed:g}×"
 
 
-def speed_index(speed: float) -> int:
-    logs = [math.log(min(each, 1e4)) for each in (*SPEEDS, speed)]
-    return min(range(len(SPEEDS)), key=lambda k: abs(logs[k] - logs[-1]))
+def find_speed_index(speed: float) -> int:
+    """Return the index of the selectable speed that is nearest to a speed, compared by their ratio."""
+
+    def compute_distance(index: int) -> float:
+        return abs(_compute_log(SPEEDS[index]) - _compute_log(speed))
+
+    return min(range(len(SPEEDS)), key=compute_distance)
+
+
+def _compute_log(speed: float) -> float:
+    return math.log(min(speed, _MAX_COMPARED_SPEED))
 
 
 @dataclass
 class Clock:
-    """Turns seconds that have passed into steps of `dt` seconds, at a speed."""
+    """Converts the time that passes into simulation steps.
+
+    Attributes
+    ----------
+    dt : float, s
+        Simulated time of a step.
+    speed : float
+        Simulated seconds per second.
+    budget : float, s
+        Computing time for the steps of a frame; infinite to take all steps that are due.
+    is_behind : bool
+        Whether the computing time was not enough for the steps of the last frame.
+    """
 
     dt: float
     speed: float = 1.0
-    budget: float = math.inf  # s, so long the steps of a frame may take; infinite: all, whatever they take
-    behind: bool = False  # whether the last frame's steps were more than its budget
-    _due: float = 0.0
+    budget: float = math.inf
+    is_behind: bool = False
+    _due_s: float = 0.0
 
-    def advance(self, seconds: float, step: Callable[[], bool]) -> int:
-        """Make due steps until one says False; return how many. Those beyond the budget are dropped."""
-        speed = _PATIENT if math.isinf(self.speed) and math.isinf(self.budget) else self.speed
-        endless, began, made = math.isinf(speed), perf_counter(), 0
-        due = self._due + (0.0 if endless else min(seconds, LONGEST_FRAME) * speed)
-        wanted = math.inf if endless else math.floor(due / self.dt + 1e-9)
-        self._due, self.behind = 0.0, False
-        while made < wanted:
-            made += 1
-            if not step():
-                return made
-            if perf_counter() - began > self.budget:
-                self.behind = not endless and made < wanted
+    def advance(self, seconds: float, take_step: Callable[[], bool]) -> int:
+        """Take the steps that are due. Those beyond the computing time are dropped.
+
+        Parameters
+        ----------
+        seconds : float, s
+            Time since the previous call.
+        take_step : callable
+            Takes a step, and returns whether to continue.
+
+        Returns
+        -------
+        int
+            Number of steps that were taken.
+        """
+        started = perf_counter()
+        due_s = self._due_s
+        is_endless = math.isinf(self.speed) and not math.isinf(self.budget)
+        step_limit = math.inf
+        if not is_endless:
+            speed = MAX_SPEED_WITHOUT_BUDGET if math.isinf(self.speed) else self.speed
+            due_s += min(seconds, MAX_FRAME_S) * speed
+            step_limit = math.floor(due_s / self.dt + _STEP_TOLERANCE)
+        self._due_s = 0.0
+        self.is_behind = False
+        taken = 0
+        while taken < step_limit:
+            taken += 1
+            if not take_step():
+                return taken
+            if perf_counter() - started > self.budget:
+                self.is_behind = not is_endless and taken < step_limit
                 break
-        if not self.behind:
-            self._due = due if endless else max(due - made * self.dt, 0.0)
-        return made
+        if is_endless:
+            self._due_s = due_s
+        elif not self.is_behind:
+            self._due_s = max(due_s - taken * self.dt, 0.0)
+        return taken

@@ -1,4 +1,4 @@
-"""Cost curves of the time line, with events and the ghosts of other branches; thinned with age."""
+"""Cost curves of the time line, curves of other branches, and events."""
 
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
@@ -8,12 +8,26 @@ import numpy as np
 
 from robocov.arrays import Array
 
-MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
+MAX_CURVE_SAMPLES = 3000
+"""Number of samples at which every second sample of the older half of a curve is removed."""
+_SAME_TIME_S = 1e-9
+_TIME_TOLERANCE_S = 1e-6
+_FILE_TIME_DECIMALS = 3
 
 
 @dataclass(frozen=True)
-class Event:
-    """Something that happened at a time, s; `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ..."""
+class SessionEvent:
+    """Something that happened in a session.
+
+    Attributes
+    ----------
+    time : float, s
+        When it happened.
+    kind : str
+        ``"obstacle"``, ``"robot"``, ``"failure"``, ``"law"``, ...
+    text : str
+        Description.
+    """
 
     time: float
     kind: str
@@ -21,86 +35,141 @@ class Event:
 
 
 class Curve:
-    """The mean distance to the nearest robot, (22) by area or by ∫φ, or the mean time, at ascending times."""
+    """A coverage cost at ascending times: the mean distance to the nearest robot, or the mean time."""
 
     def __init__(self) -> None:
-        self._time, self._value = list[float](), list[float]()
+        self._times: list[float] = []
+        self._values: list[float] = []
 
     def __len__(self) -> int:
-        return len(self._time)
+        return len(self._times)
 
     @property
-    def time(self) -> Array:
-        return np.array(self._time)
+    def times(self) -> Array:
+        """Times of the samples, (k,) s."""
+        return np.array(self._times)
 
     @property
-    def value(self) -> Array:
-        return np.array(self._value)
+    def values(self) -> Array:
+        """Values of the samples, (k,)."""
+        return np.array(self._values)
 
     @property
     def last_time(self) -> float:
-        """The time of the newest sample, s; -inf if there is none."""
-        return self._time[-1] if self._time else -np.inf
+        """Time of the newest sample, s; -inf if there is none."""
+        return self._times[-1] if self._times else -np.inf
 
     def add(self, time: float, value: float) -> None:
-        """Take a sample at any time; one of the same time is replaced."""
+        """Add a sample at any time, which replaces one of the same time, unless it is not finite."""
         if not np.isfinite([time, value]).all():
             return
-        k = bisect_left(self._time, time - 1e-9)
-        if k < len(self._time) and self._time[k] <= time + 1e-9:
-            self._value[k] = value
+        index = bisect_left(self._times, time - _SAME_TIME_S)
+        if index < len(self._times) and self._times[index] <= time + _SAME_TIME_S:
+            self._values[index] = value
             return
-        if len(self._time) >= MOST_SAMPLES:
-            half = MOST_SAMPLES // 2
-            self._time[:half], self._value[:half] = self._time[:half:2], self._value[:half:2]
-            k = bisect_left(self._time, time)
-        self._time.insert(k, time)
-        self._value.insert(k, value)
+        if len(self._times) >= MAX_CURVE_SAMPLES:
+            self._thin()
+            index = bisect_left(self._times, time)
+        self._times.insert(index, time)
+        self._values.insert(index, value)
 
-    def outline(self, most: int) -> list[list[float]]:
-        stride = -(-len(self) // most)
-        times, values = self._time[::-stride][::-1], self._value[::-stride][::-1]
-        return [[round(time, 3) for time in times], [float(f"{value:.5g}") for value in values]]
+    def sample(self, maximum: int) -> list[list[float]]:
+        """Return at most a number of evenly spaced samples, rounded for a file.
 
-    def between(self, begin: float, end: float) -> "Curve":
-        first, last = bisect_left(self._time, begin - 1e-6), bisect_right(self._time, end + 1e-6)
+        Parameters
+        ----------
+        maximum : int
+            Maximum number of samples.
+
+        Returns
+        -------
+        list of list of float
+            Times, s, and values. The newest sample is always among them.
+        """
+        stride = -(-len(self) // maximum)
+        times = self._times[::-stride][::-1]
+        values = self._values[::-stride][::-1]
+        return [
+            [round(time, _FILE_TIME_DECIMALS) for time in times],
+            [float(f"{value:.5g}") for value in values],
+        ]
+
+    def extract(self, start: float, end: float) -> "Curve":
+        """Return the part of the curve between two times, s, including both."""
+        first = bisect_left(self._times, start - _TIME_TOLERANCE_S)
+        last = bisect_right(self._times, end + _TIME_TOLERANCE_S)
         part = Curve()
-        part._time, part._value = self._time[first:last], self._value[first:last]
+        part._times = self._times[first:last]
+        part._values = self._values[first:last]
         return part
 
-    def extend(self, later: "Curve", until: float = np.inf) -> None:
-        """Append those samples of another curve that are later than the last one here, up to a time, s."""
-        for time, value in zip(later._time, later._value, strict=True):
-            if self.last_time + 1e-9 < time <= until + 1e-6:
+    def extend(self, later: "Curve", end: float = np.inf) -> None:
+        """Append the samples of another curve after the last one of this curve, up to a time, s."""
+        for time, value in zip(later._times, later._values, strict=True):
+            if self.last_time + _SAME_TIME_S < time <= end + _TIME_TOLERANCE_S:
                 self.add(time, value)
 
-    def at(self, time: float) -> float:
-        """Return the value at a time, between samples on the straight line; nan before the first."""
-        if not self._time or time < self._time[0] - 1e-6:
+    def interpolate(self, time: float) -> float:
+        """Return the value at a time, interpolated linearly; nan before the first sample."""
+        if not self._times or time < self._times[0] - _TIME_TOLERANCE_S:
             return float("nan")
-        return float(np.interp(time, self._time, self._value))
+        return float(np.interp(time, self._times, self._values))
+
+    def _thin(self) -> None:
+        """Remove every second sample of the older half."""
+        half = MAX_CURVE_SAMPLES // 2
+        self._times[:half] = self._times[:half:2]
+        self._values[:half] = self._values[:half:2]
 
 
 @dataclass(frozen=True, eq=False)
-class Ghost:
-    """The rest of a curve that was left when the run was resumed from before."""
+class GhostCurve:
+    """The part of the curve of another branch that is not on the branch of the present.
 
-    law: str  # name of the controller
-    words: str  # what was different then
-    time: Array
-    value: Array
-    of: str = "distance"  # or "time"
-    node: int = 0  # at whose end the branch ends
+    Attributes
+    ----------
+    controller : str
+        Name of the controller.
+    description : str
+        The controller with its gains.
+    times : (k,) array, s
+        Times of the samples.
+    values : (k,) array
+        Values of the samples.
+    quantity : str
+        ``"distance"`` or ``"time"``.
+    node : int
+        Number of the node at which the branch ends.
+    """
+
+    controller: str
+    description: str
+    times: Array
+    values: Array
+    quantity: str = "distance"
+    node: int = 0
 
 
-class Plotted(NamedTuple):
-    """Plottable quantity. `title`, `short`: as people call it."""
+class PlottedQuantity(NamedTuple):
+    """A quantity that the time line can show.
+
+    Attributes
+    ----------
+    name : str
+        Name in code and files.
+    title : str
+        Title of the plot.
+    short_title : str
+        Title where there is little space.
+    unit : str
+        Unit of the values.
+    """
 
     name: str
     title: str
-    short: str
+    short_title: str
     unit: str
 
 
-DISTANCE = Plotted("distance", "Mean distance to the nearest robot", "mean distance", "m")
-TIME = Plotted("time", "Mean time until the first robot is there", "mean time", "s")
+DISTANCE = PlottedQuantity("distance", "Mean distance to the nearest robot", "mean distance", "m")
+TIME = PlottedQuantity("time", "Mean time until the first robot is there", "mean time", "s")

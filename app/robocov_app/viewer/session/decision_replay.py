@@ -1,4 +1,4 @@
-"""Decisions of the past made again from kept moments."""
+"""Observations and decisions of the past, recomputed from recorded states."""
 
 from contextlib import suppress
 from copy import deepcopy
@@ -18,59 +18,120 @@ from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
 from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
-from robocov_app.viewer.session.moments import PaneSetup, State
+from robocov_app.viewer.session.states import PaneSetup, PaneState
+
+RECORD_TOLERANCE = 1e-9
+"""Relative and absolute tolerance of forces that agree with those of a record."""
 
 
-def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT_S) -> Snapshot:
-    """Return a moment as it was at a time, s; a controller that fails on it decided nothing."""
-    setup, team, positions = state.setup, state.setup.team, state.positions
-    region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
-    sensor.set_time(time)
-    points = sensor.find_nearest_points(positions, team.sensing_range)
-    neighbors = Neighbors.from_ranges(positions, team.communication_range)
-    seen = Observations(positions, state.velocities, neighbors, points, region, time, team.max_speed)
-    seen = replace(seen, density=density, steering=state.steering)
-    if (perception := _perception(setup, dt)) is not None:
+def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) -> Snapshot:
+    """Recompute observations and decision of a recorded state.
+
+    Parameters
+    ----------
+    state : PaneState
+        The state.
+    time : float, s
+        Its time.
+    dt : float, s
+        Control period.
+
+    Returns
+    -------
+    Snapshot
+        If the controller raises, there are no forces.
+    """
+    seen = _observe(state, time)
+    perception = _build_perception(state.setup, dt)
+    true_positions = None
+    if perception is not None:
         inbox = perception.create_inbox() if state.inbox is None else state.inbox
-        seen, _ = perception.perceive(seen, inbox, np.ones(len(positions), dtype=bool))
-    decision, recorded = _decision(seen, state), state.recorded
-    if recorded is not None and not np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9):
-        decision = recorded  # the controller is not what it was, or not loaded
-        if setup.law.gains.get("cells") == "time" and team.has_mixed_speeds:
-            cells = partition_by_travel_time(positions, team.max_speed, region, density=density)
-            decision = replace(decision, cells=cells)
-    return Snapshot(seen, decision, None if perception is None else positions)
+        seen, _ = perception.perceive(seen, inbox, np.ones(len(state.positions), dtype=bool))
+        true_positions = state.positions
+    decision = _decide(seen, state)
+    if state.recorded is not None and not _has_same_forces(decision, state.recorded):
+        # The controller has changed since, or it cannot be loaded.
+        decision = _complete_recorded_decision(state)
+    return Snapshot(seen, decision, true_positions)
 
 
-def _decision(seen: Observations, state: State) -> Decision:
-    nothing, controller = Decision(np.zeros_like(seen.positions)), _controller(state.setup)
+def _observe(state: PaneState, time: float) -> Observations:
+    """Return what the robots observe without noise and message loss."""
+    team = state.setup.team
+    environment = state.setup.sensed_environment
+    sensor = get_sensor(environment)
+    sensor.set_time(time)
+    points = sensor.find_nearest_points(state.positions, team.sensing_range)
+    neighbors = Neighbors.from_ranges(state.positions, team.communication_range)
+    seen = Observations(
+        state.positions, state.velocities, neighbors, points, environment.region, time, team.max_speed
+    )
+    return replace(seen, density=environment.density, steering=state.steering)
+
+
+def _has_same_forces(decision: Decision, recorded: Decision) -> bool:
+    return np.allclose(decision.forces, recorded.forces, rtol=RECORD_TOLERANCE, atol=RECORD_TOLERANCE)
+
+
+def _complete_recorded_decision(state: PaneState) -> Decision:
+    """Return the decision of a record, with the cells if they are not the usual ones."""
+    assert state.recorded is not None
+    team = state.setup.team
+    if state.setup.controller.gains.get("cells") != "time" or not team.has_mixed_speeds:
+        return state.recorded
+    environment = state.setup.sensed_environment
+    cells = partition_by_travel_time(
+        state.positions, team.max_speed, environment.region, density=environment.density
+    )
+    return replace(state.recorded, cells=cells)
+
+
+def _decide(seen: Observations, state: PaneState) -> Decision:
+    """Ask the controller again; without a usable answer there are no forces."""
+    no_forces = Decision(np.zeros_like(seen.positions))
+    controller = _build_controller(state.setup)
     if controller is None:
-        return nothing
+        return no_forces
     try:
-        memory = deepcopy(state.memory)  # it may change what it remembers, and is asked again
+        # The controller may change its memory in place, and is asked again for the same state.
+        memory = deepcopy(state.memory)
         if memory is None:
-            memory = controller.begin(state.setup.solid.region, state.setup.team)
+            memory = controller.begin(state.setup.sensed_environment.region, state.setup.team)
         decision = controller.decide(seen, memory)
-        given = (decision.forces, decision.forces if decision.goals is None else decision.goals)
-        good = isinstance(decision, Decision) and all(isinstance(rows, np.ndarray) for rows in given)
-        good = good and all(rows.shape == seen.positions.shape for rows in given)
-    except BaseException:  # a user's controller may do anything
-        return nothing
-    return decision if good and np.isfinite(decision.forces).all() else nothing
+        is_usable = _is_usable(decision, seen.positions.shape)
+    except BaseException:  # A user's controller may raise anything.
+        return no_forces
+    return decision if is_usable else no_forces
 
 
-@lru_cache(maxsize=8)  # as many as there are panes, and some more
-def _controller(setup: PaneSetup) -> Controller | None:
-    with suppress(ParameterError):  # what a saved run was made with may be gone
-        return inform_controller(setup.law.made(), setup.solid.static)
+def _is_usable(decision: object, shape: tuple[int, ...]) -> bool:
+    """Return whether a controller has returned finite forces, and goals of the same shape if any."""
+    if not isinstance(decision, Decision):
+        return False
+    goals = decision.forces if decision.goals is None else decision.goals
+    for rows in (decision.forces, goals):
+        if not isinstance(rows, np.ndarray) or rows.shape != shape:
+            return False
+    return bool(np.isfinite(decision.forces).all())
+
+
+# There is one setup for each pane; after an edit those from before are still asked for.
+@lru_cache(maxsize=8)
+def _build_controller(setup: PaneSetup) -> Controller | None:
+    """Build the controller of a pane; None if the controller of a record does not exist any more."""
+    with suppress(ParameterError):
+        return inform_controller(setup.controller.build(), setup.sensed_environment.static)
     return None
 
 
 @lru_cache(maxsize=8)
-def _perception(setup: PaneSetup, dt: float) -> Perception | None:
-    return None if setup.conditions is None else Perception(setup.conditions, setup.team, dt)
+def _build_perception(setup: PaneSetup, dt: float) -> Perception | None:
+    if setup.conditions is None:
+        return None
+    return Perception(setup.conditions, setup.team, dt)
 
 
 @lru_cache(maxsize=4)
-def sensor_in(environment: Environment) -> RangeSensor:
+def get_sensor(environment: Environment) -> RangeSensor:
+    """Return the range sensor on a map, which is kept for the next call."""
     return RangeSensor(build_solid_pieces(environment), build_movers(environment))

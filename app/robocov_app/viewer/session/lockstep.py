@@ -1,8 +1,8 @@
-"""Panes that move on together: the spring of the hand that drags a robot, robots that come and go."""
+"""Panes that advance together, with dragged robots and robots that join or fail by themselves."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Self, TypeAlias
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -11,124 +11,267 @@ from robocov.conditions import TIME_TOLERANCE_S
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
-from robocov_app.viewer.session import changes
-from robocov_app.viewer.session.changes import Drag, Fail, Join, Place, Release, Touch
-from robocov_app.viewer.session.moments import Moment, PaneSetup
-from robocov_app.viewer.session.pane import Continuation, Pane, begun, resumed
-from robocov_app.viewer.session.scenario import Scenario
+from robocov_app.viewer.session.edits import (
+    AddRobot,
+    DragRobot,
+    EditObstacles,
+    FailRobot,
+    MapEdit,
+    PaintDensity,
+    PaneEdit,
+    PlaceRobot,
+    ReleaseRobot,
+    RemovePane,
+    RunEdit,
+    SetDensity,
+)
+from robocov_app.viewer.session.pane import Continuation, Pane, resume_simulation, start_simulation
+from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.states import PaneSetup, RunState
 
-SPRING = 60.0  # stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²
-STRONGEST = 80.0  # largest pull of the spring, per kg, m/s²
-Happening: TypeAlias = tuple[int, str, str]  # step, kind and words, of robots that fail or join by themselves
+DRAG_STIFFNESS_PER_KG = 60.0
+"""Stiffness of the spring that pulls a dragged robot, divided by its mass, 1/s²."""
+MAX_DRAG_ACCELERATION_M_S2 = 80.0
+"""Maximum pull of the spring, divided by the mass of the robot."""
+MIN_REPORTED_OFFSET_M = 5e-4
+"""Distance from the requested position from which on it is reported where a robot has joined."""
+_TINY = 1e-12
+
+
+class AutomaticEvent(NamedTuple):
+    """Something that happens by itself: a robot that fails or joins, as the conditions say.
+
+    Attributes
+    ----------
+    step : int
+        Step at which it happens.
+    kind : str
+        Kind of the event, as in `SessionEvent`.
+    text : str
+        Description.
+    """
+
+    step: int
+    kind: str
+    text: str
 
 
 class Lockstep:
-    """Panes that begin as a scenario says; StartError, ParameterError when they cannot."""
+    """The panes of a session, which are always at the same step.
 
-    def __init__(self, scenario: Scenario) -> None:
-        positions, conditions = scenario.positions(), scenario.conditions
-        working = np.ones(len(positions), dtype=bool)
+    Parameters
+    ----------
+    scenario : SessionScenario
+        What they start from.
+
+    Attributes
+    ----------
+    scenario : SessionScenario
+        Map, controllers and properties as they are now.
+    step : int
+        Number of control steps since time 0.
+    drag : tuple or None
+        Number of the dragged robot, and the point to which it is pulled, m.
+    panes : list of Pane
+        One for each controller.
+
+    Raises
+    ------
+    StartError
+        If there is no space for the team.
+    ParameterError
+        If a controller or the team does not accept a value.
+    """
+
+    def __init__(self, scenario: SessionScenario) -> None:
+        positions = scenario.starts
+        conditions = scenario.conditions
+        is_working = np.ones(len(positions), dtype=bool)
         if conditions is not None:
-            conditions.check_team(len(positions))
             check_joins(scenario.environment, conditions)
-            working = conditions.find_working(0.0, len(positions))
+            is_working = conditions.find_working(0.0, len(positions))
             conditions = conditions.drop_team_changes()
-        numbers = tuple((np.flatnonzero(working) + 1).tolist())
-        moving = None if scenario.given is None or scenario.moving is None else scenario.moving[working]
-        self.scenario = scenario  # with controllers, gains, limits and map as they were last chosen
+        velocities = None
+        if scenario.given_starts is not None and scenario.velocities is not None:
+            velocities = scenario.velocities[is_working]
+        numbers = tuple((np.flatnonzero(is_working) + 1).tolist())
+        self.scenario = scenario
         self.step = 0
-        self.hand: tuple[int, Point] | None = None  # the robot that is dragged, and where to, m
-        self.panes = []
-        for number, law in enumerate(scenario.laws):
-            setup = PaneSetup(scenario.environment, law, scenario.limits, numbers, {}, conditions)
-            self.panes.append(Pane(number, setup, begun(setup, positions[working], scenario.dt, moving)))
+        self.drag: tuple[int, Point] | None = None
+        self.panes: list[Pane] = []
+        for number, controller in enumerate(scenario.controllers):
+            setup = PaneSetup(scenario.environment, controller, scenario.properties, numbers, {}, conditions)
+            simulation = start_simulation(setup, positions[is_working], scenario.dt, velocities)
+            self.panes.append(Pane(number, setup, simulation))
 
     @classmethod
-    def resumed(cls, moment: Moment) -> Self:
+    def resume(cls, state: RunState) -> Self:
+        """Build the panes from a recorded state."""
         run = cls.__new__(cls)
-        run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
-        again = {k: resumed(state, run.scenario.dt, run.step) for k, state in moment.states.items()}
-        run.panes = [Pane(k, state.setup, again[k]) for k, state in moment.states.items()]
+        run.scenario = state.scenario
+        run.step = state.step
+        run.drag = state.drag
+        run.panes = []
+        for number, pane_state in state.states.items():
+            simulation = resume_simulation(pane_state, state.scenario.dt, state.step)
+            run.panes.append(Pane(number, pane_state.setup, simulation))
         return run
 
-    def moment(self, node: int = 0) -> Moment:
-        states = {pane.number: pane.state() for pane in self.panes}
-        return Moment(self.step, states, self.scenario, self.hand, node)
+    def build_state(self, node: int = 0) -> RunState:
+        """Return the present state.
+
+        Parameters
+        ----------
+        node : int
+            Number of the node of the undo tree in whose time it is.
+
+        Returns
+        -------
+        RunState
+        """
+        states = {pane.number: pane.build_state() for pane in self.panes}
+        return RunState(self.step, states, self.scenario, self.drag, node)
 
     @property
     def time(self) -> float:
+        """Simulated time, s."""
         return self.step * self.scenario.dt
 
-    def advance(self) -> list[Happening]:
+    def advance(self) -> list[AutomaticEvent]:
+        """Simulate one step, and return what has happened by itself."""
+        # A controller that raises does so before any pane has moved.
         for pane in self.panes:
-            # A controller that fails does so before any pane has moved.
             pane.simulation.observe_and_decide()
         for pane in self.panes:
-            pane.step(self._pull(pane))
+            pane.step(self._compute_pull(pane))
         self.step += 1
-        return list(self._come_and_go())
+        return [*self._add_joining_robots(), *self._stop_failing_robots()]
 
-    def apply(self, change: Touch) -> None:
-        """Carry a change out, or nothing of it; StartError, ParameterError, MapError say why it cannot be."""
-        match change:
-            case Drag() | Release():
-                self.hand = (change.robot, change.to) if isinstance(change, Drag) else None
+    def apply(self, edit: RunEdit) -> None:
+        """Apply an edit. If it raises, nothing has changed.
+
+        Parameters
+        ----------
+        edit : RunEdit
+            The edit.
+
+        Raises
+        ------
+        StartError
+            If there is no space for a robot.
+        ParameterError
+            If the edit is not possible.
+        MapError
+            If the edited map would break a rule.
+        """
+        match edit:
+            case DragRobot(robot, to):
+                self.drag = (robot, to)
                 return
-            case changes.RemovePane(number):
-                if len(self.panes) == 1:
-                    raise ParameterError("the last pane stays")
-                self.panes = [pane for pane in self.panes if pane.number != number]
-            case changes.EditObstacles() | changes.Paint() | changes.SetDensity():
-                environment = change.on(self.scenario.environment)
-                self._change_all(lambda pane: Continuation(replace(pane.setup, environment=environment)))
+            case ReleaseRobot():
+                self.drag = None
+                return
+            case RemovePane(number):
+                self._remove_pane(number)
+            case EditObstacles() | PaintDensity() | SetDensity():
+                self._edit_map(edit)
             case _:
-                self._change_all(change.of)
-                held = self.hand is not None and self.panes[0].row(self.hand[0]) is not None
-                if isinstance(change, Place) or not held:
-                    self.hand = None
-        setup, laws = self.panes[0].setup, tuple(pane.law for pane in self.panes)
-        self.scenario = replace(self.scenario, environment=setup.environment, limits=setup.limits, laws=laws)
+                self._edit_panes(edit)
+        setup = self.panes[0].setup
+        self.scenario = replace(
+            self.scenario,
+            environment=setup.environment,
+            properties=setup.properties,
+            controllers=tuple(pane.controller for pane in self.panes),
+        )
 
-    def _change_all(self, wanted: Callable[[Pane], Continuation]) -> None:
-        """Let every pane go on as is wanted; if one cannot, none does."""
-        wants = [(pane, wanted(pane)) for pane in self.panes]
-        wants = [(pane, w) for pane, w in wants if w.positions is not None or w.setup is not pane.setup]
-        changed = [(pane, want.setup, pane.changed(want)) for pane, want in wants]
-        for pane, setup, simulation in changed:
-            pane.take(setup, simulation)
+    def _remove_pane(self, number: int) -> None:
+        if len(self.panes) == 1:
+            raise ParameterError("the last pane stays")
+        self.panes = [pane for pane in self.panes if pane.number != number]
 
-    def _pull(self, pane: Pane) -> Array | None:
-        if self.hand is None or (row := pane.row(self.hand[0])) is None:
+    def _edit_map(self, edit: MapEdit) -> None:
+        environment = edit.build_environment(self.scenario.environment)
+        self._change_panes(lambda pane: Continuation(replace(pane.setup, environment=environment)))
+
+    def _edit_panes(self, edit: PaneEdit) -> None:
+        self._change_panes(edit.build_continuation)
+        is_drag_possible = self.drag is not None and self.panes[0].get_row(self.drag[0]) is not None
+        if isinstance(edit, PlaceRobot) or not is_drag_possible:
+            self.drag = None
+
+    def _change_panes(self, build_continuation: Callable[[Pane], Continuation]) -> None:
+        """Change all panes, or none if one of them cannot be changed."""
+        continuations = [(pane, build_continuation(pane)) for pane in self.panes]
+        changes = []
+        for pane, continuation in continuations:
+            if continuation.positions is not None or continuation.setup is not pane.setup:
+                simulation = pane.build_changed_simulation(continuation)
+                changes.append((pane, continuation.setup, simulation))
+        for pane, setup, simulation in changes:
+            pane.adopt(setup, simulation)
+
+    def _compute_pull(self, pane: Pane) -> Array | None:
+        """Return the forces of a critically damped spring on the dragged robot, (n, 2) N."""
+        if self.drag is None:
             return None
-        simulation, pulls = pane.simulation, np.zeros_like(pane.simulation.positions)
-        pull = SPRING * (np.array(self.hand[1]) - simulation.positions[row])
-        pull -= 2.0 * np.sqrt(SPRING) * simulation.velocities[row]
-        size = float(np.hypot(*pull))
-        pulls[row] = pull * (simulation.team.mass[row] * min(1.0, STRONGEST / max(size, 1e-12)))
-        return pulls
+        number, target = self.drag
+        row = pane.get_row(number)
+        if row is None:
+            return None
+        simulation = pane.simulation
+        acceleration = DRAG_STIFFNESS_PER_KG * (np.array(target) - simulation.positions[row])
+        acceleration -= 2.0 * np.sqrt(DRAG_STIFFNESS_PER_KG) * simulation.velocities[row]
+        magnitude = float(np.hypot(*acceleration))
+        fraction = min(1.0, MAX_DRAG_ACCELERATION_M_S2 / max(magnitude, _TINY))
+        forces = np.zeros_like(simulation.positions)
+        forces[row] = acceleration * (simulation.team.mass[row] * fraction)
+        return forces
 
-    def _describe_offset(self, number: int, requested: Point) -> str:
-        """Return how far from the requested place a robot joined, in words; empty if it joined there."""
-        pane = self.panes[0]
-        row = pane.row(number)
-        offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))
-        if offset < 5e-4:
-            return ""
-        return f" {offset:.2f} m from [{requested[0]:g}, {requested[1]:g}]"
+    def _find_changing_robots(self, change_times: Array) -> list[int]:
+        """Return the numbers of the robots whose time of a change, (n,) s, was in the last step."""
+        now = self.time + TIME_TOLERANCE_S
+        before = self.time - self.scenario.dt + TIME_TOLERANCE_S
+        is_changing = (change_times > before) & (change_times <= now)
+        numbers: list[int] = (np.flatnonzero(is_changing) + 1).tolist()
+        return numbers
 
-    def _come_and_go(self) -> Iterator[Happening]:
+    def _add_joining_robots(self) -> list[AutomaticEvent]:
         conditions = self.scenario.conditions
         if conditions is None or not conditions.has_team_changes:
-            return
-        begins, ends = conditions.compute_working_periods(self.scenario.robots)
-        now, before = self.time + TIME_TOLERANCE_S, self.time - self.scenario.dt + TIME_TOLERANCE_S
-        for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
-            if number not in self.panes[0].setup.there:
-                place = next(join.place for join in conditions.joins if join.robot == number)
-                x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
-                self.apply(Join(number, (x, y)))
-                yield self.step, "robot", f"robot {number} joined{self._describe_offset(number, (x, y))}"
-        for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
-            if number in self.panes[0].numbers and len(self.panes[0].numbers) > 1:
-                self.apply(Fail(number))
-                yield self.step, "failure", f"robot {number} failed"
+            return []
+        events = []
+        join_times, _ = conditions.compute_working_periods(self.scenario.robots)
+        for number in self._find_changing_robots(join_times):
+            if number in self.panes[0].setup.all_numbers:
+                continue
+            position = next(join.place for join in conditions.joins if join.robot == number)
+            if position is None:
+                x, y = self.scenario.starts[number - 1].tolist()
+                position = (x, y)
+            self.apply(AddRobot(number, position))
+            text = f"robot {number} joined{self._describe_offset(number, position)}"
+            events.append(AutomaticEvent(self.step, "robot", text))
+        return events
+
+    def _stop_failing_robots(self) -> list[AutomaticEvent]:
+        conditions = self.scenario.conditions
+        if conditions is None or not conditions.has_team_changes:
+            return []
+        events = []
+        _, failure_times = conditions.compute_working_periods(self.scenario.robots)
+        for number in self._find_changing_robots(failure_times):
+            numbers = self.panes[0].numbers
+            if number in numbers and len(numbers) > 1:
+                self.apply(FailRobot(number))
+                events.append(AutomaticEvent(self.step, "failure", f"robot {number} failed"))
+        return events
+
+    def _describe_offset(self, number: int, requested: Point) -> str:
+        """Describe the distance from the requested position to that where a robot joined, if there is one."""
+        pane = self.panes[0]
+        row = pane.get_row(number)
+        offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))
+        if offset < MIN_REPORTED_OFFSET_M:
+            return ""
+        return f" {offset:.2f} m from [{requested[0]:g}, {requested[1]:g}]"

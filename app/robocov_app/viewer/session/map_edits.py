@@ -1,4 +1,4 @@
-"""Edits of a map: obstacles drawn, moved and deleted, each a new environment; what cannot be is refused."""
+"""Edits of a map: obstacles that are added, moved and removed, and a painted density."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -8,120 +8,230 @@ from itertools import groupby
 import numpy as np
 import shapely
 
+from robocov.arrays import Array
 from robocov.density import Raster, sample_density
 from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, format_path
 from robocov.mapfile import from_json, to_json
 
-SHORTEST = 0.02  # meters below which what is drawn is taken for a slip of the hand
-CELLS = 96  # cells along the longer side of a map whose density is painted
-LEAST, MOST = 0.05, 50.0  # between these a place counts once it has been painted
-_DAB = 1.15  # factor of one dab on the density at its center
-_DECIMALS = 3  # of what is painted, so that a map that is saved stays short
+MIN_SHAPE_SIZE_M = 0.02
+"""Size below which a drawn shape is taken for a slip of the pointer."""
+PAINTED_RASTER_CELLS = 96
+"""Number of cells along the longer side of a map whose density is painted."""
+MIN_PAINTED_DENSITY = 0.05
+MAX_PAINTED_DENSITY = 50.0
+DAB_FACTOR = 1.15
+"""Factor by which a dab of the brush changes the density at its center."""
+_DENSITY_DECIMALS = 3
+"""Decimals of a painted density, so that map files stay short."""
+_COORDINATE_DECIMALS = 4
+"""Decimals of drawn coordinates, m, so that files stay short."""
 
 
-def with_replaced(
+def replace_obstacles(
     environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
 ) -> Environment:
-    """Return the map, as a file gives it, with obstacles in the place of `removed` ones from a number on.
+    """Return a map with some of its obstacles replaced, as a file would contain it.
 
-    Starts that are covered go. Raises MapError where it would break a rule, in a sentence for people.
+    Starts that are covered by an obstacle are removed.
+
+    Parameters
+    ----------
+    environment : Environment
+        The map.
+    first : int
+        Index of the first obstacle that is replaced.
+    removed : int
+        Number of obstacles that are replaced.
+    added : iterable of Obstacle
+        The obstacles that replace them.
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    MapError
+        If the map would break a rule.
     """
-    there, starts = environment.obstacles, dict(environment.starts)
-    obstacles = (*there[:first], *added, *there[first + removed :])
+    old = environment.obstacles
+    obstacles = (*old[:first], *added, *old[first + removed :])
+    starts = dict(environment.starts)
     while True:
+        changed = replace(environment, obstacles=obstacles, starts=starts)
         try:
-            return from_json(to_json(replace(environment, obstacles=obstacles, starts=starts)), "map")
+            return from_json(to_json(changed), "map")
         except MapError as error:
-            # an obstacle on a start takes that start away, nothing else
             message = str(error).removeprefix("map: ")
-            told = {name: re.escape(format_path(("starts", name))) for name in starts}
-            blocked = [name for name, at in told.items() if re.match(rf"{at}[:.\[]", message)]
-            if not blocked:
+            covered = [name for name in starts if _is_about_start(message, name)]
+            if not covered:
                 raise MapError(message) from None
-            for name in blocked:
+            for name in covered:
                 del starts[name]
 
 
-def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    return with_replaced(environment, len(environment.obstacles), 0, [obstacle])
+def _is_about_start(message: str, name: str) -> bool:
+    """Return whether the message of a MapError is about a start."""
+    path = re.escape(format_path(("starts", name)))
+    return re.match(rf"{path}[:.\[]", message) is not None
 
 
-def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
-    def at(point: tuple[float, float]) -> tuple[float, float]:
-        return round(point[0] + dx, 4), round(point[1] + dy, 4)
+def add_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
+    """Return a map with one more obstacle; raises as `replace_obstacles`."""
+    return replace_obstacles(environment, len(environment.obstacles), 0, [obstacle])
+
+
+def move_obstacle(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
+    """Return an obstacle moved by a distance, m."""
+
+    def move(point: Point) -> Point:
+        return round(point[0] + dx, _COORDINATE_DECIMALS), round(point[1] + dy, _COORDINATE_DECIMALS)
 
     if isinstance(obstacle, CircleObstacle):
-        return replace(obstacle, center=at(obstacle.center))
+        return replace(obstacle, center=move(obstacle.center))
     if isinstance(obstacle, WallObstacle):
-        return replace(obstacle, points=tuple(map(at, obstacle.points)))
-    holes = tuple(tuple(map(at, hole)) for hole in obstacle.holes)
-    return replace(obstacle, vertices=tuple(map(at, obstacle.vertices)), holes=holes)
+        return replace(obstacle, points=tuple(map(move, obstacle.points)))
+    holes = tuple(tuple(map(move, hole)) for hole in obstacle.holes)
+    return replace(obstacle, vertices=tuple(map(move, obstacle.vertices)), holes=holes)
 
 
-def obstacle_at(environment: Environment, point: tuple[float, float], reach: float = 0.0) -> int | None:
-    """Return the number of the topmost obstacle at a point, else of the nearest within `reach` m, or None."""
-    away = shapely.distance([shape.polygon for shape in environment.obstacles], shapely.Point(point))
-    if not len(away) or away.min() > reach:
+def find_obstacle(environment: Environment, point: Point, reach: float = 0.0) -> int | None:
+    """Return the index of the obstacle at a point.
+
+    Parameters
+    ----------
+    environment : Environment
+        The map.
+    point : tuple
+        The point, (x, y) m.
+    reach : float, m
+        Distance within which an obstacle counts as being at the point.
+
+    Returns
+    -------
+    int or None
+        Index of the nearest obstacle, of the topmost one where several contain the point.
+    """
+    polygons = [obstacle.polygon for obstacle in environment.obstacles]
+    distances = shapely.distance(polygons, shapely.Point(point))
+    if not len(distances) or distances.min() > reach:
         return None
-    return int(np.flatnonzero(away == away.min())[-1])
+    return int(np.flatnonzero(distances == distances.min())[-1])
 
 
-def words_for(obstacle: Obstacle) -> str:
+def describe_obstacle(obstacle: Obstacle) -> str:
+    """Return the kind of an obstacle, with its name if it has one."""
     kind = type(obstacle).__name__.removesuffix("Obstacle").lower()
     return f"{kind} “{obstacle.name}”" if obstacle.name else kind
 
 
-def polygon_of(points: list[tuple[float, float]]) -> PolygonObstacle:
-    ring = _rounded(points)
-    ring = ring[:-1] if len(ring) > 2 and ring[0] == ring[-1] else ring
-    if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < SHORTEST**2:
+def build_polygon(points: list[Point]) -> PolygonObstacle:
+    """Build a polygon from the points of its outline, m.
+
+    Raises
+    ------
+    MapError
+        If it encloses nothing, or crosses itself.
+    """
+    vertices = _round_points(points)
+    if len(vertices) > 2 and vertices[0] == vertices[-1]:
+        vertices = vertices[:-1]
+    if len(vertices) < 3 or shapely.MultiPoint(vertices).convex_hull.area < MIN_SHAPE_SIZE_M**2:
         raise MapError("a polygon needs three corners that enclose something")
-    if not shapely.Polygon(ring).is_valid:
+    if not shapely.Polygon(vertices).is_valid:
         raise MapError("the polygon's outline crosses itself")
-    return PolygonObstacle(ring)
+    return PolygonObstacle(vertices)
 
 
-def wall_of(points: list[tuple[float, float]], width: float) -> WallObstacle:
-    line = _rounded(points)
-    if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
+def build_wall(points: list[Point], width: float) -> WallObstacle:
+    """Build a wall of a width, m, along points, m.
+
+    Raises
+    ------
+    MapError
+        If the points are in the same place.
+    """
+    line = _round_points(points)
+    if len(line) < 2 or shapely.LineString(line).length < MIN_SHAPE_SIZE_M:
         raise MapError("a wall needs two points that are apart")
     return WallObstacle(line, width)
 
 
-def circle_of(center: tuple[float, float], rim: tuple[float, float]) -> CircleObstacle:
+def build_circle(center: Point, rim: Point) -> CircleObstacle:
+    """Build a circle from its center and a point on its rim, m.
+
+    Raises
+    ------
+    MapError
+        If the points are in the same place.
+    """
     radius = float(np.hypot(rim[0] - center[0], rim[1] - center[1]))
-    if radius < SHORTEST:
+    if radius < MIN_SHAPE_SIZE_M:
         raise MapError("a circle needs a radius: drag from its middle to its rim")
-    return CircleObstacle(_rounded([center])[0], round(radius, 4))
+    return CircleObstacle(_round_points([center])[0], round(radius, _COORDINATE_DECIMALS))
 
 
-def _rounded(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Return points to the tenth of a millimeter, so that files stay short; repeated ones once."""
-    rounded = [(round(float(x), 4), round(float(y), 4)) for x, y in points]
+def _round_points(points: list[Point]) -> tuple[Point, ...]:
+    """Round points to a tenth of a millimeter, and remove repeated ones."""
+    rounded = [
+        (round(float(x), _COORDINATE_DECIMALS), round(float(y), _COORDINATE_DECIMALS)) for x, y in points
+    ]
     return tuple(point for point, _ in groupby(rounded))
 
 
-def painted(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:
-    """Return a map's density after dabs of a brush at points, m: raised or lowered, most in their middle."""
-    raster = painted_raster(environment)
-    values, (x_min, y_min, x_max, y_max) = np.array(raster.values), raster.extent
+def paint_density(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:
+    """Raise or lower the density of a map with a brush.
+
+    Parameters
+    ----------
+    environment : Environment
+        The map.
+    dabs : sequence of tuple
+        Points at which the brush is applied, (x, y) m each.
+    radius : float, m
+        Radius of the brush, whose effect decreases from its center to its rim.
+    lowers : bool
+        Whether the density is lowered.
+
+    Returns
+    -------
+    Raster
+    """
+    raster = build_paintable_raster(environment)
+    values = np.array(raster.values)
     rows, columns = values.shape
-    x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)
-    y = y_min + (np.arange(rows) + 0.5) * ((y_max - y_min) / rows)
-    for at_x, at_y in dabs:
-        square = ((x[None, :] - at_x) ** 2 + (y[:, None] - at_y) ** 2) / radius**2
-        soft = np.where(square < 1.0, (1.0 - np.minimum(square, 1.0)) ** 2, 0.0)
-        change = np.exp((-1.0 if lowers else 1.0) * np.log(_DAB) * soft)
-        values = np.where(soft > 0.0, np.clip(np.maximum(values, LEAST) * change, LEAST, MOST), values)
-    return Raster(np.round(values, _DECIMALS), raster.extent)
+    x_min, y_min, x_max, y_max = raster.extent
+    x = _compute_cell_centers(x_min, x_max, columns)[None, :]
+    y = _compute_cell_centers(y_min, y_max, rows)[:, None]
+    exponent = -np.log(DAB_FACTOR) if lowers else np.log(DAB_FACTOR)
+    for center_x, center_y in dabs:
+        squared_distances = ((x - center_x) ** 2 + (y - center_y) ** 2) / radius**2
+        strengths = np.where(squared_distances < 1.0, (1.0 - np.minimum(squared_distances, 1.0)) ** 2, 0.0)
+        changed = np.maximum(values, MIN_PAINTED_DENSITY) * np.exp(exponent * strengths)
+        changed = np.clip(changed, MIN_PAINTED_DENSITY, MAX_PAINTED_DENSITY)
+        values = np.where(strengths > 0.0, changed, values)
+    return Raster(np.round(values, _DENSITY_DECIMALS), raster.extent)
 
 
-def painted_raster(environment: Environment) -> Raster:
-    """Return a map's density as a raster that can be painted: as it is where it is one, else sampled."""
+def _compute_cell_centers(low: float, high: float, count: int) -> Array:
+    """Return the centers of equal cells between two coordinates, (count,) m."""
+    cell_size = (high - low) / count
+    return np.asarray(low + (np.arange(count) + 0.5) * cell_size, dtype=np.float64)
+
+
+def build_paintable_raster(environment: Environment) -> Raster:
+    """Return the density of a map as a raster that can be painted, sampled unless it is one already."""
     density = environment.density
-    if isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1:
+    is_paintable = (
+        isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1
+    )
+    if is_paintable:
+        assert isinstance(density, Raster)
         return density
-    sides = np.ptp(np.reshape(environment.region.bounds, (2, 2)), axis=0).tolist()
-    columns, rows = (max(round(side / (max(sides) / CELLS)), 2) for side in sides)
-    return sample_density(density, environment.region.bounds, columns, rows)
+    bounds = environment.region.bounds
+    x_min, y_min, x_max, y_max = bounds
+    cell_size = max(x_max - x_min, y_max - y_min) / PAINTED_RASTER_CELLS
+    columns = max(round((x_max - x_min) / cell_size), 2)
+    rows = max(round((y_max - y_min) / cell_size), 2)
+    return sample_density(density, bounds, columns, rows)

@@ -1,13 +1,11 @@
-"""One controller at work on the team: a pane of the window."""
+"""A pane of the window: the team under one controller."""
 
 from copy import deepcopy
-from functools import partial
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.controllers import has_memory
 from robocov.errors import StartError
 from robocov.observation import Snapshot
@@ -15,15 +13,27 @@ from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov.world.free_positions import relocate_robots
 from robocov_app.render.scene import Scene, Sensed
+from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.curves import Curve
-from robocov_app.viewer.session.moments import PaneSetup, State, Trail, of_robots
-from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.states import PaneSetup, PaneState
+from robocov_app.viewer.session.trails import Trail, select_robots
 
-SENSED_EVERY = 3  # steps between notes of what is sensed
+STEPS_BETWEEN_SENSED_POINTS = 3
+"""Number of steps between two notes of the points that robots sense."""
+_MOVED_M = 1e-3
+"""Distance from which on a robot counts as moved when it is pushed out of an obstacle."""
 
 
 class Continuation(NamedTuple):
-    """Continuation of a pane. `positions`, `velocities`, (n, 2) m and m/s: by default the present ones."""
+    """State from which an edited pane continues.
+
+    Attributes
+    ----------
+    setup : PaneSetup
+        What the pane simulates with from now on.
+    positions, velocities : (n, 2) array or None, m and m/s
+        Of the working robots; by default as they are.
+    """
 
     setup: PaneSetup
     positions: Array | None = None
@@ -31,113 +41,288 @@ class Continuation(NamedTuple):
 
 
 class Pane:
-    """A team under one controller, which can be touched. Robots that failed are obstacles to the others."""
+    """A team under one controller. Failed robots are obstacles to the others.
+
+    Parameters
+    ----------
+    number : int
+        Number of the pane, which stays the same when others are removed.
+    setup : PaneSetup
+        What it simulates with.
+    simulation : Simulation
+        The simulation at the present step.
+
+    Attributes
+    ----------
+    starts : (n, 2) array, m
+        First positions of the working robots.
+    trail : Trail
+        Trajectories of the working robots.
+    curves : dict of str to Curve
+        Cost curves by quantity, ``"distance"`` and ``"time"``.
+    distance_curve : Curve
+        Mean distance to the nearest robot.
+    sensed : Sensed
+        Points that robots have sensed.
+    """
 
     def __init__(self, number: int, setup: PaneSetup, simulation: Simulation) -> None:
-        self.number, self.setup, self.simulation = number, setup, simulation
+        self.number = number
+        self.setup = setup
+        self.simulation = simulation
         self.starts = simulation.positions
         self.trail = Trail(len(self.starts))
         self.trail.add(simulation.time, self.starts)
         self.curves = {"distance": Curve(), "time": Curve()}
-        self.curve, self.sensed, self._steps = self.curves["distance"], Sensed(), 0
+        self.distance_curve = self.curves["distance"]
+        self.sensed = Sensed()
+        self._steps = 0
 
     @property
-    def law(self) -> ControllerChoice:
-        return self.setup.law
+    def controller(self) -> ControllerChoice:
+        """The controller."""
+        return self.setup.controller
 
     @property
     def numbers(self) -> tuple[int, ...]:
+        """Numbers of the working robots."""
         return self.setup.numbers
 
     @property
     def time(self) -> float:
+        """Time of the simulation, s."""
         return self.simulation.time
 
-    def row(self, number: int) -> int | None:
+    def get_row(self, number: int) -> int | None:
+        """Return the row of a robot in arrays; None if it does not work."""
         return self.numbers.index(number) if number in self.numbers else None
 
     def step(self, pushes: Array | None = None) -> None:
-        if self._steps % SENSED_EVERY == 0:
+        """Simulate one step.
+
+        Parameters
+        ----------
+        pushes : (n, 2) array or None, N
+            External forces on the robots.
+        """
+        if self._steps % STEPS_BETWEEN_SENSED_POINTS == 0:
             seen = self.simulation.observe_and_decide().seen
             self.sensed.add(seen.time, self.numbers, seen.obstacle_points)
         self._steps += 1
         self.simulation.step(pushes)
         self.trail.add(self.time, self.simulation.positions)
 
-    def scene(self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any) -> Scene:
-        team = self.simulation.team if setup is self.setup else setup.team
-        more |= {"numbers": setup.numbers, "failed": setup.failed, "label": setup.law.label}
-        more["failed_radii"] = {number: setup.limits.radius_of(number) for number in setup.failed}
-        more["starts"] = self.starts if len(self.starts) == len(setup.numbers) else None
-        more |= {"trail": trail[0] if len(trail[0]) else None, "trail_time": trail[1]}
-        return Scene.of(setup.environment, team, snapshot, **more)
+    def build_scene(
+        self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any
+    ) -> Scene:
+        """Build the scene of a step for drawing.
 
-    def state(self) -> State:
-        simulation = self.simulation
-        # who wrote a controller may have it change what it remembers
-        memory = deepcopy(simulation.memory) if has_memory(simulation.controller) else None
-        moving = simulation.positions, simulation.velocities
-        return State(self.setup, *moving, memory, None, simulation.inbox, simulation.steering)
+        Parameters
+        ----------
+        setup : PaneSetup
+            Setup of the pane at the step.
+        snapshot : Snapshot
+            Observations and decision at the step.
+        trail : tuple of array
+            Positions and times of the trail up to the step.
+        **more
+            Further fields of `Scene`.
 
-    def changed(self, wanted: Continuation) -> Simulation:
-        """Return the simulation that goes on from here as wanted; the pane stays as it is.
-
-        Robots that do not fit are pushed out of what is in the way. StartError when there is no room for one;
-        ParameterError when the controller or the team does not take a value.
+        Returns
+        -------
+        Scene
         """
-        old, setup = self.simulation, wanted.setup
-        environment, team = setup.solid, setup.team
-        # the same controller goes on remembering; one without memory begins anew, as when resumed
-        goes_on = setup.law == self.law and has_memory(old.controller)
-        controller = None if goes_on else setup.law.made()
-        known = attrgetter("law", "limits", "numbers", "failed")
-        alike = wanted.positions is None and known(self.setup) == known(setup)
-        if alike and setup.environment.has_same_geometry(self.setup.environment):
-            return old.with_density(environment)  # all else stays, as when it is painted
-        row_of = {number: row for row, number in enumerate(self.numbers)}  # who stays keeps what is its own
-        rows = np.array([row_of.get(number, -1) for number in setup.numbers], dtype=np.intp)
-        steering = None if old.steering is None else np.where(rows[:, None] < 0, 0.0, old.steering[rows])
-        other: dict[str, Any] = {"controller": controller, "team": team, "steering": steering}
-        make = partial(old.with_changes, environment=environment, **other)
-        positions = old.positions if wanted.positions is None else wanted.positions
-        velocities = old.velocities if wanted.velocities is None else wanted.velocities
-        try:
-            changed = make(positions=positions, velocities=velocities)
-        except StartError:  # who does not fit comes to rest where it does
-            placed = relocate_robots(environment.at(old.time), positions, team)
-            moved = np.hypot(*(placed - positions).T) > 1e-3
-            changed = make(positions=placed, velocities=np.where(moved[:, None], 0.0, velocities))
+        positions, times = trail
+        return Scene.of(
+            setup.environment,
+            self.simulation.team if setup is self.setup else setup.team,
+            snapshot,
+            numbers=setup.numbers,
+            failed=setup.failed,
+            failed_radii={number: setup.properties.get_radius(number) for number in setup.failed},
+            label=setup.controller.label,
+            starts=self.starts if len(self.starts) == len(setup.numbers) else None,
+            trail=positions if len(positions) else None,
+            trail_time=times,
+            **more,
+        )
+
+    def build_state(self) -> PaneState:
+        """Return the present state, from which the pane can be resumed."""
+        simulation = self.simulation
+        memory = None
+        if has_memory(simulation.controller):
+            # A user's controller may change its memory in place.
+            memory = deepcopy(simulation.memory)
+        return PaneState(
+            self.setup,
+            simulation.positions,
+            simulation.velocities,
+            memory,
+            inbox=simulation.inbox,
+            steering=simulation.steering,
+        )
+
+    def build_changed_simulation(self, continuation: Continuation) -> Simulation:
+        """Build the simulation with which the pane continues after an edit; the pane itself stays as it is.
+
+        Robots that overlap an obstacle are pushed out of it.
+
+        Parameters
+        ----------
+        continuation : Continuation
+            What changes.
+
+        Returns
+        -------
+        Simulation
+
+        Raises
+        ------
+        StartError
+            If there is no space for a robot.
+        ParameterError
+            If the controller or the team does not accept a value.
+        """
+        old = self.simulation
+        setup = continuation.setup
+        # The same controller keeps its memory. One without memory is built again, as when it is resumed.
+        keeps_controller = setup.controller == self.controller and has_memory(old.controller)
+        controller = None if keeps_controller else setup.controller.build()
+        if self._differs_only_in_density(continuation):
+            return old.with_density(setup.sensed_environment)
+        rows = self._find_rows(setup.numbers)
+        changed = self._build_with_robots(continuation, controller, rows)
         if old.inbox is not None and setup.numbers != self.numbers:
             changed = changed.with_memory(changed.memory, old.inbox.select_robots(rows))
         return changed
 
-    def take(self, setup: PaneSetup, simulation: Simulation) -> None:
-        before, after = self.numbers, setup.numbers
+    def _differs_only_in_density(self, continuation: Continuation) -> bool:
+        """Return whether an edit changes nothing but the density of the map, or nothing at all."""
+        old = self.setup
+        new = continuation.setup
+        return (
+            continuation.positions is None
+            and old.controller == new.controller
+            and old.properties == new.properties
+            and old.numbers == new.numbers
+            and old.failed == new.failed
+            and new.environment.has_same_geometry(old.environment)
+        )
+
+    def _find_rows(self, numbers: tuple[int, ...]) -> IntArray:
+        """Return the present rows of robots, (n,); -1 for robots that do not work yet."""
+        row_by_number = {number: row for row, number in enumerate(self.numbers)}
+        return np.array([row_by_number.get(number, -1) for number in numbers], dtype=np.intp)
+
+    def _build_with_robots(self, continuation: Continuation, controller: Any, rows: IntArray) -> Simulation:
+        """Build the changed simulation; robots without space come to rest at the nearest free position."""
+        old = self.simulation
+        setup = continuation.setup
+        environment = setup.sensed_environment
+        team = setup.team
+        positions = old.positions if continuation.positions is None else continuation.positions
+        velocities = old.velocities if continuation.velocities is None else continuation.velocities
+        steering = None
+        if old.steering is not None:
+            steering = np.where(rows[:, None] < 0, 0.0, old.steering[rows])
+
+        def build(positions: Array, velocities: Array) -> Simulation:
+            return old.with_changes(
+                environment=environment,
+                controller=controller,
+                team=team,
+                steering=steering,
+                positions=positions,
+                velocities=velocities,
+            )
+
+        try:
+            return build(positions, velocities)
+        except StartError:
+            placed = relocate_robots(environment.at(old.time), positions, team)
+            is_moved = np.hypot(*(placed - positions).T) > _MOVED_M
+            return build(placed, np.where(is_moved[:, None], 0.0, velocities))
+
+    def adopt(self, setup: PaneSetup, simulation: Simulation) -> None:
+        """Continue with another setup and simulation."""
+        before = self.numbers
+        after = setup.numbers
         if after != before:
-            self.trail, starts = self.trail.of_robots(before, after), of_robots(self.starts, before, after)
+            self.trail = self.trail.select_robots(before, after)
+            starts = select_robots(self.starts, before, after)
             self.starts = np.where(np.isnan(starts), simulation.positions, starts)
-        self.simulation, self.setup = simulation, setup
+        self.simulation = simulation
+        self.setup = setup
         self.trail.add(self.time, simulation.positions, always=True)
 
 
-def begun(
-    setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None, **later: Any
+def start_simulation(
+    setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None
 ) -> Simulation:
-    """Return a simulation that begins so, or goes on `later`; StartError, ParameterError as `Simulation`."""
-    scenario = Scenario(
-        setup.solid,
-        setup.law.made(),
+    """Build the simulation of a pane at time 0.
+
+    Parameters
+    ----------
+    setup : PaneSetup
+        What the pane simulates with.
+    positions : (n, 2) array, m
+        Starting positions.
+    dt : float, s
+        Control period.
+    velocities : (n, 2) array or None, m/s
+        Initial velocities; by default robots are at rest.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    StartError
+        If robots overlap obstacles or each other.
+    ParameterError
+        If the controller or the team does not accept a value.
+    """
+    return _build_scenario(setup, positions, dt, velocities).build_simulation()
+
+
+def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
+    """Build the simulation of a pane from a recorded state.
+
+    Parameters
+    ----------
+    state : PaneState
+        The recorded state.
+    dt : float, s
+        Control period.
+    step : int
+        Step of the state.
+
+    Returns
+    -------
+    Simulation
+    """
+    scenario = _build_scenario(state.setup, state.positions, dt, state.velocities, state.steering)
+    simulation = scenario.build_simulation(steps=step, is_computed=True)
+    memory = simulation.memory if state.memory is None else state.memory
+    return simulation.with_memory(memory, state.inbox)
+
+
+def _build_scenario(
+    setup: PaneSetup,
+    positions: Array,
+    dt: float,
+    velocities: Array | None,
+    steering: Array | None = None,
+) -> Scenario:
+    return Scenario(
+        setup.sensed_environment,
+        setup.controller.build(),
         team=setup.team,
         starts=positions,
         velocities=velocities,
-        steering=later.pop("steering", None),
+        steering=steering,
         dt=dt,
         conditions=setup.conditions,
     )
-    return scenario.build_simulation(**later)
-
-
-def resumed(state: State, dt: float, step: int) -> Simulation:
-    later: dict[str, Any] = {"steering": state.steering, "steps": step, "is_computed": True}
-    simulation = begun(state.setup, state.positions, dt, state.velocities, **later)
-    return simulation.with_memory(simulation.memory if state.memory is None else state.memory, state.inbox)

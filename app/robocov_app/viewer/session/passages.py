@@ -1,4 +1,4 @@
-"""Words on passages: what an edit of the map cuts off, and gaps too narrow for a robot."""
+"""What an edit of a map does to passages: areas that it cuts off, and gaps that are too narrow."""
 
 from collections.abc import Sequence
 
@@ -8,30 +8,77 @@ import shapely
 from robocov.arrays import Array
 from robocov.environment import Environment, Point, find_narrow_gaps
 
+_WIDTH_TOLERANCE = 1e-6
+"""Relative tolerance within which a gap is wide enough."""
+_QUARTER_SEGMENTS = 4
 
-def passage_words(
+
+def describe_passage_changes(
     before: Environment, after: Environment, radius: float, robots: Array | Sequence[Point] = ()
 ) -> str:
-    """Return what an edit cuts off from robots of a radius, m, and what gap it leaves too narrow for them.
+    """Describe what an edit cuts off from robots, and a gap that it leaves too narrow for them.
 
-    `robots`: where they are, (n, 2) m.
+    Parameters
+    ----------
+    before, after : Environment
+        The map before and after the edit.
+    radius : float, m
+        Radius of the robots.
+    robots : (n, 2) array_like, m
+        Positions of the robots.
+
+    Returns
+    -------
+    str
+        Empty if there is nothing to say.
     """
-    words, stands = [], shapely.points(np.asarray(robots, dtype=float).reshape(-1, 2))
-    rooms = [shapely.get_parts(each.free.buffer(-radius, quad_segs=4)) for each in (before, after)]
-    inside = shapely.STRtree(rooms[0]).query(shapely.point_on_surface(rooms[1]), predicate="intersects")
-    for room in range(len(rooms[0])):  # what hung together is left where robots are, else where it is largest
-        parts = rooms[1][inside[0][inside[1] == room]]
-        left = np.array([(shapely.distance(stands, part) <= radius).any() for part in parts], dtype=bool)
-        if left.sum() > 1:
-            words.append(f"the team is parted in {left.sum()}")
-        if not left.any():
-            left = shapely.area(parts) == shapely.area(parts).max(initial=0.0)
-        lost = shapely.union_all(parts[~left])  # of places of centers
-        area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost, radius)))
-        if area > radius * radius:
-            words.append(f"{area:.1f} m² cut off")
-    width = 2 * radius * (1 - 1e-6)  # what is just wide enough is wide enough
-    known = {gap.between for gap in find_narrow_gaps(before.free, width)}
-    new = [gap for gap in find_narrow_gaps(after.free, width) if gap.between not in known]
-    words += [f"a gap of {100 * gap.width:.0f} cm, too narrow for a robot" for gap in new[:1]]
-    return "; ".join(words)
+    positions = shapely.points(np.asarray(robots, dtype=float).reshape(-1, 2))
+    descriptions = []
+    for components in _split_components(before, after, radius):
+        has_robots = np.array(
+            [(shapely.distance(positions, component) <= radius).any() for component in components],
+            dtype=bool,
+        )
+        if has_robots.sum() > 1:
+            descriptions.append(f"the team is parted in {has_robots.sum()}")
+        is_reachable = has_robots
+        if not has_robots.any():
+            # Without robots the largest component counts as the one that is left.
+            areas = shapely.area(components)
+            is_reachable = areas == areas.max(initial=0.0)
+        lost_centers = shapely.union_all(components[~is_reachable])
+        lost_area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost_centers, radius)))
+        if lost_area > radius * radius:
+            descriptions.append(f"{lost_area:.1f} m² cut off")
+    descriptions += _describe_narrow_gap(before, after, radius)
+    return "; ".join(descriptions)
+
+
+def _split_components(before: Environment, after: Environment, radius: float) -> list[np.ndarray]:
+    """Return, for each component where a robot's center could be before, the components that are left."""
+    components_before = _find_center_components(before, radius)
+    components_after = _find_center_components(after, radius)
+    tree = shapely.STRtree(components_before)
+    after_indices, before_indices = tree.query(
+        shapely.point_on_surface(components_after), predicate="intersects"
+    )
+    return [
+        components_after[after_indices[before_indices == index]] for index in range(len(components_before))
+    ]
+
+
+def _find_center_components(environment: Environment, radius: float) -> np.ndarray:
+    """Return the components of the positions at which a robot overlaps no obstacle."""
+    centers = environment.free.buffer(-radius, quad_segs=_QUARTER_SEGMENTS)
+    components: np.ndarray = shapely.get_parts(centers)
+    return components
+
+
+def _describe_narrow_gap(before: Environment, after: Environment, radius: float) -> list[str]:
+    """Describe the first gap that an edit has made too narrow, if there is one."""
+    width = 2 * radius * (1 - _WIDTH_TOLERANCE)
+    old_gaps = {gap.between for gap in find_narrow_gaps(before.free, width)}
+    for gap in find_narrow_gaps(after.free, width):
+        if gap.between not in old_gaps:
+            return [f"a gap of {100 * gap.width:.0f} cm, too narrow for a robot"]
+    return []

@@ -1,217 +1,279 @@
-"""Saved runs in the window again: as the past of a session that can be looked at and gone on from."""
+"""Sessions whose past is a saved run, or the runs of a comparison side by side."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS, has_memory, inform_controller
-from robocov.controllers.base import Controller
-from robocov.controllers.gains import Gain, Option
-from robocov.errors import InputError, ParameterError, RobocovError
-from robocov.observation import Decision, Observations
-from robocov.observation.region import Region
+from robocov.controllers import has_memory, inform_controller
+from robocov.errors import InputError
+from robocov.observation import Decision
 from robocov.record import Record
-from robocov.team import Team
 from robocov_app.runs.saved_runs import SavedRun, build_roster
-from robocov_app.viewer.session.moments import MOST_BYTES, History, Moment, PaneSetup, State
-from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
-from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.document import SessionDocument
+from robocov_app.viewer.session.history import MAX_HISTORY_BYTES, RunHistory
+from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
+from robocov_app.viewer.session.missing_controller import find_controller, use_placeholder
+from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
+from robocov_app.viewer.session.present import Present, restore_trails
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.states import PaneSetup, PaneState, RunState
+from robocov_app.viewer.session.timeline import Timeline
 
-MOST_OF_RECORDS = 400_000_000  # bytes of moments beside records' arrays; of longer ones old ones are thinned
-_OF_A_MOMENT = 1500  # about how many bytes a moment of one pane takes, beside those arrays
-
-
-@dataclass(frozen=True)
-class LostController(ControllerChoice):
-    """A controller that is not loaded, or does not take its gains: its runs can be looked at."""
-
-    title: str = ""  # what people called it
-    reason: str = ""  # why it cannot be had
-    stands_in: bool = False  # at the end of such a run, as its own controller, until somebody wants to go on
-    summary = "stands for a controller that is not there any more"
-
-    @property
-    def label(self) -> str:
-        return self.title
-
-    @property
-    def known(self) -> dict[str, Gain | Option]:
-        return {}
-
-    def made(self) -> Controller:
-        if self.stands_in:
-            return self
-        raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
-
-    def begin(self, region: Region, team: Team) -> None:
-        """Nothing is remembered."""
-
-    def decide(self, seen: Observations, memory: None) -> Decision:
-        replace(self, stands_in=False).made()
-        raise AssertionError
+MAX_RECORD_BYTES = 400_000_000
+"""Memory for the states of records, without their arrays; of longer records older states are thinned."""
+STATE_BYTES = 1500
+"""Approximate memory for the state of one pane, without the arrays of the record."""
+_PERIOD_TOLERANCE = 1e-6
+_FORCE_TOLERANCE = 1e-9
 
 
-def replayed_session(saved: Sequence[SavedRun], controllers: Sequence[str] = ()) -> Session:
-    """Return a session whose past is a saved run, or the runs of a comparison side by side.
+def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] = ()) -> Session:
+    """Build a session whose past is a saved run, or the runs of a comparison side by side.
 
-    Its beginning is looked at, and it plays. `controllers`: those that may be loaded beside the built-in
-    ones, so that their runs can be gone on with: names that the user has typed, never ones of the runs
-    themselves. Raises InputError when the runs do not go together, or are none that the window can show.
+    Time 0 is displayed, and it plays.
+
+    Parameters
+    ----------
+    saved : sequence of SavedRun
+        The runs, one for each pane.
+    controllers : sequence of str
+        Controllers in files of the user's own that may be run, so that their runs can be continued. They
+        are names that the user has typed, never names in the runs themselves.
+
+    Returns
+    -------
+    Session
+
+    Raises
+    ------
+    InputError
+        If the runs do not belong together, or the window cannot display them.
     """
-    saved = [each._replace(record=_paced(each.record)) for each in saved]
-    records = [each.record for each in saved]
-    _check(saved)
-    rosters = [build_roster(record) for record in records]
-    first, dt = records[0], control_dt(records[0])
-    limits, environment = TeamSpec.of(first.team, rosters[0].numbers), rosters[0].environment
-    laws = [law_of(record, controllers) for record in records]
-    given, moving = np.array(first.positions[0]), np.array(first.velocities[0])
-    start = first.start if first.start in environment.starts else None
-    choice = tuple(map(_standing, laws)), len(first.team), start, first.seed or 0
-    scenario = Scenario(environment, *choice, limits, dt, given, moving, first.conditions)
-    session, states = Session(scenario), list[list[State]]()
-    for record, law, roster in zip(records, laws, rosters, strict=True):
-        states.append(_states_of(record, PaneSetup(environment, law, limits, roster.numbers, roster.failed)))
-    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
-    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
-    scenario = replace(scenario, laws=tuple(laws))
-    for k in range(len(first)):
-        now = {pane: each[k] for pane, each in enumerate(states)}
-        history.add(Moment(k * round(first.dt / dt), now, scenario))
-    for pane, each in zip(session.panes, saved, strict=True):
-        _put(pane, each, history)
-    for touched in first.session.get("touched", ()):
-        words = f"robot {', '.join(map(str, touched['robots']))} was dragged"
-        session.head.happenings.add((round(touched["to_s"] / dt), "hand", words))
-    session.recall(history)
-    session.repeatable = all(record.session.get("repeatable", True) for record in records)
-    return session
+    runs = [run._replace(record=_detect_period(run.record)) for run in saved]
+    _check_runs(runs)
+    records = [run.record for run in runs]
+    choices = [find_controller(record, controllers) for record in records]
+    placeholders = tuple(use_placeholder(choice) for choice in choices)
+    start_scenario = _build_scenario(records[0], placeholders)
+    history = _build_history(records, replace(start_scenario, controllers=tuple(choices)))
+    document = SessionDocument.start(start_scenario)
+    head = document.nodes[0]
+    head.last_step = history.last.step
+    head.automatic_events.update(_list_drag_events(records[0], history.dt))
+    run = _resume_end(history.last)
+    restore_trails(run, history)
+    for pane, saved_run in zip(run.panes, runs, strict=True):
+        _restore_pane(pane, saved_run, history)
+    timeline = Timeline(
+        document,
+        Present(head, run, history),
+        record_end_time=history.last.step * history.dt,
+        is_record_reproducible=all(record.session.get("repeatable", True) for record in records),
+    )
+    timeline.show(0)
+    return Session(timeline=timeline)
 
 
-def control_dt(record: Record) -> float:
-    """Return the control period, s; moments of a record may be farther apart than that."""
+def get_control_period(record: Record) -> float:
+    """Return the control period of a record, s; its states may be farther apart."""
     dt = float(record.session.get("control_dt_s", record.dt))
-    return dt if abs(record.dt / dt - round(record.dt / dt)) < 1e-6 else record.dt
+    steps = record.dt / dt
+    is_multiple = abs(steps - round(steps)) < _PERIOD_TOLERANCE
+    return dt if is_multiple else record.dt
 
 
-def _paced(record: Record) -> Record:
-    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even."""
-    gap = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
-    steps = round(gap / record.dt)
-    if steps <= 1 or abs(gap / record.dt - steps) > 1e-6:
+def _detect_period(record: Record) -> Record:
+    """Return a thinned record with the time between its states as `dt`, if that is always the same."""
+    interval = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
+    steps = round(interval / record.dt)
+    if steps <= 1 or abs(interval / record.dt - steps) > _PERIOD_TOLERANCE:
         return record
-    session = {**record.session, "control_dt_s": control_dt(record)}
+    session = {**record.session, "control_dt_s": get_control_period(record)}
     return replace(record, dt=steps * record.dt, session=session)
 
 
-def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
-    kind = record.controller.rpartition(":")[2]
-    known = [name for name in controllers if name.rpartition(":")[2] == kind]
-    name, gains = record.controller, dict(record.gains)
-    if name not in (*CONTROLLERS, *known):
-        if not known:
-            own = f"FILE.py:{kind}" if kind != name else kind
-            reason = f"is none of robocov's controllers; to go on, open it with --controller {own}"
-            return LostController(name, gains, record.label, f"{record.label} {reason}")
-        name = known[0]
-    law = ControllerChoice(name, gains)
-    try:
-        law.made()
-        return law.plain()
-    except RobocovError as error:
-        return LostController(record.controller, gains, record.label, str(error))
+def _check_runs(saved: Sequence[SavedRun]) -> None:
+    """Raise an InputError unless the window can display the runs side by side."""
+    if not 1 <= len(saved) <= MAX_PANES:
+        reason = f"{len(saved)} runs, but the window has room for {MAX_PANES}; --frames and --video show all"
+        raise InputError(f"{saved[0].folder.parent}: {reason}")
+    first = _describe_run(saved[0].record)
+    for run in saved:
+        record = run.record
+        even_times = np.arange(len(record)) * record.dt
+        elapsed = record.time - record.time[0]
+        if not np.allclose(elapsed, even_times, rtol=1e-6, atol=1e-3 * record.dt):
+            file = run.folder / "record.npz"
+            raise InputError(f"{file}: time: expected times {record.dt:g} s apart")
+        for name, value in _describe_run(record).items():
+            if value != first[name]:
+                expected = f"expected {first[name]} as in {saved[0].folder}, got {value}"
+                raise InputError(f"{run.folder}: {name}: {expected}; --frames and --video show both")
 
 
-def _check(saved: Sequence[SavedRun]) -> None:
-    if not 1 <= len(saved) <= MOST_PANES:
-        known = f"{len(saved)} runs, but the window has room for {MOST_PANES}; --frames and --video show all"
-        raise InputError(f"{saved[0].folder.parent}: {known}")
-    first = saved[0].record
-    for each in saved:
-        record, where = each.record, each.folder
-        even = np.arange(len(record)) * record.dt
-        if not np.allclose(record.time - record.time[0], even, rtol=1e-6, atol=1e-3 * record.dt):
-            raise InputError(f"{where / 'record.npz'}: time: expected times {record.dt:g} s apart")
-        for what, mine, others in (
-            ("dt_s", record.dt, first.dt),
-            ("moments", len(record), len(first)),
-            ("team", record.team.to_dict(), first.team.to_dict()),
-            ("robots", build_roster(record).numbers, build_roster(first).numbers),
-            ("conditions", record.conditions, first.conditions),
-        ):
-            if mine != others:
-                wanted = f"expected {others} as in {saved[0].folder}, got {mine}"
-                raise InputError(f"{where}: {what}: {wanted}; --frames and --video show both")
+def _describe_run(record: Record) -> Mapping[str, object]:
+    """Return what must be the same for runs side by side."""
+    return {
+        "dt_s": record.dt,
+        "moments": len(record),
+        "team": record.team.to_dict(),
+        "robots": build_roster(record).numbers,
+        "conditions": record.conditions,
+    }
 
 
-def _standing(law: ControllerChoice) -> ControllerChoice:
-    return replace(law, stands_in=True) if isinstance(law, LostController) else law
+def _build_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -> SessionScenario:
+    """Build the scenario of runs of which one is given."""
+    roster = build_roster(record)
+    return SessionScenario(
+        roster.environment,
+        controllers,
+        len(record.team),
+        start=record.start if record.start in roster.environment.starts else None,
+        seed=record.seed or 0,
+        properties=RobotProperties.from_team(record.team, roster.numbers),
+        dt=get_control_period(record),
+        given_starts=np.array(record.positions[0]),
+        velocities=np.array(record.velocities[0]),
+        conditions=record.conditions,
+    )
 
 
-def _states_of(record: Record, cast: PaneSetup) -> list[State]:
-    arrays, states = (record.positions, record.velocities, record.forces, record.goals), []
-    fixed = [np.broadcast_to(array, array.shape) for array in arrays]  # nobody can change them
-    remembered = zip(_memories_of(record, cast.law), _circumstances_of(record, cast), strict=True)
-    for k, (memory, there) in enumerate(remembered):
-        rows = slice(None) if there is cast else np.flatnonzero(record.working[k])
-        positions, velocities, forces, goals = (array[k][rows] for array in fixed)
-        decision = Decision(forces, None if np.isnan(record.goals[k]).all() else goals)
-        steering = None if record.steering is None else record.steering[k][rows]
-        states.append(State(there, positions, velocities, memory, decision, steering=steering))
+def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunHistory:
+    """Build the past of a session from records."""
+    first = records[0]
+    dt = scenario.dt
+    pane_states = []
+    for record, choice in zip(records, scenario.controllers, strict=True):
+        roster = build_roster(record)
+        setup = PaneSetup(scenario.environment, choice, scenario.properties, roster.numbers, roster.failed)
+        pane_states.append(_build_states(record, setup))
+    needed_bytes = len(first) * len(records) * (STATE_BYTES + first.positions[0].nbytes * 2)
+    history = RunHistory(dt, MAX_HISTORY_BYTES + min(needed_bytes, MAX_RECORD_BYTES))
+    steps_between_states = round(first.dt / dt)
+    for index in range(len(first)):
+        states = {pane: states[index] for pane, states in enumerate(pane_states)}
+        history.append(RunState(index * steps_between_states, states, scenario))
+    return history
+
+
+def _list_drag_events(record: Record, dt: float) -> list[AutomaticEvent]:
+    """Return the events of robots that were dragged while a record was made."""
+    events = []
+    for drag in record.session.get("touched", ()):
+        numbers = ", ".join(map(str, drag["robots"]))
+        events.append(AutomaticEvent(round(drag["to_s"] / dt), "hand", f"robot {numbers} was dragged"))
+    return events
+
+
+def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
+    """Build the states of a pane from a record."""
+    # The arrays of the states are views that nobody can change.
+    positions = np.broadcast_to(record.positions, record.positions.shape)
+    velocities = np.broadcast_to(record.velocities, record.velocities.shape)
+    forces = np.broadcast_to(record.forces, record.forces.shape)
+    goals = np.broadcast_to(record.goals, record.goals.shape)
+    memories = _recompute_memories(record, setup.controller)
+    setups = _build_setups(record, setup)
+    states = []
+    for index in range(len(record)):
+        rows: Any = slice(None)
+        if setups[index] is not setup:
+            rows = np.flatnonzero(record.working[index])
+        has_goals = not np.isnan(record.goals[index]).all()
+        decision = Decision(forces[index][rows], goals[index][rows] if has_goals else None)
+        steering = None if record.steering is None else record.steering[index][rows]
+        states.append(
+            PaneState(
+                setups[index],
+                positions[index][rows],
+                velocities[index][rows],
+                memories[index],
+                decision,
+                steering=steering,
+            )
+        )
     return states
 
 
-def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
-    """Yield the circumstances of each moment: who worked, and who had failed; messages no record tells."""
+def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
+    """Return the setup of each state, in which robots may have failed or joined."""
     if record.conditions is None:
-        yield from [cast] * len(record)
-        return
-    known: dict[bytes, PaneSetup] = {}
-    rest = record.conditions.drop_team_changes()
-    for places, working, there in zip(record.positions, record.working, record.present, strict=True):
-        key = working.tobytes() + there.tobytes()
-        if key not in known:
-            wrecks = np.flatnonzero(there & ~working)
-            failed = {cast.numbers[row]: tuple(places[row].tolist()) for row in wrecks}
-            numbers = tuple(cast.numbers[row] for row in np.flatnonzero(working))
-            known[key] = replace(cast, numbers=numbers, failed={**cast.failed, **failed}, conditions=rest)
-        yield known[key]
+        return [setup] * len(record)
+    setup_by_robots: dict[bytes, PaneSetup] = {}
+    conditions = record.conditions.drop_team_changes()
+    setups = []
+    for positions, working, present in zip(record.positions, record.working, record.present, strict=True):
+        key = working.tobytes() + present.tobytes()
+        if key not in setup_by_robots:
+            failed = dict(setup.failed)
+            for row in np.flatnonzero(present & ~working):
+                failed[setup.numbers[row]] = tuple(positions[row].tolist())
+            numbers = tuple(setup.numbers[row] for row in np.flatnonzero(working))
+            setup_by_robots[key] = replace(setup, numbers=numbers, failed=failed, conditions=conditions)
+        setups.append(setup_by_robots[key])
+    return setups
 
 
-def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
-    """Return what the controller, asked again, remembers at each moment; None once it decides otherwise."""
-    found: list[Any] = []
-    with suppress(BaseException):  # a user's controller may do anything; a lost one is not there
-        controller = law.made()
+def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
+    """Return the memory of the controller at each state, by asking it again.
+
+    It is None where the controller is missing or without memory, and after it has decided otherwise than in
+    the record.
+    """
+    memories: list[Any] = []
+    # A user's controller may raise anything, and a missing one cannot be built.
+    with suppress(BaseException):
+        controller = choice.build()
         if not has_memory(controller):
             return [None] * len(record)
         controller = inform_controller(controller, record.environment.static)
         memory = controller.begin(record.environment.region, record.team)
-        for k in range(len(record)):
-            found.append(deepcopy(memory))
-            decision = controller.decide(record.snapshot(k).seen, memory)
-            if not np.allclose(decision.forces, record.forces[k], rtol=1e-9, atol=1e-9):
+        for index in range(len(record)):
+            memories.append(deepcopy(memory))
+            decision = controller.decide(record.snapshot(index).seen, memory)
+            is_same = np.allclose(
+                decision.forces, record.forces[index], rtol=_FORCE_TOLERANCE, atol=_FORCE_TOLERANCE
+            )
+            if not is_same:
                 break
             memory = decision.memory
-    return found + [None] * (len(record) - len(found))
+    return memories + [None] * (len(record) - len(memories))
 
 
-def _put(pane: Pane, saved: SavedRun, history: History) -> None:
-    record, last = saved.record, history.last
-    state = last.states[pane.number]
-    standing = replace(state.setup, law=_standing(state.setup.law))
-    pane.simulation = resumed(state._replace(setup=standing), history.dt, last.step)
-    pane.setup, pane.starts = state.setup, record.positions[0][record.working[-1]]
-    for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
-        numbers = history[k].states[pane.number].setup.numbers
-        pane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])
-    if saved.history is not None:
-        told = {"distance": saved.history.mean_distance, "time": saved.history.mean_time}
-        for what, values in told.items():
-            for time, value in zip(saved.history.time, () if values is None else values, strict=False):
-                pane.curves[what].add(float(time), float(value))
+def _resume_end(last: RunState) -> Lockstep:
+    """Resume the end of a record; missing controllers have placeholders until a decision is needed."""
+    states = {}
+    for number, state in last.states.items():
+        setup = replace(state.setup, controller=use_placeholder(state.setup.controller))
+        states[number] = state._replace(setup=setup)
+    run = Lockstep.resume(last._replace(states=states))
+    for pane in run.panes:
+        pane.setup = last.states[pane.number].setup
+    return run
+
+
+def _restore_pane(pane: Pane, saved: SavedRun, history: RunHistory) -> None:
+    """Restore the starts, sensed points and cost curves of a pane from a saved run."""
+    record = saved.record
+    pane.starts = record.positions[0][record.working[-1]]
+    stride = max(1, round(STEPS_BETWEEN_SENSED_POINTS * history.dt / record.dt))
+    for index in range(0, len(record), stride):
+        numbers = history[index].states[pane.number].setup.numbers
+        points = record.obstacle_points[index][record.working[index]]
+        pane.sensed.add(index * record.dt, numbers, points)
+    if saved.history is None:
+        return
+    values_by_quantity = {"distance": saved.history.mean_distance, "time": saved.history.mean_time}
+    for quantity, values in values_by_quantity.items():
+        if values is None:
+            continue
+        for time, value in zip(saved.history.time, values, strict=False):
+            pane.curves[quantity].add(float(time), float(value))

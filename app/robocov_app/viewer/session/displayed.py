@@ -1,0 +1,141 @@
+"""The displayed state of a session: the present, or a recorded state of the past."""
+
+from contextlib import suppress
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov.errors import RobocovError
+from robocov.metrics import SETTLED_WINDOW_S
+from robocov.observation import Snapshot
+from robocov_app.viewer.session.decision_replay import rebuild_snapshot
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.states import PaneSetup, PaneState
+from robocov_app.viewer.session.timeline import Timeline
+from robocov_app.viewer.session.trails import Trail, rebuild_trail
+
+MAX_RECENT_POSITIONS = 30
+"""Approximate maximum number of recent positions of a robot."""
+
+
+class DisplayedState:
+    """The state that a timeline displays.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The timeline.
+    """
+
+    def __init__(self, timeline: Timeline) -> None:
+        self._timeline = timeline
+        self._rebuilt_trails: dict[int, tuple[object, Trail]] = {}
+
+    @property
+    def time(self) -> float:
+        """Displayed time, s."""
+        return self._timeline.history.get_time(self._timeline.displayed_index)
+
+    @property
+    def environment(self) -> Environment:
+        """The map, without failed robots."""
+        return self.get_setup(self._timeline.panes[0]).environment
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Numbers of the working robots."""
+        return self.get_setup(self._timeline.panes[0]).numbers
+
+    def get_setup(self, pane: Pane) -> PaneSetup:
+        """Return the setup of a pane."""
+        return self._get_state(pane).setup
+
+    def get_positions(self, pane: Pane) -> Array:
+        """Return the positions of the robots of a pane, (n, 2) m."""
+        if self._timeline.is_live:
+            return pane.simulation.positions
+        return self._get_state(pane).positions
+
+    def get_snapshot(self, pane: Pane) -> Snapshot:
+        """Return observations and decision of a pane. Where the controller raises, there is no decision."""
+        if self._timeline.is_live:
+            with suppress(RobocovError):
+                return pane.simulation.observe_and_decide()
+        return rebuild_snapshot(self._get_state(pane), self.time, self._timeline.scenario.dt)
+
+    def get_trail(self, pane: Pane) -> tuple[Array, Array]:
+        """Return the trajectories of a pane up to the displayed time.
+
+        Parameters
+        ----------
+        pane : Pane
+            The pane.
+
+        Returns
+        -------
+        positions : (k, n, 2) array, m
+        times : (k,) array, s
+        """
+        if self.get_setup(pane).numbers == pane.numbers:
+            return pane.trail.get_until(self.time)
+        timeline = self._timeline
+        key = (timeline.shown_index, timeline.past_version)
+        rebuilt_key, trail = self._rebuilt_trails.get(pane.number, (None, pane.trail))
+        if rebuilt_key != key:
+            trail, _ = rebuild_trail(timeline.history, pane.number, timeline.displayed_index)
+            self._rebuilt_trails[pane.number] = (key, trail)
+        return trail.positions, trail.times
+
+    def get_recent_positions(self, pane: Pane, number: int) -> Array:
+        """Return positions of a robot during the seconds before the displayed time.
+
+        Parameters
+        ----------
+        pane : Pane
+            The pane.
+        number : int
+            Number of the robot.
+
+        Returns
+        -------
+        (k, 2) array, m
+            Positions, the oldest first; none where the robot does not work.
+        """
+        history = self._timeline.history
+        last = self._timeline.displayed_index
+        first = history.find_index(self.time - SETTLED_WINDOW_S)
+        stride = max(1, (last - first) // MAX_RECENT_POSITIONS)
+        positions = []
+        for index in range(first, last + 1, stride):
+            state = history[index].states.get(pane.number)
+            if state is not None and number in state.setup.numbers:
+                positions.append(state.positions[state.setup.numbers.index(number)])
+        return np.array(positions).reshape(-1, 2)
+
+    def get_costs(self, quantity: str = "distance") -> tuple[float, dict[int, float]]:
+        """Return the coverage costs of all panes at the newest time for which all are known.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"distance"`` or ``"time"``.
+
+        Returns
+        -------
+        time : float, s
+            At most the displayed time.
+        costs : dict of int to float
+            Cost by pane, without panes whose cost is unknown.
+        """
+        panes = [pane for pane in self._timeline.panes if len(pane.curves[quantity])]
+        time = min([self.time, *(pane.curves[quantity].last_time for pane in panes)])
+        costs = {}
+        for pane in panes:
+            cost = pane.curves[quantity].interpolate(time)
+            if np.isfinite(cost):
+                costs[pane.number] = cost
+        return time, costs
+
+    def _get_state(self, pane: Pane) -> PaneState:
+        return self._timeline.history[self._timeline.displayed_index].states[pane.number]

@@ -1,0 +1,315 @@
+"""The document of a session: a tree of edits from which every state can be recomputed.
+
+The simulation is deterministic, so that a scenario and the edits with their steps determine the run. Nothing
+is ever removed from the tree: undo returns to the parent of a node, and an edit in the past adds another
+child.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from operator import attrgetter
+from typing import NamedTuple, Self
+
+from robocov.errors import InputError, ParameterError
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.curves import Curve, SessionEvent
+from robocov_app.viewer.session.edits import Restart, SessionEdit
+from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
+from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.states import RunState
+
+MAX_CACHED_STATES = 160
+"""Maximum number of states of a node that are kept while another branch is displayed."""
+
+
+@dataclass(eq=False)
+class Node:
+    """An edit, or several that belong together, and the time that passes until the next one.
+
+    Attributes
+    ----------
+    number : int
+        Index in the document.
+    parent : Node or None
+        The node in whose time the edit was made.
+    branch_step : int
+        Step of the parent's time at which the edit was made.
+    kind : str
+        Kind of the edit, as in `SessionEvent`.
+    description : str
+        The edit in words.
+    edits : list of SessionEdit
+        The edits in the order in which they were made.
+    last_step : int
+        Step up to which the run was simulated.
+    name : str
+        Name of the branch that ends here; empty if it has none.
+    redo : Node or None
+        The child that was left by undo.
+    cached_states : list of RunState
+        States in the time of the node; they are not in files, because they can be recomputed.
+    curves : dict
+        Cost curves by pane and quantity.
+    controllers : dict
+        Controllers by pane.
+    automatic_events : set of AutomaticEvent
+        Robots that failed or joined by themselves.
+    """
+
+    number: int
+    parent: "Node | None"
+    branch_step: int
+    kind: str
+    description: str
+    edits: list[SessionEdit]
+    last_step: int
+    name: str = ""
+    redo: "Node | None" = field(default=None, repr=False)
+    cached_states: list[RunState] = field(default_factory=list, repr=False)
+    curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
+    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)
+    automatic_events: set[AutomaticEvent] = field(default_factory=set, repr=False)
+
+    @property
+    def scenario(self) -> SessionScenario | None:
+        """The scenario that starts here; None if the run of the parent continues."""
+        edit = self.edits[0]
+        return edit.scenario if isinstance(edit, Restart) else None
+
+    def require_scenario(self) -> SessionScenario:
+        """Return the scenario that starts here, at the root of a run."""
+        assert self.scenario is not None
+        return self.scenario
+
+    @property
+    def first_step(self) -> int:
+        """The first step in the time of the node."""
+        return self.branch_step if self.scenario is None else 0
+
+    def apply_edits(self, run: Lockstep) -> None:
+        """Apply the edits that were made at the present step of a run.
+
+        Raises
+        ------
+        InputError
+            If an edit is not possible; it names the node.
+        """
+        for edit in self.edits:
+            if edit.step == run.step and not isinstance(edit, Restart):
+                try:
+                    run.apply(edit)
+                except InputError as error:
+                    place = f"touches[{self.number}], “{self.description}”"
+                    raise InputError(f"{place}: {error}") from None
+
+
+class Branch(NamedTuple):
+    """A path through the tree that ends with a node after which nothing was edited.
+
+    Attributes
+    ----------
+    node : Node
+        The node at its end.
+    last_step : int
+        Its last step.
+    description : str
+        Its name, or the last edit in words.
+    """
+
+    node: Node
+    last_step: int
+    description: str
+
+    def describe_end(self, dt: float) -> str:
+        """Describe the time and the mean distances at the end of the branch.
+
+        Parameters
+        ----------
+        dt : float, s
+            Control period.
+
+        Returns
+        -------
+        str
+        """
+        time = self.last_step * dt
+        parts = [f"{time:.1f} s"]
+        for (pane, quantity), curve in sorted(self.node.curves.items()):
+            if quantity != "distance" or not len(curve):
+                continue
+            # The controllers of a file are only known after its edits have been repeated.
+            controller = self.node.controllers.get(pane)
+            label = controller.label if controller else ""
+            parts.append(f"{label} {curve.interpolate(time):.3f} m".lstrip())
+        return " · ".join(parts)
+
+
+class SessionDocument:
+    """The nodes of a session in the order in which they were added. The first one starts a run.
+
+    Parameters
+    ----------
+    nodes : list of Node
+        The nodes.
+
+    Attributes
+    ----------
+    revision : int
+        Number of edits that were made since the document was opened.
+    """
+
+    def __init__(self, nodes: list[Node]) -> None:
+        self.nodes = nodes
+        self.revision = 0
+
+    @classmethod
+    def start(cls, scenario: SessionScenario) -> Self:
+        """Build the document of a new session."""
+        document = cls([])
+        document.nodes.append(document.build_node(None, 0, "begin", "begun", Restart(scenario)))
+        return document
+
+    def build_node(
+        self, parent: Node | None, branch_step: int, kind: str, description: str, edit: SessionEdit
+    ) -> Node:
+        """Build the next node. It is not added to the document.
+
+        Parameters
+        ----------
+        parent : Node or None
+            The node in whose time the edit is made.
+        branch_step : int
+            Step at which the edit is made.
+        kind : str
+            Kind of the edit, as in `SessionEvent`.
+        description : str
+            The edit in words.
+        edit : SessionEdit
+            The edit.
+
+        Returns
+        -------
+        Node
+        """
+        first_step = 0 if isinstance(edit, Restart) else branch_step
+        edits = [replace(edit, step=first_step)]
+        return Node(len(self.nodes), parent, branch_step, kind, description, edits, first_step)
+
+    def get_path(self, node: Node) -> list[Node]:
+        """Return the nodes from the root of a run, at time 0, to a node."""
+        path = [node]
+        while path[-1].parent is not None and path[-1].scenario is None:
+            path.append(path[-1].parent)
+        return path[::-1]
+
+    def get_last_steps(self, node: Node, step: int) -> dict[int, int]:
+        """Return the last step of each node on the path to a step of a node, by number."""
+        last_steps = {before.number: after.branch_step for before, after in pairwise(self.get_path(node))}
+        last_steps[node.number] = step
+        return last_steps
+
+    def list_branches(self) -> list[Branch]:
+        """Return all branches, in the order of the nodes at their ends."""
+        branches = []
+        for node in self.nodes:
+            children = [child for child in self.nodes if child.parent is node]
+            if all(child.branch_step < node.last_step for child in children):
+                branches.append(Branch(node, node.last_step, node.name or node.description))
+        return branches
+
+    def find_branch(self, name: str) -> Branch:
+        """Return the branch with a name, or with a number from 1 on.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such branch.
+        """
+        branches = self.list_branches()
+        for number, branch in enumerate(branches, 1):
+            if name in (branch.node.name, str(number)):
+                return branch
+        known = ", ".join(f"{number} ({branch.description})" for number, branch in enumerate(branches, 1))
+        raise ParameterError(f"branch: expected one of {known}, got {name!r}")
+
+    def list_events(self, node: Node, step: int, dt: float) -> list[SessionEvent]:
+        """Return what happened on the path to a step of a node, in the order of time.
+
+        Parameters
+        ----------
+        node : Node
+            The node.
+        step : int
+            The step.
+        dt : float, s
+            Control period.
+
+        Returns
+        -------
+        list of SessionEvent
+        """
+        last_steps = self.get_last_steps(node, step)
+        events = []
+        for ancestor in self.get_path(node):
+            happened = sorted(ancestor.automatic_events)
+            if ancestor.scenario is None:
+                edit_event = AutomaticEvent(ancestor.branch_step, ancestor.kind, ancestor.description)
+                happened.insert(0, edit_event)
+            last_step = last_steps[ancestor.number]
+            events += [
+                SessionEvent(event.step * dt, event.kind, event.text)
+                for event in happened
+                if event.step <= last_step
+            ]
+        return sorted(events, key=attrgetter("time"))
+
+
+def replay(
+    document: SessionDocument,
+    node: Node,
+    step: int,
+    run: Lockstep | None = None,
+    since: Node | None = None,
+) -> Iterator[tuple[Lockstep, Node]]:
+    """Simulate the path to a step of a node again.
+
+    Parameters
+    ----------
+    document : SessionDocument
+        The document.
+    node : Node
+        The node.
+    step : int
+        The step.
+    run : Lockstep or None
+        The run at a step of the node `since`; by default it starts at time 0.
+    since : Node or None
+        The node in whose time the run is.
+
+    Yields
+    ------
+    run : Lockstep
+        The run at each step, before it advances.
+    node : Node
+        The node in whose time it is.
+
+    Raises
+    ------
+    InputError
+        If an edit is not possible. Controllers may raise any exception.
+    """
+    path = document.get_path(node)
+    last_steps = document.get_last_steps(node, step)
+    if run is None:
+        run = Lockstep(path[0].require_scenario())
+    first = 0 if since is None else path.index(since)
+    for index, current in enumerate(path[first:]):
+        if index > 0:
+            current.apply_edits(run)
+        while run.step < last_steps[current.number]:
+            yield run, current
+            current.automatic_events.update(run.advance())
+            current.apply_edits(run)
+    yield run, node

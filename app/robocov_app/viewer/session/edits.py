@@ -1,0 +1,418 @@
+"""Edits of a session, as session files contain them, and the effect of each on a pane or the map."""
+
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
+from typing import Annotated, Any, Literal, TypeAlias, cast
+
+import numpy as np
+from pydantic import ConfigDict, Field, WrapValidator
+
+from robocov.density import Density
+from robocov.environment import Environment, Obstacle, Point
+from robocov.errors import MapError, ParameterError, RobocovError
+from robocov.mapfile import parse_density, to_json
+from robocov.mapfile.models import DensityModel, ObstacleModel, to_json_value
+from robocov.world.free_positions import find_free_position
+from robocov_app.viewer.session.controller_choice import FileController
+from robocov_app.viewer.session.file_fields import Position, RobotNumber, Step, build_refusal, convert_field
+from robocov_app.viewer.session.map_edits import paint_density, replace_obstacles
+from robocov_app.viewer.session.pane import Continuation, Pane
+from robocov_app.viewer.session.robot_properties import FileProperties
+from robocov_app.viewer.session.scenario import MAX_ROBOTS, SessionScenario
+
+MAX_PANE_NUMBER = 100
+MAX_BRUSH_RADIUS_M = 1e6
+UNDATED_STEP = -1
+"""Step of an edit that has not been made yet."""
+
+_PaneNumber: TypeAlias = Annotated[
+    int, Field(strict=True, ge=0, le=MAX_PANE_NUMBER, description="Number of a pane")
+]
+_Count: TypeAlias = Annotated[int, Field(strict=True, ge=0)]
+_OBSTACLES = convert_field(
+    list[ObstacleModel],
+    load=lambda models, _: tuple(model.build() for model in models),
+    dump=lambda obstacles, _: [to_json_value(obstacle) for obstacle in obstacles],
+)
+
+
+def _load_density(model: Any, context: Any) -> Density | None:
+    if model is None:
+        return None
+    boundary = context.get_environment(0).boundary
+    return parse_density(model.model_dump(exclude_none=True, warnings=False), boundary, context.where)
+
+
+def _dump_density(density: Density | None, _: object) -> object:
+    """Write a density as in a map file, where it only occurs together with a map."""
+    square = Environment("square", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), (), {})
+    return to_json(square.with_density(density)).get("density")
+
+
+_DENSITY = convert_field(DensityModel | None, load=_load_density, dump=_dump_density)
+
+
+def _load_scenario(content: object, read: Any) -> SessionScenario:
+    """Read a scenario; errors of its values become validation errors, which have a position in the file."""
+    try:
+        return cast(SessionScenario, read(content))
+    except MapError:
+        raise
+    except RobocovError as error:
+        raise build_refusal(error) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Edit:
+    """One edit of a session.
+
+    Attributes
+    ----------
+    step : int
+        Step before which the edit is made.
+    do : str
+        Name of the kind of edit in files.
+    """
+
+    __pydantic_config__ = ConfigDict(extra="forbid", validate_default=True)
+
+    step: Step = UNDATED_STEP
+    do: str
+
+
+@dataclass(frozen=True)
+class RobotEdit(_Edit):
+    """Edit of one robot.
+
+    Attributes
+    ----------
+    robot : int
+        Number of the robot.
+    """
+
+    robot: RobotNumber
+
+
+@dataclass(frozen=True)
+class DragRobot(RobotEdit):
+    """Pull a robot towards a point by a spring.
+
+    Attributes
+    ----------
+    to : tuple
+        The point, (x, y) m.
+    """
+
+    to: Position
+    do: Literal["drag"] = field(default="drag", kw_only=True)
+
+
+@dataclass(frozen=True)
+class ReleaseRobot(_Edit):
+    """Stop pulling a robot, which keeps its velocity."""
+
+    do: Literal["release"] = field(default="release", kw_only=True)
+
+
+@dataclass(frozen=True)
+class PlaceRobot(RobotEdit):
+    """Put a robot, working or failed, at a point.
+
+    Attributes
+    ----------
+    at : tuple
+        The point, (x, y) m.
+    """
+
+    at: Position
+    do: Literal["place"] = field(default="place", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        row = _find_row(pane, self.robot)
+        position = _find_free_position(pane, self.robot, self.at)
+        if row is None:
+            return _change_robot(pane, self.robot, failed_at=position)
+        return _change_robot(pane, self.robot, working_at=position)
+
+
+@dataclass(frozen=True)
+class AddRobot(RobotEdit):
+    """Add a robot, at rest at a point.
+
+    Attributes
+    ----------
+    at : tuple
+        The point, (x, y) m.
+    """
+
+    at: Position
+    do: Literal["join"] = field(default="join", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        numbers = pane.setup.all_numbers
+        if len(numbers) >= MAX_ROBOTS:
+            raise ParameterError(f"there are {MAX_ROBOTS} robots already")
+        if self.robot in numbers:
+            raise ParameterError(f"there is a robot {self.robot} already")
+        return _change_robot(pane, self.robot, working_at=_find_free_position(pane, self.robot, self.at))
+
+
+@dataclass(frozen=True)
+class RemoveRobot(RobotEdit):
+    """Remove a robot, working or failed."""
+
+    do: Literal["leave"] = field(default="leave", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        _find_row(pane, self.robot)
+        _require_another_robot(pane, self.robot)
+        return _change_robot(pane, self.robot)
+
+
+@dataclass(frozen=True)
+class FailRobot(RobotEdit):
+    """Let a robot fail: it stops, sends no messages, and is an obstacle to the others."""
+
+    do: Literal["fail"] = field(default="fail", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        row = _find_row(pane, self.robot)
+        if row is None:
+            raise ParameterError(f"robot {self.robot} has failed already")
+        _require_another_robot(pane, self.robot)
+        x, y = pane.simulation.positions[row].tolist()
+        return _change_robot(pane, self.robot, failed_at=(x, y))
+
+
+@dataclass(frozen=True)
+class ReviveRobot(RobotEdit):
+    """Let a failed robot work again, at its position or the nearest free one."""
+
+    do: Literal["revive"] = field(default="revive", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        if _find_row(pane, self.robot) is not None:
+            raise ParameterError(f"robot {self.robot} works")
+        failed_at = pane.setup.failed[self.robot]
+        return _change_robot(pane, self.robot, working_at=_find_free_position(pane, self.robot, failed_at))
+
+
+@dataclass(frozen=True)
+class EditObstacles(_Edit):
+    """Replace consecutive obstacles of the map by others.
+
+    Attributes
+    ----------
+    first : int
+        Index of the first obstacle that is replaced.
+    removed : int
+        Number of obstacles that are replaced.
+    added : tuple of Obstacle
+        The obstacles that replace them.
+    """
+
+    first: _Count
+    removed: _Count
+    added: Annotated[tuple[Obstacle, ...], _OBSTACLES]
+    do: Literal["obstacles"] = field(default="obstacles", kw_only=True)
+
+    def build_environment(self, environment: Environment) -> Environment:
+        """Return the edited map."""
+        return replace_obstacles(environment, self.first, self.removed, self.added)
+
+
+@dataclass(frozen=True)
+class PaintDensity(_Edit):
+    """Raise or lower the density of the map with a brush.
+
+    Attributes
+    ----------
+    dabs : tuple of tuple
+        Points at which the brush was applied, (x, y) m each.
+    radius : float, m
+        Radius of the brush.
+    lowers : bool
+        Whether the density is lowered.
+    """
+
+    dabs: tuple[Position, ...]
+    radius: Annotated[float, Field(strict=True, gt=0, le=MAX_BRUSH_RADIUS_M)]
+    lowers: Annotated[bool, Field(strict=True)]
+    do: Literal["paint"] = field(default="paint", kw_only=True)
+
+    def build_environment(self, environment: Environment) -> Environment:
+        """Return the edited map."""
+        density = paint_density(environment, self.dabs, self.radius, lowers=self.lowers)
+        return environment.with_density(density)
+
+
+@dataclass(frozen=True, eq=False)
+class SetDensity(_Edit):
+    """Replace the density of the map.
+
+    Attributes
+    ----------
+    density : Density or None
+        The density; None for a uniform one.
+    """
+
+    density: Annotated[Density | None, _DENSITY]
+    do: Literal["density"] = field(default="density", kw_only=True)
+
+    def build_environment(self, environment: Environment) -> Environment:
+        """Return the edited map."""
+        return environment.with_density(self.density)
+
+
+@dataclass(frozen=True)
+class SetController(_Edit):
+    """Replace the controller of a pane, or its gains.
+
+    Attributes
+    ----------
+    pane : int
+        Number of the pane.
+    controller : ControllerChoice
+        The controller.
+    """
+
+    pane: _PaneNumber
+    controller: FileController
+    do: Literal["controller"] = field(default="controller", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        if pane.number != self.pane:
+            return Continuation(pane.setup)
+        return Continuation(replace(pane.setup, controller=self.controller))
+
+
+@dataclass(frozen=True)
+class SetRobotProperties(_Edit):
+    """Replace the properties of all robots.
+
+    Attributes
+    ----------
+    properties : RobotProperties
+        The properties.
+    """
+
+    properties: Annotated[FileProperties, Field(alias="team")]
+    do: Literal["team"] = field(default="team", kw_only=True)
+
+    def build_continuation(self, pane: Pane) -> Continuation:
+        """Return the state from which a pane continues."""
+        return Continuation(replace(pane.setup, properties=self.properties))
+
+
+@dataclass(frozen=True)
+class RemovePane(_Edit):
+    """Remove a pane.
+
+    Attributes
+    ----------
+    pane : int
+        Number of the pane.
+    """
+
+    pane: _PaneNumber
+    do: Literal["remove-pane"] = field(default="remove-pane", kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Restart(_Edit):
+    """Start again at time 0; this is also the first edit of every session.
+
+    Attributes
+    ----------
+    scenario : SessionScenario
+        What the session starts from.
+    """
+
+    scenario: Annotated[SessionScenario, WrapValidator(_load_scenario)]
+    do: Literal["restart"] = field(default="restart", kw_only=True)
+
+
+MapEdit: TypeAlias = EditObstacles | PaintDensity | SetDensity
+PaneEdit: TypeAlias = (
+    PlaceRobot | AddRobot | RemoveRobot | FailRobot | ReviveRobot | SetController | SetRobotProperties
+)
+RunEdit: TypeAlias = PaneEdit | MapEdit | DragRobot | ReleaseRobot | RemovePane
+"""Edit of a run that continues from the same step."""
+SessionEdit: TypeAlias = RunEdit | Restart
+
+
+def compare_obstacles(before: Environment, after: Environment) -> EditObstacles:
+    """Return the edit that replaces the obstacles of one map by those of another."""
+    old = before.obstacles
+    new = after.obstacles
+    first = _count_equal(old, new)
+    last = _count_equal(old[first:][::-1], new[first:][::-1])
+    return EditObstacles(first, len(old) - first - last, new[first : len(new) - last])
+
+
+def _count_equal(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
+    """Return the number of obstacles at the beginning that are the same."""
+    equal_pairs = takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False))
+    return sum(1 for _ in equal_pairs)
+
+
+def _find_row(pane: Pane, number: int) -> int | None:
+    """Return the row of a robot; None if it has failed."""
+    if number not in pane.setup.all_numbers:
+        raise ParameterError(f"there is no robot {number}")
+    return pane.get_row(number)
+
+
+def _require_another_robot(pane: Pane, number: int) -> None:
+    """Raise a ParameterError if a robot is the last one that works."""
+    if not set(pane.numbers) - {number}:
+        raise ParameterError("the last robot that works stays")
+
+
+def _find_free_position(pane: Pane, number: int, point: Point) -> Point:
+    """Return the position nearest to a point at which a robot overlaps neither obstacles nor robots."""
+    setup = pane.setup
+    simulation = pane.simulation
+    other_rows = [row for row, other in enumerate(pane.numbers) if other != number]
+    other_failed = {other: position for other, position in setup.failed.items() if other != number}
+    return find_free_position(
+        replace(setup, failed=other_failed).sensed_environment,
+        setup.properties.get_radius(number),
+        simulation.positions[other_rows],
+        point,
+        simulation.team.radius[other_rows],
+    )
+
+
+def _change_robot(
+    pane: Pane, number: int, working_at: Point | None = None, failed_at: Point | None = None
+) -> Continuation:
+    """Return the state of a pane with a robot at rest at a position, or failed at one, or without it."""
+    setup = pane.setup
+    positions = dict(zip(pane.numbers, pane.simulation.positions, strict=True))
+    velocities = dict(zip(pane.numbers, pane.simulation.velocities, strict=True))
+    positions.pop(number, None)
+    velocities.pop(number, None)
+    if working_at is not None:
+        positions[number] = np.array(working_at)
+        velocities[number] = np.zeros(2)
+    failed = dict(setup.failed)
+    failed.pop(number, None)
+    if failed_at is not None:
+        failed[number] = failed_at
+    numbers = tuple(sorted(positions))
+    if numbers != setup.numbers or failed != setup.failed:
+        setup = replace(setup, numbers=numbers, failed=failed)
+    if numbers == pane.numbers and working_at is None:
+        return Continuation(setup)
+    return Continuation(
+        setup,
+        np.array([positions[robot] for robot in numbers]),
+        np.array([velocities[robot] for robot in numbers]),
+    )

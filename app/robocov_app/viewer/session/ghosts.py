@@ -1,0 +1,71 @@
+"""Cost curves of the branches that are not displayed."""
+
+import numpy as np
+
+from robocov_app.viewer.session.curves import Curve, GhostCurve
+from robocov_app.viewer.session.document import Branch, Node, SessionDocument
+
+MAX_GHOST_BRANCHES = 8
+"""Maximum number of branches whose curves are displayed."""
+QUANTITIES = ("distance", "time")
+
+
+def build_ghost_curves(
+    document: SessionDocument, head: Node, step: int, dt: float, panes: int
+) -> list[GhostCurve]:
+    """Build the curves of the newest other branches of the same run.
+
+    Parameters
+    ----------
+    document : SessionDocument
+        The document.
+    head : Node
+        The node in whose time the present is.
+    step : int
+        The present step.
+    dt : float, s
+        Control period.
+    panes : int
+        Number of panes that are displayed.
+
+    Returns
+    -------
+    list of GhostCurve
+        The parts of the curves that are not on the path to the present.
+    """
+    last_steps = document.get_last_steps(head, step)
+    root = document.get_path(head)[0]
+    ghosts = []
+    for branch in document.list_branches():
+        if document.get_path(branch.node)[0] is root:
+            ghosts += _build_branch_curves(document, branch, last_steps, dt)
+    return ghosts[-len(QUANTITIES) * MAX_GHOST_BRANCHES * panes :]
+
+
+def _build_branch_curves(
+    document: SessionDocument, branch: Branch, last_steps: dict[int, int], dt: float
+) -> list[GhostCurve]:
+    """Build the curves of a branch, without the parts up to the given last steps of common nodes."""
+    branch_last_steps = document.get_last_steps(branch.node, branch.last_step)
+    path = document.get_path(branch.node)
+    ghosts = []
+    for pane, controller in branch.node.controllers.items():
+        for quantity in QUANTITIES:
+            curve = Curve()
+            for node in path:
+                start = last_steps.get(node.number, -np.inf)
+                end = branch_last_steps[node.number]
+                if end > start:
+                    curve.extend(node.curves[pane, quantity].extract(start * dt, end * dt))
+            if len(curve) > 1:
+                ghosts.append(
+                    GhostCurve(
+                        controller.name,
+                        controller.description,
+                        curve.times,
+                        curve.values,
+                        quantity,
+                        branch.node.number,
+                    )
+                )
+    return ghosts

@@ -1,0 +1,98 @@
+"""Controllers of records that do not exist any more, or are not loaded."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from robocov.controllers import CONTROLLERS
+from robocov.controllers.base import Controller
+from robocov.controllers.gains import Gain, Option
+from robocov.errors import ParameterError, RobocovError
+from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
+from robocov.record import Record
+from robocov.team import Team
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+
+
+@dataclass(frozen=True)
+class MissingController(ControllerChoice):
+    """A controller that is not loaded, or does not accept its gains; its records can be displayed.
+
+    Attributes
+    ----------
+    title : str
+        Label of the controller in the record.
+    reason : str
+        Why it cannot be built.
+    is_placeholder : bool
+        Whether it takes the place of the controller at the end of a record, until a decision is needed.
+    """
+
+    title: str = ""
+    reason: str = ""
+    is_placeholder: bool = False
+    summary = "stands for a controller that is not there any more"
+
+    @property
+    def label(self) -> str:
+        """Name of the controller in the window."""
+        return self.title
+
+    @property
+    def available_gains(self) -> Mapping[str, Gain | Option]:
+        """The gains cannot be known."""
+        return {}
+
+    def build(self) -> Controller:
+        """Return the placeholder itself, or raise a ParameterError with the reason."""
+        if self.is_placeholder:
+            return self
+        raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Return no memory."""
+
+    def decide(self, seen: Observations, memory: None) -> Decision:
+        """Raise a ParameterError with the reason."""
+        replace(self, is_placeholder=False).build()
+        raise AssertionError
+
+
+def find_controller(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
+    """Find the controller of a record.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    controllers : sequence of str
+        Controllers in files of the user's own, as the user has named them. No other file is run.
+
+    Returns
+    -------
+    ControllerChoice
+        A `MissingController` if it cannot be built.
+    """
+    name = record.controller
+    gains = dict(record.gains)
+    class_name = name.rpartition(":")[2]
+    same_class = [known for known in controllers if known.rpartition(":")[2] == class_name]
+    if name not in (*CONTROLLERS, *same_class):
+        if not same_class:
+            suggestion = f"FILE.py:{class_name}" if class_name != name else class_name
+            reason = f"is none of robocov's controllers; to go on, open it with --controller {suggestion}"
+            return MissingController(name, gains, record.label, f"{record.label} {reason}")
+        name = same_class[0]
+    choice = ControllerChoice(name, gains)
+    try:
+        choice.build()
+        return choice.drop_defaults()
+    except RobocovError as error:
+        return MissingController(record.controller, gains, record.label, str(error))
+
+
+def use_placeholder(choice: ControllerChoice) -> ControllerChoice:
+    """Return a choice that can be built, which is a placeholder for a missing controller."""
+    if isinstance(choice, MissingController):
+        return replace(choice, is_placeholder=True)
+    return choice

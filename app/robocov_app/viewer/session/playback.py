@@ -1,0 +1,97 @@
+"""Playback of a session: how time passes while it is displayed."""
+
+import numpy as np
+
+from robocov.errors import RobocovError
+from robocov_app.viewer.session.clock import Clock
+from robocov_app.viewer.session.timeline import Timeline
+
+SEEK_SLICE_S = 0.03
+"""Time of a frame for building another state of the session."""
+FIRST_SEEK_SLICES = 4
+"""Number of slices that are spent at once when another state is asked for."""
+
+
+class Playback:
+    """Plays a timeline: the recorded past first, then by simulating.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The timeline.
+
+    Attributes
+    ----------
+    clock : Clock
+        Speed, and the computing time for each frame.
+    is_playing : bool
+        Whether time passes.
+    stop_when_settled : bool
+        Whether to pause when the team has settled.
+    """
+
+    def __init__(self, timeline: Timeline) -> None:
+        self._timeline = timeline
+        self.clock = Clock(timeline.scenario.dt)
+        self.is_playing = True
+        self.stop_when_settled = False
+
+    @property
+    def seek_seconds(self) -> float:
+        """Time that `Timeline.seek` may take at once, s."""
+        if np.isinf(self.clock.budget):
+            return np.inf
+        return FIRST_SEEK_SLICES * SEEK_SLICE_S
+
+    def advance(self, seconds: float) -> int:
+        """Let time pass.
+
+        Parameters
+        ----------
+        seconds : float, s
+            Time since the previous call.
+
+        Returns
+        -------
+        int
+            Number of steps that were simulated or displayed.
+
+        Raises
+        ------
+        RobocovError
+            If a controller raises it; playback pauses.
+        """
+        if self._timeline.is_seeking:
+            self._timeline.continue_seek(SEEK_SLICE_S)
+            return 0
+        if not self.is_playing:
+            return 0
+        self.clock.dt = self._timeline.scenario.dt
+        return self.clock.advance(seconds, self._play_step)
+
+    def step(self) -> None:
+        """Pause, and display the next recorded state, or simulate one step."""
+        self.is_playing = False
+        timeline = self._timeline
+        if timeline.is_live:
+            timeline.advance()
+        else:
+            timeline.show(timeline.displayed_index + 1)
+
+    def _play_step(self) -> bool:
+        """Play one step, and return whether to continue."""
+        timeline = self._timeline
+        if not timeline.is_live:
+            timeline.show_next()
+            if timeline.is_live and timeline.is_at_record_end:
+                # Users decide whether to continue after the end of a record.
+                self.is_playing = False
+            return self.is_playing
+        try:
+            timeline.advance()
+        except RobocovError:
+            self.is_playing = False
+            raise
+        if self.stop_when_settled and timeline.is_settled:
+            self.is_playing = False
+        return self.is_playing

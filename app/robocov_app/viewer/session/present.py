@@ -1,0 +1,234 @@
+"""The present of a timeline, and how it is built for any step of a document."""
+
+from collections import defaultdict
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
+from robocov_app.render.scene import Sensed
+from robocov_app.viewer.session.decision_replay import get_sensor
+from robocov_app.viewer.session.document import MAX_CACHED_STATES, Node, SessionDocument, replay
+from robocov_app.viewer.session.history import RunHistory
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.states import RunState
+from robocov_app.viewer.session.trails import rebuild_trail
+
+MAX_SENSED_STATES = 300
+"""Maximum number of states from which the sensed points of another branch are recomputed."""
+
+
+@dataclass(eq=False)
+class Present:
+    """Everything that is replaced as a whole when a timeline moves to another state.
+
+    Attributes
+    ----------
+    head : Node
+        The node of the document in whose time the present is.
+    run : Lockstep
+        The panes at the present step.
+    history : RunHistory
+        The recorded states up to the present, which is the last one.
+    """
+
+    head: Node
+    run: Lockstep
+    history: RunHistory
+
+    @classmethod
+    def start(cls, root: Node) -> Self:
+        """Build the state at time 0 of a run.
+
+        Parameters
+        ----------
+        root : Node
+            The node with the scenario.
+
+        Returns
+        -------
+        Present
+
+        Raises
+        ------
+        StartError
+            If there is no space for the team.
+        ParameterError
+            If a controller or the team does not accept a value.
+        """
+        run = Lockstep(root.require_scenario())
+        history = RunHistory(run.scenario.dt)
+        history.append(run.build_state(root.number))
+        return cls(root, run, history)
+
+    def has_settled(self) -> bool:
+        """Return whether no robot has moved noticeably during the last seconds."""
+        run = self.run
+        if run.drag is not None or run.time < SETTLED_WINDOW_S:
+            return False
+        before = self.history[self.history.find_index(run.time - SETTLED_WINDOW_S)]
+        for pane in run.panes:
+            state = before.states[pane.number]
+            if state.setup is not pane.setup:
+                return False
+            displacements = pane.simulation.positions - state.positions
+            if np.hypot(*displacements.T).max() >= SETTLED_DISTANCE_M:
+                return False
+        return True
+
+
+def build_present(
+    document: SessionDocument,
+    old: Present,
+    node: Node,
+    step: int,
+    edit: Callable[[Lockstep], None] | None = None,
+) -> Generator[None, None, Present]:
+    """Build the state at a step of a node. The old present stays as it is.
+
+    Parameters
+    ----------
+    document : SessionDocument
+        The document.
+    old : Present
+        The present so far. Its recorded states are reused as far as they are on the path to the node.
+    node : Node
+        A node of the document, or a new one.
+    step : int
+        A step of the node.
+    edit : callable or None
+        Changes the run at that step.
+
+    Yields
+    ------
+    None
+        After each simulated step, so that a caller can pause.
+
+    Returns
+    -------
+    Present
+
+    Raises
+    ------
+    StartError, ParameterError, InputError
+        If the state cannot be built. Controllers may raise any exception.
+    """
+    path = document.get_path(node)
+    history = _copy_common_past(document, old, node, step)
+    if len(history):
+        run = Lockstep.resume(history.last)
+    else:
+        start = Present.start(path[0])
+        run = start.run
+        history = start.history
+    since = next(ancestor for ancestor in path if ancestor.number == history.last.node)
+    for _, current in replay(document, node, step, run, since):
+        if (run.step, current.number) != (history.last.step, history.last.node):
+            history.amend(run.build_state(current.number))
+        yield
+    cache_present(document, old)
+    new = Present(node, run, history)
+    _restore_panes(document, old, new)
+    if edit is not None:
+        edit(run)
+    return new
+
+
+def cache_present(document: SessionDocument, present: Present) -> None:
+    """Keep states, curves and controllers in the nodes on the path to the present, for the time after it.
+
+    Parameters
+    ----------
+    document : SessionDocument
+        The document.
+    present : Present
+        The present.
+    """
+    recorded = defaultdict[int, list[RunState]](list)
+    for state in present.history.states:
+        recorded[state.node].append(state)
+    path = document.get_path(present.head)
+    dt = present.run.scenario.dt
+    for node, following in zip(path, [*path[1:], None], strict=True):
+        states = list(recorded[node.number])
+        if following is None or not states:
+            states += [state for state in node.cached_states if state.step > present.run.step]
+        # The last state is always among the cached ones.
+        stride = max(-(-len(states) // MAX_CACHED_STATES), 1)
+        node.cached_states = states[::-stride][::-1]
+        end_time = np.inf if following is None else following.branch_step * dt
+        for pane in present.run.panes:
+            node.controllers[pane.number] = pane.controller
+            for quantity, curve in pane.curves.items():
+                merged = curve.extract(node.first_step * dt, end_time)
+                merged.extend(node.curves[pane.number, quantity])
+                node.curves[pane.number, quantity] = merged
+
+
+def restore_trails(run: Lockstep, history: RunHistory) -> None:
+    """Rebuild the trails and starts of all panes of a run from its recorded past."""
+    for pane in run.panes:
+        pane.trail, pane.starts = rebuild_trail(history, pane.number, len(history) - 1)
+
+
+def _copy_common_past(document: SessionDocument, old: Present, node: Node, step: int) -> RunHistory:
+    """Return the recorded states on the path to a step of a node; none if they are not known."""
+    path = document.get_path(node)
+    last_steps = document.get_last_steps(node, step)
+    path_numbers = {ancestor.number for ancestor in path}
+    old_numbers = {ancestor.number for ancestor in document.get_path(old.head)}
+    common_numbers = path_numbers & old_numbers
+    common_count = 0
+    for state in old.history.states:
+        if state.node in common_numbers and state.step <= last_steps[state.node]:
+            common_count += 1
+    if common_count:
+        # Two paths have their first nodes in common. Therefore the common states are the first ones, too.
+        history = old.history.copy_until(common_count - 1)
+    else:
+        history = RunHistory(path[0].require_scenario().dt)
+    for ancestor in path:
+        if ancestor.number in common_numbers:
+            continue
+        for state in ancestor.cached_states:
+            if state.step <= last_steps[ancestor.number]:
+                history.amend(state)
+    return history
+
+
+def _restore_panes(document: SessionDocument, old: Present, new: Present) -> None:
+    """Rebuild the trails, curves and sensed points of the panes of a new present."""
+    restore_trails(new.run, new.history)
+    path = document.get_path(new.head)
+    last_steps = document.get_last_steps(new.head, new.run.step)
+    old_last_step = document.get_last_steps(old.head, old.run.step).get(new.head.number, -1)
+    is_earlier = new.run.step <= old_last_step
+    old_panes = {pane.number: pane for pane in old.run.panes} if is_earlier else {}
+    dt = new.run.scenario.dt
+    for pane in new.run.panes:
+        for quantity, curve in pane.curves.items():
+            for node in path:
+                curve.extend(node.curves[pane.number, quantity], last_steps[node.number] * dt)
+        if pane.number in old_panes:
+            pane.sensed = old_panes[pane.number].sensed.copy()
+            pane.sensed.cut(new.run.time)
+        elif new.run.step > 0:
+            pane.sensed = _rebuild_sensed_points(new.history, pane)
+
+
+def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> Sensed:
+    """Sense again at some of the recorded states."""
+    sensed = Sensed()
+    stride = max(1, len(history) // MAX_SENSED_STATES)
+    for index in range(0, len(history), stride):
+        time = history.get_time(index)
+        state = history[index].states[pane.number]
+        setup = state.setup
+        sensor = get_sensor(setup.sensed_environment)
+        sensor.set_time(time)
+        points = sensor.find_nearest_points(state.positions, setup.team.sensing_range)
+        sensed.add(time, setup.numbers, points)
+    return sensed

@@ -1,0 +1,186 @@
+"""Saving the runs of a session in the background, by other processes."""
+
+import re
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from subprocess import DEVNULL
+
+from robocov.controllers import CONTROLLERS
+from robocov.errors import OutputError
+from robocov_app.runs.saved_runs import name_folders
+from robocov_app.terminal.output import echo, find_free_path
+from robocov_app.viewer.session.document import SessionDocument
+from robocov_app.viewer.session.edits import Restart, SetController
+from robocov_app.viewer.session.file import SUFFIX, save_session
+from robocov_app.viewer.session.session import Session
+
+MAX_FOLDER_STEM_CHARS = 64
+FIRST_WAIT_S = 0.5
+"""Time to wait for the processes before the user is told about it."""
+_ERROR_FILE = "errors.txt"
+
+
+@dataclass
+class _Job:
+    """A run that is being saved.
+
+    Attributes
+    ----------
+    target : Path
+        Folder of the run.
+    process : Popen
+        The process.
+    temporary : TemporaryDirectory
+        Folder with the session, and with what the process writes to its standard error.
+    """
+
+    target: Path
+    process: subprocess.Popen[bytes]
+    temporary: tempfile.TemporaryDirectory[str]
+
+
+class RunSaver:
+    """Lets other processes save runs. Only `finish` waits for them.
+
+    Parameters
+    ----------
+    lattice : int
+        Number of lattice points along the longer side of the map, for the coverage cost.
+    """
+
+    def __init__(self, lattice: int) -> None:
+        self._lattice = lattice
+        self._jobs: list[_Job] = []
+        self._messages: list[tuple[str, bool]] = []
+
+    def save(self, session: Session, folder: Path, map_name: str = "") -> str:
+        """Start to save the branch of a session up to its present in a new folder.
+
+        Parameters
+        ----------
+        session : Session
+            The session.
+        folder : Path
+            Folder in which the folder of the run is made.
+        map_name : str
+            Name or path of the map, for the name of the folder.
+
+        Returns
+        -------
+        str
+            A message.
+
+        Raises
+        ------
+        ParameterError
+            If the session cannot be recomputed from its edits.
+        OutputError
+            If the folder cannot be made, or the process cannot be started.
+        """
+        timeline = session.timeline
+        timeline.require_reproducible()
+        target = _make_new_folder(folder, _build_folder_stem(session, map_name))
+        temporary = tempfile.TemporaryDirectory(prefix="robocov-")
+        file = Path(temporary.name) / f"session{SUFFIX}"
+        save_session(file, timeline.document, timeline.head, timeline.step, {})
+        command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
+        command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
+        user_controllers = _list_user_controllers(timeline.document)
+        if user_controllers:
+            command += ["--controller", ",".join(user_controllers)]
+        try:
+            with file.with_name(_ERROR_FILE).open("wb") as errors:
+                process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
+        except OSError as error:
+            raise OutputError(f"the run cannot be saved: {error.strerror or error}") from error
+        self._jobs.append(_Job(target, process, temporary))
+        return f"saving the run: {target}/"
+
+    def poll(self) -> list[tuple[str, bool]]:
+        """Return messages about runs that have ended since the last call, and whether each is an error."""
+        for job in self._jobs[:]:
+            if job.process.poll() is not None:
+                self._end_job(job)
+        messages = self._messages
+        self._messages = []
+        return messages
+
+    def finish(self) -> None:
+        """Wait until all runs are saved. An interruption stops the processes."""
+        try:
+            for index, job in enumerate(self._jobs):
+                with suppress(subprocess.TimeoutExpired):
+                    job.process.wait(FIRST_WAIT_S)
+                if index == 0 and job.process.poll() is None:
+                    echo("saving runs; Ctrl-C gives up", to_stderr=True)
+                job.process.wait()
+        except BaseException:
+            for job in self._jobs:
+                job.process.kill()
+                job.process.wait()
+            raise
+        finally:
+            for job in self._jobs[:]:
+                self._end_job(job)
+
+    def _end_job(self, job: _Job) -> None:
+        """Clean up after a process, and note the message about its result."""
+        self._jobs.remove(job)
+        lines: list[str] = []
+        # A program that cleans up temporary files may have removed the folder.
+        with suppress(OSError), job.temporary as folder:
+            lines = Path(folder, _ERROR_FILE).read_text("utf-8", "replace").strip().splitlines()
+        if job.process.returncode == 0:
+            self._messages.append((f"run saved: {job.target}/ (record, cost, pictures)", False))
+            return
+        reason = "the process has ended"
+        if lines:
+            reason = lines[-1].removeprefix("robocov: error: ")
+        # This fails, as it should, if the folder contains something.
+        with suppress(OSError):
+            job.target.rmdir()
+        self._messages.append((f"run not saved: {job.target}/: {reason}", True))
+
+
+def _build_folder_stem(session: Session, map_name: str) -> str:
+    """Build the name of a folder from those of the map and the controller."""
+    file_name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json")
+    name = file_name or session.displayed.environment.name
+    stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:MAX_FOLDER_STEM_CHARS] or "map"
+    controllers = [pane.controller.name for pane in session.timeline.panes]
+    subject = name_folders(controllers)[0] if len(controllers) == 1 else "comparison"
+    return f"{stem}-{subject}"
+
+
+def _list_user_controllers(document: SessionDocument) -> list[str]:
+    """Return the names of all controllers of a document that are in files of the user's own."""
+    restart_names = []
+    later_names = []
+    for node in document.nodes:
+        for edit in node.edits:
+            if isinstance(edit, Restart):
+                restart_names += [controller.name for controller in edit.scenario.controllers]
+            elif isinstance(edit, SetController):
+                later_names.append(edit.controller.name)
+    names = dict.fromkeys([*restart_names, *later_names])
+    return [name for name in names if name not in CONTROLLERS]
+
+
+def _make_new_folder(folder: Path, stem: str) -> Path:
+    """Make a folder that did not exist before; an OutputError if it cannot be made."""
+    while True:
+        target = find_free_path(folder, stem, "")
+        try:
+            target.mkdir(parents=True)
+        except FileExistsError:
+            # Another program may have made it meanwhile. A file in the place of a parent stays in the way.
+            if not target.exists():
+                raise OutputError(f"{target}: cannot be made") from None
+        except OSError as error:
+            raise OutputError(f"{target}: cannot be made: {error.strerror or error}") from error
+        else:
+            return target

@@ -1,0 +1,141 @@
+"""States to which a session returns after an unexpected error."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+from robocov.errors import RobocovError
+from robocov_app.viewer.session.document import Node
+from robocov_app.viewer.session.edits import SessionEdit
+from robocov_app.viewer.session.history import RunHistory
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.present import Present, restore_trails
+from robocov_app.viewer.session.states import RunState
+from robocov_app.viewer.session.timeline import Timeline
+
+
+@dataclass(frozen=True)
+class SavePoint:
+    """State of a timeline to which it can return.
+
+    Attributes
+    ----------
+    head : Node
+        The head.
+    head_edits : tuple of SessionEdit
+        Its edits.
+    head_kind, head_description : str
+        Its texts.
+    node_count : int
+        Number of nodes of the document.
+    revision : int
+        Revision of the document.
+    run : Lockstep
+        The run.
+    run_key : tuple
+        What of the run is different after an edit or a step.
+    panes : tuple of Pane
+        The panes.
+    history : RunHistory
+        The recorded past.
+    last : RunState
+        Its newest state.
+    shown_index : int or None
+        The displayed state.
+    record_end_time : float or None, s
+        The end of the record.
+    """
+
+    head: Node
+    head_edits: tuple[SessionEdit, ...]
+    head_kind: str
+    head_description: str
+    node_count: int
+    revision: int
+    run: Lockstep
+    run_key: tuple[object, ...]
+    panes: tuple[Pane, ...]
+    history: RunHistory
+    last: RunState
+    shown_index: int | None
+    record_end_time: float | None
+
+
+def build_save_point(timeline: Timeline) -> SavePoint:
+    """Note the state of a timeline."""
+    return SavePoint(
+        head=timeline.head,
+        head_edits=tuple(timeline.head.edits),
+        head_kind=timeline.head.kind,
+        head_description=timeline.head.description,
+        node_count=len(timeline.document.nodes),
+        revision=timeline.document.revision,
+        run=timeline.run,
+        run_key=_build_run_key(timeline.run),
+        panes=tuple(timeline.panes),
+        history=timeline.history,
+        last=timeline.history.last,
+        shown_index=timeline.shown_index,
+        record_end_time=timeline.record_end_time,
+    )
+
+
+def is_at_save_point(timeline: Timeline, point: SavePoint) -> bool:
+    """Return whether a timeline is unchanged since a save point, apart from what is displayed."""
+    return (
+        timeline.run is point.run
+        and _build_run_key(timeline.run) == point.run_key
+        and timeline.history is point.history
+        and timeline.history.last is point.last
+        and timeline.head is point.head
+        and tuple(timeline.head.edits) == point.head_edits
+        and len(timeline.document.nodes) == point.node_count
+    )
+
+
+def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
+    """Return a timeline to a save point.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The timeline, which an unexpected error may have left in any state.
+    point : SavePoint
+        The state to return to.
+    """
+    _restore_document(timeline, point)
+    point.history.rewind(point.last)
+    run = point.run
+    # A record whose controller does not exist any more cannot be resumed, but it was not changed either.
+    with suppress(RobocovError):
+        run = Lockstep.resume(point.last)
+    restore_trails(run, point.history)
+    old_panes = {pane.number: pane for pane in point.panes}
+    for pane in run.panes:
+        if pane.number in old_panes:
+            pane.curves = old_panes[pane.number].curves
+            pane.distance_curve = pane.curves["distance"]
+            pane.sensed = old_panes[pane.number].sensed.copy()
+            pane.sensed.cut(run.time)
+    timeline.follow(None)
+    timeline.replace_present(Present(point.head, run, point.history))
+    timeline.shown_index = point.shown_index
+    timeline.record_end_time = point.record_end_time
+
+
+def _restore_document(timeline: Timeline, point: SavePoint) -> None:
+    nodes = timeline.document.nodes
+    del nodes[point.node_count :]
+    for node in nodes:
+        if node.redo is not None and node.redo not in nodes:
+            node.redo = None
+    point.head.edits[:] = point.head_edits
+    point.head.kind = point.head_kind
+    point.head.description = point.head_description
+    timeline.document.revision = point.revision
+
+
+def _build_run_key(run: Lockstep) -> tuple[object, ...]:
+    """Return what of a run is different after an edit or a step."""
+    panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
+    return run.step, run.drag, id(run.scenario), *panes

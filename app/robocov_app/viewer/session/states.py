@@ -1,0 +1,130 @@
+"""Recorded states of a run: enough to resume it from there, bit for bit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from robocov.arrays import Array
+from robocov.conditions import Conditions
+from robocov.conditions.communication import Inbox
+from robocov.environment import CircleObstacle, Environment, Point
+from robocov.observation import Decision
+from robocov.team import Team
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.scenario import SessionScenario
+
+
+@dataclass(frozen=True, eq=False)
+class PaneSetup:
+    """What a pane simulates with; it stays the same from one edit to the next.
+
+    Attributes
+    ----------
+    environment : Environment
+        The map, without failed robots.
+    controller : ControllerChoice
+        The controller.
+    properties : RobotProperties
+        Properties of the robots.
+    numbers : tuple of int
+        Numbers of the working robots, in the order of the rows of arrays.
+    failed : mapping of int to tuple
+        Positions of failed robots by number, (x, y) m.
+    conditions : Conditions or None
+        Noise and message loss, without robots that fail or join.
+    """
+
+    environment: Environment
+    controller: ControllerChoice
+    properties: RobotProperties
+    numbers: tuple[int, ...]
+    failed: Mapping[int, Point]
+    conditions: Conditions | None = None
+
+    @property
+    def sensed_environment(self) -> Environment:
+        """The map with failed robots as obstacles, as the working robots sense it."""
+        if not self.failed:
+            return self.environment
+        radii = tuple(map(self.properties.get_radius, self.failed))
+        return _add_failed_robots(self.environment, tuple(self.failed.values()), radii)
+
+    @property
+    def all_numbers(self) -> list[int]:
+        """Numbers of all robots, working and failed, in ascending order."""
+        return sorted([*self.numbers, *self.failed])
+
+    @property
+    def team(self) -> Team:
+        """The working robots."""
+        return self.properties.build_team(self.numbers)
+
+    @property
+    def speed_limits(self) -> Array | None:
+        """Speed limits of the working robots, (n,) m/s; None if those of all robots are equal."""
+        if "max_speed" not in self.properties.different:
+            return None
+        return self.team.max_speed
+
+
+# A session has many setups, and what is computed from a map is large. Therefore only few maps are kept.
+@lru_cache(maxsize=8)
+def _add_failed_robots(
+    environment: Environment, positions: tuple[Point, ...], radii: tuple[float, ...]
+) -> Environment:
+    failed_robots = map(CircleObstacle, positions, radii)
+    return replace(environment, obstacles=(*environment.obstacles, *failed_robots))
+
+
+class PaneState(NamedTuple):
+    """State of one pane at one step.
+
+    Attributes
+    ----------
+    setup : PaneSetup
+        What the pane simulates with.
+    positions, velocities : (n, 2) array, m and m/s
+        Of the working robots.
+    memory : object
+        Memory of the controller; None for a controller without memory.
+    recorded : Decision or None
+        The decision in the record, if the state comes from one.
+    inbox : Inbox or None
+        Messages that the robots have; None if they know the others directly.
+    steering : (n, 2) array or None, rad and rad/s
+        Headings and turning rates of unicycles.
+    """
+
+    setup: PaneSetup
+    positions: Array
+    velocities: Array
+    memory: Any
+    recorded: Decision | None = None
+    inbox: Inbox | None = None
+    steering: Array | None = None
+
+
+class RunState(NamedTuple):
+    """State of all panes at one step.
+
+    Attributes
+    ----------
+    step : int
+        Number of control steps since time 0.
+    states : mapping of int to PaneState
+        By the number of the pane.
+    scenario : SessionScenario
+        Map, controllers and properties as they are at this step.
+    drag : tuple or None
+        Number of the dragged robot, and the point to which it is pulled, m.
+    node : int
+        Number of the node of the undo tree in whose time the step is.
+    """
+
+    step: int
+    states: Mapping[int, PaneState]
+    scenario: SessionScenario
+    drag: tuple[int, Point] | None = None
+    node: int = 0

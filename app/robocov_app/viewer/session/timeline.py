@@ -1,0 +1,281 @@
+"""The timeline of a session: the present, the recorded past, and the branches of the document."""
+
+from collections.abc import Callable, Generator
+from time import perf_counter
+
+import numpy as np
+
+from robocov.environment import Point
+from robocov.errors import ParameterError
+from robocov_app.viewer.session.curves import GhostCurve, SessionEvent
+from robocov_app.viewer.session.document import Node, SessionDocument
+from robocov_app.viewer.session.ghosts import build_ghost_curves
+from robocov_app.viewer.session.history import RunHistory
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.present import Present, build_present, cache_present
+from robocov_app.viewer.session.scenario import SessionScenario
+
+STEPS_BETWEEN_SETTLED_CHECKS = 12
+_TIME_TOLERANCE_S = 1e-9
+
+
+class Timeline:
+    """The present of a session, the past that led to it, and the branches to which it can move.
+
+    `advance` simulates one step. `seek` is the only way to any other state: it builds that state completely
+    before it replaces the present, so that an error changes nothing. `show` only selects which recorded
+    state is displayed.
+
+    Parameters
+    ----------
+    document : SessionDocument
+        The edits of the session.
+    present : Present or None
+        The present; by default time 0 of the first node.
+    record_end_time : float or None, s
+        Time up to which the present was recorded by another run.
+    is_record_reproducible : bool
+        Whether the document leads to the end of that record.
+
+    Attributes
+    ----------
+    head : Node
+        The node of the document in whose time the present is.
+    run : Lockstep
+        The panes at the present step.
+    history : RunHistory
+        The recorded states up to the present, which is the last one.
+    shown_index : int or None
+        Index of the displayed state in the history; None for the present.
+    is_settled : bool
+        Whether no robot has moved noticeably for some time.
+    past_version : int
+        Number that grows when the past is replaced.
+    """
+
+    head: Node
+    run: Lockstep
+    history: RunHistory
+    shown_index: int | None
+    is_settled: bool
+    _calls_at_shown_state: int
+    _ghosts: list[GhostCurve] | None
+
+    def __init__(
+        self,
+        document: SessionDocument,
+        present: Present | None = None,
+        record_end_time: float | None = None,
+        *,
+        is_record_reproducible: bool = True,
+    ) -> None:
+        self.document = document
+        self.record_end_time = record_end_time
+        self.is_record_reproducible = is_record_reproducible
+        self.past_version = 0
+        self._seeking: Generator[None, None, Present] | None = None
+        self._followed_path: list[Node] = []
+        self.replace_present(present or Present.start(document.nodes[0]))
+
+    @property
+    def scenario(self) -> SessionScenario:
+        """Map, controllers and properties of the robots at present."""
+        return self.run.scenario
+
+    @property
+    def panes(self) -> list[Pane]:
+        """The panes, at the present step."""
+        return self.run.panes
+
+    @property
+    def drag(self) -> tuple[int, Point] | None:
+        """Number of the dragged robot, and the point to which it is pulled, m; None if there is none."""
+        return self.run.drag
+
+    @property
+    def step(self) -> int:
+        """The present step."""
+        return self.run.step
+
+    @property
+    def end_time(self) -> float:
+        """The present time, s, at which the recorded past ends."""
+        return self.run.time
+
+    @property
+    def is_live(self) -> bool:
+        """Whether the present is displayed."""
+        return self.shown_index is None
+
+    @property
+    def displayed_index(self) -> int:
+        """Index of the displayed state in the history."""
+        return len(self.history) - 1 if self.shown_index is None else self.shown_index
+
+    @property
+    def is_reproducible(self) -> bool:
+        """Whether the document leads to the present."""
+        return self.record_end_time is None or self.is_record_reproducible
+
+    @property
+    def is_at_record_end(self) -> bool:
+        """Whether the present is the end of a record from which nothing was simulated yet."""
+        return self.record_end_time is not None and self.end_time <= self.record_end_time + _TIME_TOLERANCE_S
+
+    @property
+    def is_seeking(self) -> bool:
+        """Whether a call of `seek` was not completed yet."""
+        return self._seeking is not None
+
+    @property
+    def events(self) -> list[SessionEvent]:
+        """What happened up to the present."""
+        return self.document.list_events(self.head, self.step, self.scenario.dt)
+
+    @property
+    def ghosts(self) -> list[GhostCurve]:
+        """The curves of other branches."""
+        if self._ghosts is None:
+            self._ghosts = build_ghost_curves(
+                self.document, self.head, self.step, self.scenario.dt, len(self.panes)
+            )
+        return self._ghosts
+
+    def require_reproducible(self) -> None:
+        """Raise a ParameterError unless the document leads to the present, with controllers that exist."""
+        if not self.is_reproducible:
+            raise ParameterError("this began with a recorded run, which cannot be made again")
+        for pane in self.panes:
+            pane.controller.build()
+
+    def show(self, index: int) -> None:
+        """Display a recorded state, or the present if the index is that of the last state or greater."""
+        self.shown_index = index if index < len(self.history) - 1 else None
+        self._calls_at_shown_state = 0
+
+    def show_next(self) -> None:
+        """Display the next recorded state, after as many calls as there are steps between the two.
+
+        Thus the past plays at the same speed where it was thinned.
+        """
+        assert self.shown_index is not None
+        shown = self.history[self.shown_index]
+        following = self.history[self.shown_index + 1]
+        self._calls_at_shown_state += 1
+        if self._calls_at_shown_state >= following.step - shown.step:
+            self.show(self.shown_index + 1)
+
+    def advance(self) -> None:
+        """Simulate one step. Controllers may raise any exception."""
+        self.head.automatic_events.update(self.run.advance())
+        # A branch may have started within a node whose edits lasted several steps, such as a drag.
+        self.head.apply_edits(self.run)
+        self.head.last_step = max(self.head.last_step, self.step)
+        self.history.append(self.run.build_state(self.head.number))
+        self._repeat_followed_edits()
+        if self.step % STEPS_BETWEEN_SETTLED_CHECKS == 0:
+            self.is_settled = Present(self.head, self.run, self.history).has_settled()
+
+    def follow(self, node: Node | None) -> None:
+        """Repeat the edits on the path to a node when their time comes; None ends that."""
+        self._followed_path = [] if node is None else self.document.get_path(node)
+
+    def _repeat_followed_edits(self) -> None:
+        """Enter the next nodes of the path that is followed if they start at the present step."""
+        if self.head not in self._followed_path:
+            self._followed_path = []
+            return
+        for node in self._followed_path[self._followed_path.index(self.head) + 1 :]:
+            if node.branch_step != self.step:
+                break
+            node.apply_edits(self.run)
+            self.note_edit(node)
+
+    def note_edit(self, node: Node) -> None:
+        """Take note that the edits of a node were applied to the run at the present step.
+
+        Parameters
+        ----------
+        node : Node
+            The head, or one of its children. A new node is added to the document.
+        """
+        if node.number == len(self.document.nodes):
+            self.document.nodes.append(node)
+        self.head = node
+        self.is_settled = False
+        self._ghosts = None
+        self.history.amend(self.run.build_state(node.number))
+
+    def seek(
+        self,
+        node: Node,
+        step: int | None = None,
+        *,
+        edit: Callable[[Lockstep], None] | None = None,
+        seconds: float = np.inf,
+    ) -> None:
+        """Make a step of a node the present. If an error is raised, nothing has changed.
+
+        Parameters
+        ----------
+        node : Node
+            A node of the document, or a new one that starts a run, which is then added to the document.
+        step : int or None
+            A step of the node; by default its last.
+        edit : callable or None
+            Changes the run at that step before it becomes the present.
+        seconds : float, s
+            Time that the call may take. If it is not enough, `continue_seek` does the rest.
+
+        Raises
+        ------
+        StartError, ParameterError, InputError
+            If the state cannot be built. Controllers may raise any exception.
+        """
+        self.finish_seek()
+        old = Present(self.head, self.run, self.history)
+        if step is None:
+            step = node.last_step
+        self._seeking = build_present(self.document, old, node, step, edit)
+        self.continue_seek(seconds)
+
+    def finish_seek(self) -> None:
+        """Complete a call of `seek` that was not completed."""
+        self.continue_seek(np.inf)
+
+    def continue_seek(self, seconds: float) -> None:
+        """Continue a call of `seek` that was not completed, for some time, s."""
+        seeking = self._seeking
+        if seeking is None:
+            return
+        # Whatever is raised ends the seek.
+        self._seeking = None
+        started = perf_counter()
+        while True:
+            try:
+                next(seeking)
+            except StopIteration as end:
+                self.replace_present(end.value)
+                return
+            if perf_counter() - started > seconds:
+                self._seeking = seeking
+                return
+
+    def replace_present(self, present: Present) -> None:
+        """Replace the present, which is displayed from now on, as the last step of `seek`."""
+        if present.head.number == len(self.document.nodes):
+            self.document.nodes.append(present.head)
+        self._seeking = None
+        self.head = present.head
+        self.run = present.run
+        self.history = present.history
+        self.shown_index = None
+        self.is_settled = False
+        self.past_version += 1
+        self._calls_at_shown_state = 0
+        self._ghosts = None
+
+    def cache_present(self) -> None:
+        """Keep the curves of the present in the document, together with those of other branches."""
+        cache_present(self.document, Present(self.head, self.run, self.history))
