@@ -27,7 +27,7 @@ def test_a_wall_drawn_nearly_from_wall_to_wall_closes_the_room_and_says_what_is_
         driver.key("return")
         assert len(driver.session.displayed.environment.free.geoms) == 2
         assert driver.session.displayed.environment.obstacles[-1].points == ((5.0, 0.0), (5.0, 6.0))
-        assert driver.viewer.message == "wall drawn; the team is parted in 2"
+        assert driver.viewer.message == "wall drawn; the team is split into 2 groups"
 
 
 def test_what_is_cut_off_is_where_no_robot_is_also_if_it_is_larger() -> None:
@@ -36,7 +36,10 @@ def test_what_is_cut_off_is_where_no_robot_is_also_if_it_is_larger() -> None:
     left, right = np.array([[1.0, 1.0]]), np.array([[9.0, 1.0]])
     assert describe_passage_changes(before, after, 0.1, left) == "35.7 m² cut off"
     assert describe_passage_changes(before, after, 0.1, right) == "23.7 m² cut off"
-    assert describe_passage_changes(before, after, 0.1, np.vstack([left, right])) == "the team is parted in 2"
+    assert (
+        describe_passage_changes(before, after, 0.1, np.vstack([left, right]))
+        == "the team is split into 2 groups"
+    )
 
 
 def test_what_is_far_from_walls_stays_where_it_is_drawn(tmp_path: Path) -> None:

@@ -222,7 +222,7 @@ def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.asked, Question)
-            assert "1 touch, never saved" in window.dialogs.asked.words
+            assert "1 edit, never saved" in window.dialogs.asked.words
             window.frame(0.5)
             assert window.viewer.session.displayed.time == 0.0
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=chosen, mod=0, unicode="", scancode=0))

@@ -351,7 +351,7 @@ def test_a_controller_that_is_not_loaded_leaves_its_run_to_be_looked_at(counting
         np.testing.assert_array_equal(snapshot.positions, record.positions[k])
         np.testing.assert_array_equal(snapshot.decision.forces, record.forces[k])
         assert snapshot.decision.goals is None
-    gone = r"not gone on with: Counting is none of .*; to go on, open it with --controller FILE.py:Counting$"
+    gone = r"not resumed: Counting is none of .*; to resume it, open it with --controller FILE.py:Counting$"
     with pytest.raises(ParameterError, match=gone):
         session.playback.step()
     session.show_time(0.5)
@@ -382,7 +382,7 @@ def test_the_window_shows_what_it_can(tmp_path: Path, counting: ControllerChoice
         assert window.viewer.message.startswith("the record ends here")
         window.do("pause")
         window.frame(1 / 30)
-        assert "not gone on with" in window.viewer.message
+        assert "not resumed" in window.viewer.message
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
             window.do("robot:next")

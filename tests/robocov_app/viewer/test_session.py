@@ -46,7 +46,7 @@ def test_it_begins_anew_as_it_began():
     for pane in session.timeline.panes:
         np.testing.assert_array_equal(session.displayed.get_positions(pane), start)
     assert list(session.timeline.events) == list(session.timeline.ghosts) == []
-    assert session.undo() == "begun anew"
+    assert session.undo() == "restarted"
     assert robots_of(session) == ((2, 3, 4), (1,)) and session.displayed.time == 20 / 60
 
 

@@ -127,7 +127,7 @@ class Anything(RuleBasedStateMachine):
         pane = self.session.timeline.panes[k % len(self.session.timeline.panes)]
         self.attempt(lambda: self.session.set_controller(pane, law))
 
-    @rule(properties=some_limits)
+    @rule(limits=some_limits)
     def set_limits(self, limits):
         self.attempt(lambda: self.session.set_properties(limits))
 

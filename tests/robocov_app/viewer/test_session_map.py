@@ -34,10 +34,10 @@ def test_panes_come_and_go():
 
 def test_there_are_neither_too_many_panes_nor_none():
     session = begun(*[RAPF] * MAX_PANES)
-    with pytest.raises(ParameterError, match="room for 4 controllers"):
+    with pytest.raises(ParameterError, match="expected at most 4 controllers"):
         session.add_pane(RPF)
     session = begun(RAPF)
-    with pytest.raises(ParameterError, match="the last pane stays"):
+    with pytest.raises(ParameterError, match="cannot remove the last pane"):
         session.remove_pane(session.timeline.panes[0])
 
 

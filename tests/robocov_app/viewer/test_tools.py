@@ -307,7 +307,7 @@ class TestEraser:
 
     def test_the_last_robot_stays(self):
         session = begun(robots=1)
-        with pytest.raises(ParameterError, match="the last robot"):
+        with pytest.raises(ParameterError, match="cannot remove the last working robot"):
             clicked(toolbox()["eraser"], session, (1.0, 1.0), number=1)
 
 

@@ -269,7 +269,7 @@ def test_what_cannot_be_changes_nothing():
         for touch, match in (
             (lambda: session.fail_robot(3), "robot 3 has failed already"),
             (lambda: session.fail_robot(9), "there is no robot 9"),
-            (lambda: session.revive_robot(1), "robot 1 works"),
+            (lambda: session.revive_robot(1), "robot 1 has not failed"),
             (lambda: session.revive_robot(9), "there is no robot 9"),
             (lambda: session.remove_robot(9), "there is no robot 9"),
             (lambda: session.place_robot(9, (1.0, 1.0)), "there is no robot 9"),
@@ -286,7 +286,7 @@ def test_the_last_that_works_stays():
     session.fail_robot(1)
     before = all_told(session)
     for touch in (session.fail_robot, session.remove_robot):
-        with pytest.raises(ParameterError, match="the last robot that works stays"):
+        with pytest.raises(ParameterError, match="cannot remove the last working robot"):
             touch(2)
         assert all_told(session) == before
     # who does not work may go
@@ -369,12 +369,12 @@ def test_undo_is_of_the_present():
     stepped(session, 20)
     session.show_time(10 / 60)
     assert robots_of(session) == ((1, 2, 3), ())
-    assert session.undo() == "robot 2 taken out"
+    assert session.undo() == "robot 2 removed"
     assert session.timeline.is_live
     assert session.timeline.end_time == pytest.approx(20 / 60)
     assert robots_of(session) == ((1, 2, 3), ())
     session.show_time(10 / 60)
-    assert session.redo() == "robot 2 taken out"
+    assert session.redo() == "robot 2 removed"
     assert robots_of(session) == ((1, 3), ())
     assert session.timeline.is_live
 

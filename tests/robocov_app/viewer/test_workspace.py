@@ -37,7 +37,7 @@ def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
     stepped(session, 10)
     kept(workspace)
     (found,) = find_recoverable_drafts(tmp_path)
-    assert "1 touch, " in describe_draft(found) and describe_draft(found).endswith("never saved")
+    assert "1 edit, " in describe_draft(found) and describe_draft(found).endswith("never saved")
     again, view = recover_draft(found, (), tmp_path)
     assert view == {"theme": "light"} and again.has_unsaved_edits
     assert (

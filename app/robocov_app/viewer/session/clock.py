@@ -8,7 +8,7 @@ from time import perf_counter
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 """Selectable speeds, simulated seconds per second; infinite for as fast as possible."""
 MAX_FRAME_S = 0.1
-"""Maximum time of a frame that is simulated; what a frame took longer is not made up for."""
+"""Maximum time of a frame that is simulated. Longer frames slow the simulation down."""
 FRAME_BUDGET_S = 0.008
 """Computing time for the simulation in each frame of a window on a display."""
 MAX_SPEED_WITHOUT_BUDGET = 16.0

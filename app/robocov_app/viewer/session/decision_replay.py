@@ -56,7 +56,7 @@ def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) ->
 
 
 def _observe(state: PaneState, time: float) -> Observations:
-    """Return what the robots observe without noise and message loss."""
+    """Return the observations of the robots without noise and message loss."""
     team = state.setup.team
     environment = state.setup.sensed_environment
     sensor = get_sensor(environment)

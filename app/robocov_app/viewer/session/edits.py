@@ -197,7 +197,7 @@ class ReviveRobot(RobotEdit):
     def build_continuation(self, pane: Pane) -> Continuation:
         """Return the state from which a pane continues."""
         if _find_row(pane, self.robot) is not None:
-            raise ParameterError(f"robot {self.robot} works")
+            raise ParameterError(f"robot {self.robot} has not failed")
         failed_at = pane.setup.failed[self.robot]
         return _change_robot(pane, self.robot, working_at=_find_free_position(pane, self.robot, failed_at))
 
@@ -331,7 +331,7 @@ class Restart(_Edit):
     Attributes
     ----------
     scenario : SessionScenario
-        What the session starts from.
+        Map, robots and controllers at time 0.
     """
 
     scenario: Annotated[SessionScenario, WrapValidator(_load_scenario)]
@@ -372,7 +372,7 @@ def _find_row(pane: Pane, number: int) -> int | None:
 def _require_another_robot(pane: Pane, number: int) -> None:
     """Raise a ParameterError if a robot is the last one that works."""
     if not set(pane.numbers) - {number}:
-        raise ParameterError("the last robot that works stays")
+        raise ParameterError("cannot remove the last working robot")
 
 
 def _find_free_position(pane: Pane, number: int, point: Point) -> Point:

@@ -28,14 +28,14 @@ def refuse_value(where: str, path: tuple[str | int, ...], value: object, expecte
     value : object
         The value.
     expected : str
-        What is expected instead.
+        The expected value.
     """
     message = f"expected {expected}, got {quote_json(value)}"
     raise MapError.from_mistakes(where, [Mistake.at_path(path, message)])
 
 
 class FileContext:
-    """What the fields of a session file refer to: its maps, and the controllers that may be run.
+    """The context of the fields of a session file: its maps, and the controllers that may be run.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ class BundledMapModel(_Model):
 
 
 class ConditionModel(_Model):
-    """A condition of which one field is given."""
+    """A condition, given by one of its fields."""
 
     step: Step | None = Field(None, description="A step of the simulation")
     settled: Literal[True] | None = Field(None, description="The team has settled")

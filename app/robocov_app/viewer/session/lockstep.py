@@ -62,7 +62,7 @@ class Lockstep:
     Parameters
     ----------
     scenario : SessionScenario
-        What they start from.
+        Map, robots and controllers at time 0.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Lockstep:
         return self.step * self.scenario.dt
 
     def advance(self) -> list[AutomaticEvent]:
-        """Simulate one step, and return what has happened by itself."""
+        """Simulate one step, and return the robots that have failed or joined by themselves."""
         # A controller that raises does so before any pane has moved.
         for pane in self.panes:
             pane.simulation.observe_and_decide()
@@ -187,7 +187,7 @@ class Lockstep:
 
     def _remove_pane(self, number: int) -> None:
         if len(self.panes) == 1:
-            raise ParameterError("the last pane stays")
+            raise ParameterError("cannot remove the last pane")
         self.panes = [pane for pane in self.panes if pane.number != number]
 
     def _edit_map(self, edit: MapEdit) -> None:

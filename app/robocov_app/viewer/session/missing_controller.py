@@ -31,7 +31,7 @@ class MissingController(ControllerChoice):
     title: str = ""
     reason: str = ""
     is_placeholder: bool = False
-    summary = "stands for a controller that is not there any more"
+    summary = "takes the place of a missing controller"
 
     @property
     def label(self) -> str:
@@ -47,7 +47,7 @@ class MissingController(ControllerChoice):
         """Return the placeholder itself, or raise a ParameterError with the reason."""
         if self.is_placeholder:
             return self
-        raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
+        raise ParameterError(f"the run can be displayed, but not resumed: {self.reason}")
 
     def begin(self, region: Region, team: Team) -> None:
         """Return no memory."""
@@ -80,7 +80,7 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
     if name not in (*CONTROLLERS, *same_class):
         if not same_class:
             suggestion = f"FILE.py:{class_name}" if class_name != name else class_name
-            reason = f"is none of robocov's controllers; to go on, open it with --controller {suggestion}"
+            reason = f"is none of robocov's controllers; to resume it, open it with --controller {suggestion}"
             return MissingController(name, gains, record.label, f"{record.label} {reason}")
         name = same_class[0]
     choice = ControllerChoice(name, gains)

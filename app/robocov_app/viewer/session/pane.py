@@ -30,7 +30,7 @@ class Continuation(NamedTuple):
     Attributes
     ----------
     setup : PaneSetup
-        What the pane simulates with from now on.
+        Setup of the pane from now on.
     positions, velocities : (n, 2) array or None, m and m/s
         Of the working robots; by default as they are.
     """
@@ -48,7 +48,7 @@ class Pane:
     number : int
         Number of the pane, which stays the same when others are removed.
     setup : PaneSetup
-        What it simulates with.
+        Map, controller and robots.
     simulation : Simulation
         The simulation at the present step.
 
@@ -171,7 +171,7 @@ class Pane:
         Parameters
         ----------
         continuation : Continuation
-            What changes.
+            State from which the pane continues.
 
         Returns
         -------
@@ -265,7 +265,7 @@ def start_simulation(
     Parameters
     ----------
     setup : PaneSetup
-        What the pane simulates with.
+        Map, controller and robots.
     positions : (n, 2) array, m
         Starting positions.
     dt : float, s

@@ -40,7 +40,7 @@ def describe_passage_changes(
             dtype=bool,
         )
         if has_robots.sum() > 1:
-            descriptions.append(f"the team is parted in {has_robots.sum()}")
+            descriptions.append(f"the team is split into {has_robots.sum()} groups")
         is_reachable = has_robots
         if not has_robots.any():
             # Without robots the largest component counts as the one that is left.

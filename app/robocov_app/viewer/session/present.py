@@ -154,8 +154,8 @@ def cache_present(document: SessionDocument, present: Present) -> None:
     dt = present.run.scenario.dt
     for node, following in zip(path, [*path[1:], None], strict=True):
         states = list(recorded[node.number])
-        if following is None or not states:
-            states += [state for state in node.cached_states if state.step > present.run.step]
+        last_recorded_step = states[-1].step if states else -1
+        states += [state for state in node.cached_states if state.step > last_recorded_step]
         # The last state is always among the cached ones.
         stride = max(-(-len(states) // MAX_CACHED_STATES), 1)
         node.cached_states = states[::-stride][::-1]
@@ -178,9 +178,9 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
     """Return the recorded states on the path to a step of a node; none if they are not known."""
     path = document.get_path(node)
     last_steps = document.get_last_steps(node, step)
-    path_numbers = {ancestor.number for ancestor in path}
+    path_numbers = [ancestor.number for ancestor in path]
     old_numbers = {ancestor.number for ancestor in document.get_path(old.head)}
-    common_numbers = path_numbers & old_numbers
+    common_numbers = old_numbers.intersection(path_numbers)
     common_count = 0
     for state in old.history.states:
         if state.node in common_numbers and state.step <= last_steps[state.node]:
@@ -190,11 +190,12 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
         history = old.history.copy_until(common_count - 1)
     else:
         history = RunHistory(path[0].require_scenario().dt)
-    for ancestor in path:
-        if ancestor.number in common_numbers:
-            continue
+    # Other states may be known from another visit to the branch.
+    first_missing = path_numbers.index(history.last.node) if common_count else 0
+    for ancestor in path[first_missing:]:
         for state in ancestor.cached_states:
-            if state.step <= last_steps[ancestor.number]:
+            is_later = not len(history) or state.step >= history.last.step
+            if is_later and state.step <= last_steps[ancestor.number]:
                 history.amend(state)
     return history
 

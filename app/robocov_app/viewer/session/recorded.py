@@ -130,7 +130,7 @@ def _describe_run(record: Record) -> Mapping[str, object]:
 
 
 def _build_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -> SessionScenario:
-    """Build the scenario of runs of which one is given."""
+    """Build the scenario of several runs from the record of the first."""
     roster = build_roster(record)
     return SessionScenario(
         roster.environment,
@@ -175,7 +175,7 @@ def _list_drag_events(record: Record, dt: float) -> list[AutomaticEvent]:
 
 def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
     """Build the states of a pane from a record."""
-    # The arrays of the states are views that nobody can change.
+    # Broadcast arrays are views that cannot be written to.
     positions = np.broadcast_to(record.positions, record.positions.shape)
     velocities = np.broadcast_to(record.velocities, record.velocities.shape)
     forces = np.broadcast_to(record.forces, record.forces.shape)

@@ -20,7 +20,7 @@ from robocov_app.viewer.session.session import Session
 
 MAX_FOLDER_STEM_CHARS = 64
 FIRST_WAIT_S = 0.5
-"""Time to wait for the processes before the user is told about it."""
+"""Time to wait for a process without a message to the user."""
 _ERROR_FILE = "errors.txt"
 
 
@@ -35,7 +35,7 @@ class _Job:
     process : Popen
         The process.
     temporary : TemporaryDirectory
-        Folder with the session, and with what the process writes to its standard error.
+        Folder with the session, and with the standard error of the process.
     """
 
     target: Path
@@ -116,7 +116,7 @@ class RunSaver:
                 with suppress(subprocess.TimeoutExpired):
                     job.process.wait(FIRST_WAIT_S)
                 if index == 0 and job.process.poll() is None:
-                    echo("saving runs; Ctrl-C gives up", to_stderr=True)
+                    echo("saving runs; press Ctrl-C to cancel", to_stderr=True)
                 job.process.wait()
         except BaseException:
             for job in self._jobs:

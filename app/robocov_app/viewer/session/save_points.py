@@ -33,7 +33,7 @@ class SavePoint:
     run : Lockstep
         The run.
     run_key : tuple
-        What of the run is different after an edit or a step.
+        Values that are different after an edit or a step.
     panes : tuple of Pane
         The panes.
     history : RunHistory
@@ -81,7 +81,7 @@ def build_save_point(timeline: Timeline) -> SavePoint:
 
 
 def is_at_save_point(timeline: Timeline, point: SavePoint) -> bool:
-    """Return whether a timeline is unchanged since a save point, apart from what is displayed."""
+    """Return whether a timeline is unchanged since a save point, apart from the displayed state."""
     return (
         timeline.run is point.run
         and _build_run_key(timeline.run) == point.run_key
@@ -136,6 +136,6 @@ def _restore_document(timeline: Timeline, point: SavePoint) -> None:
 
 
 def _build_run_key(run: Lockstep) -> tuple[object, ...]:
-    """Return what of a run is different after an edit or a step."""
+    """Return values of a run that are different after an edit or a step."""
     panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
     return run.step, run.drag, id(run.scenario), *panes

@@ -44,18 +44,18 @@ from robocov_app.viewer.session.timeline import Timeline
 MIN_PUSH_M = 5e-3
 """Distance from which on a robot counts as pushed by an obstacle; one that leans on it moves in any case."""
 GESTURE_WINDOW_S = 1.0
-"""Simulated time within which changes of a value, as by a slider, count as one edit."""
+"""Simulated time within which changes of the same value, for example by a slider, count as one edit."""
 _DRAG_DECIMALS = 4
 
 
 @dataclass(frozen=True)
 class _Gesture:
-    """Edits that count as one, as long as the same thing is edited.
+    """Consecutive edits of the same robot, gain or stroke, which count as one.
 
     Attributes
     ----------
     key : object
-        What is edited.
+        Robot, gain or stroke that is edited.
     time : float, s
         Time of the last edit.
     past_version : int
@@ -65,6 +65,13 @@ class _Gesture:
     key: object
     time: float
     past_version: int
+
+    def continues(self, key: object, kind: str, timeline: Timeline) -> bool:
+        """Return whether an edit with a key, of a kind, belongs to the gesture."""
+        if key != self.key or timeline.past_version != self.past_version:
+            return False
+        # A robot may be dragged for any time.
+        return kind == "hand" or timeline.end_time - self.time < GESTURE_WINDOW_S
 
 
 class Session:
@@ -76,7 +83,7 @@ class Session:
     Parameters
     ----------
     scenario : SessionScenario or None
-        What the session starts from.
+        Map, robots and controllers at time 0.
     timeline : Timeline or None
         The timeline of a session that exists already, instead of a scenario.
 
@@ -151,7 +158,7 @@ class Session:
                 run.apply(edit)
 
             timeline.seek(timeline.document.nodes[shown.node], shown.step, edit=apply_to)
-        if self._continues_gesture(gesture, kind):
+        if self._gesture is not None and self._gesture.continues(gesture, kind, timeline):
             node = timeline.head
             _extend_node(node, replace(edit, step=timeline.step), kind, description)
         else:
@@ -163,16 +170,6 @@ class Session:
             self._gesture = _Gesture(gesture, timeline.end_time, timeline.past_version)
         timeline.document.revision += 1
         timeline.note_edit(node)
-
-    def _continues_gesture(self, gesture: object, kind: str) -> bool:
-        """Return whether an edit belongs to the previous one."""
-        last = self._gesture
-        if gesture is None or last is None:
-            return False
-        if gesture != last.key or last.past_version != self.timeline.past_version:
-            return False
-        # A drag may last as long as it likes.
-        return kind == "hand" or self.timeline.end_time - last.time < GESTURE_WINDOW_S
 
     def restart(
         self,
@@ -238,7 +235,7 @@ class Session:
     def branch(self) -> bool:
         """Make the displayed state the present, and return whether it was in the past.
 
-        What came after it stays as a branch.
+        The later states stay as a branch.
         """
         timeline = self.timeline
         if timeline.is_live:
@@ -330,12 +327,12 @@ class Session:
     def add_pane(self, controller: ControllerChoice) -> None:
         """Restart with another controller alongside the others."""
         if len(self.timeline.panes) >= MAX_PANES:
-            raise ParameterError(f"there is room for {MAX_PANES} controllers side by side")
+            raise ParameterError(f"expected at most {MAX_PANES} controllers side by side")
         self.restart(controllers=(*self.timeline.scenario.controllers, controller))
 
     def remove_pane(self, pane: Pane) -> None:
         """Remove a pane."""
-        self.apply(RemovePane(pane.number), "pane", f"{pane.controller.label} left out")
+        self.apply(RemovePane(pane.number), "pane", f"{pane.controller.label} removed")
 
     def edit_map(self, environment: Environment, description: str) -> int:
         """Replace the obstacles of the map by those of another one.
@@ -414,7 +411,7 @@ class Session:
 
     def remove_robot(self, number: int) -> None:
         """Remove a robot."""
-        self.apply(RemoveRobot(number), "robot", f"robot {number} taken out")
+        self.apply(RemoveRobot(number), "robot", f"robot {number} removed")
 
     def fail_robot(self, number: int) -> None:
         """Let a robot fail."""
@@ -447,7 +444,7 @@ def _extend_node(node: Node, edit: RunEdit, kind: str, description: str) -> None
 
 
 def _describe_restart(old: SessionScenario, new: SessionScenario) -> str:
-    """Describe what is different after a restart."""
+    """Describe the differences between the scenarios before and after a restart."""
     parts = [f"{controller.label} compared" for controller in new.controllers[len(old.controllers) :]]
     if new.environment is not old.environment:
         parts.append(f"map {new.environment.name}")
@@ -457,4 +454,4 @@ def _describe_restart(old: SessionScenario, new: SessionScenario) -> str:
         parts.append(f"{new.robots} robots")
     if new.seed != old.seed:
         parts.append(f"seed {new.seed}")
-    return ", ".join(parts) or "begun anew"
+    return ", ".join(parts) or "restarted"

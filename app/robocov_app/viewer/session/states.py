@@ -18,7 +18,7 @@ from robocov_app.viewer.session.scenario import SessionScenario
 
 @dataclass(frozen=True, eq=False)
 class PaneSetup:
-    """What a pane simulates with; it stays the same from one edit to the next.
+    """Map, controller and robots of a pane, which stay the same from one edit to the next.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class PaneSetup:
         return self.team.max_speed
 
 
-# A session has many setups, and what is computed from a map is large. Therefore only few maps are kept.
+# A session has many setups, and the data computed from a map are large. Therefore only few maps are kept.
 @lru_cache(maxsize=8)
 def _add_failed_robots(
     environment: Environment, positions: tuple[Point, ...], radii: tuple[float, ...]
@@ -84,7 +84,7 @@ class PaneState(NamedTuple):
     Attributes
     ----------
     setup : PaneSetup
-        What the pane simulates with.
+        Map, controller and robots.
     positions, velocities : (n, 2) array, m and m/s
         Of the working robots.
     memory : object

@@ -145,7 +145,7 @@ class Timeline:
     def require_reproducible(self) -> None:
         """Raise a ParameterError unless the document leads to the present, with controllers that exist."""
         if not self.is_reproducible:
-            raise ParameterError("this began with a recorded run, which cannot be made again")
+            raise ParameterError("the session started from a record that cannot be recomputed")
         for pane in self.panes:
             pane.controller.build()
 
@@ -249,7 +249,7 @@ class Timeline:
         seeking = self._seeking
         if seeking is None:
             return
-        # Whatever is raised ends the seek.
+        # Any exception ends the seek.
         self._seeking = None
         started = perf_counter()
         while True:

@@ -134,8 +134,8 @@ def describe_draft(draft: autosave.Draft) -> str:
     """Describe a draft for the question whether to recover it."""
     place = "never saved" if draft.path is None else f"not saved to {draft.path.name}"
     count = len(draft.content["session"]["touches"]) - 1
-    unit = "touch" if count == 1 else "touches"
-    return f"a session of {draft.when:%H:%M}, {count} {unit}, {place}"
+    unit = "edit" if count == 1 else "edits"
+    return f"session from {draft.when:%H:%M}, {count} {unit}, {place}"
 
 
 def recover_draft(
