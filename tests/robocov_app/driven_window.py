@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pygame
-from touched_run import HALL, RAPF, begun
+from sample_sessions import HALL, RAPF, start_session
 
 from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
@@ -60,7 +60,7 @@ def opened(
 ) -> Iterator[Driver]:
     """Open a window without a display, paused at its beginning."""
     with open_display(headless=True):
-        session = begun(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
+        session = start_session(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
         usual = {layer.name for layer in standard_layers() if layer.default}
         viewer = Presenter(
             session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name

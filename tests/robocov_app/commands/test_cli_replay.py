@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import answer, complaint
-from kept_run import records_of
 from PIL import Image
-from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
+from sample_sessions import HALL, LLOYD, RAPF, RPF, advance_session, start_session
+from session_records import build_records
 
 from robocov_app.cli import main
 from robocov_app.runs.artifacts import start_comparison
@@ -35,16 +35,16 @@ def write_history(folder: Path) -> None:
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a run and a comparison, in which a robot failed."""
     folder = tmp_path_factory.mktemp("made")
-    (record,) = records_of(stepped(begun(), 60))
+    (record,) = build_records(advance_session(start_session(), 60))
     (folder / "run").mkdir()
     record.save(folder / "run")
     write_history(folder / "run")
-    session = stepped(begun(RPF, LLOYD), 30)
+    session = advance_session(start_session(RPF, LLOYD), 30)
     session.fail_robot(1)
     names = ["rpf", "lloyd"]
     (folder / "both").mkdir()
     start_comparison(folder / "both", names)
-    for name, each in zip(names, records_of(stepped(session, 60)), strict=True):
+    for name, each in zip(names, build_records(advance_session(session, 60)), strict=True):
         (folder / "both" / name).mkdir()
         each.save(folder / "both" / name)
     write_history(folder / "both" / "lloyd")
@@ -123,8 +123,8 @@ def test_a_run_is_not_replaced_by_its_own_film(run: Path, both: Path, capsys) ->
 
 
 def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsys) -> None:
-    (short,) = records_of(stepped(begun(RPF), 30))
-    (whole,) = records_of(stepped(begun(LLOYD), 60))
+    (short,) = build_records(advance_session(start_session(RPF), 30))
+    (whole,) = build_records(advance_session(start_session(LLOYD), 60))
     short.save(both / "rpf")
     whole.save(both / "lloyd")
     answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "film"))
@@ -306,7 +306,9 @@ def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: 
             "{both}/gone: not the folder of a run (there is no run.json)",
         ),
         (
-            lambda both: records_of(stepped(begun(RAPF, environment=EMPTY), 60))[0].save(both / "lloyd"),
+            lambda both: build_records(advance_session(start_session(RAPF, environment=EMPTY), 60))[0].save(
+                both / "lloyd"
+            ),
             "{both}/lloyd/run.json: expected the same map as in {both}/rpf",
         ),
     ],

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from called import COMMAND, SHORT, answer, complaint
-from kept_run import records_of
-from touched_run import begun, stepped
+from sample_sessions import advance_session, start_session
+from session_records import build_records
 
 from robocov.record import Record
 from robocov_app.cli import main
@@ -77,7 +77,7 @@ def test_what_cannot_be_written_is_one_line_and_stays_as_it_is(
     if name == "link":
         target.symlink_to("a pipe")
     if "run" in words.split():
-        (record,) = records_of(stepped(begun(), 5))
+        (record,) = build_records(advance_session(start_session(), 5))
         record.save(Path("run"))
     elif "import" in words:
         Path("square.wkt").write_text("POLYGON ((0 0, 9 0, 9 9, 0 9, 0 0))")

@@ -10,7 +10,7 @@ import pygame
 import pytest
 from driven_editor import opened_editor
 from driven_window import opened
-from touched_run import begun
+from sample_sessions import start_session
 
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
@@ -253,7 +253,7 @@ def test_an_edit_of_a_session_that_raises_is_taken_back(
 
 
 def _same_without_a_fault() -> Session:
-    session = begun()
+    session = start_session()
     for _ in range(20):
         session.playback.step()
     session.fail_robot(2)

@@ -6,7 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, positions_of, stepped, with_curves
+from sample_sessions import (
+    HALL,
+    LLOYD,
+    RAPF,
+    RPF,
+    advance_session,
+    advance_with_costs,
+    describe_state,
+    get_positions,
+    start_session,
+)
 
 from robocov.environment import CircleObstacle
 from robocov.errors import StartError
@@ -18,39 +28,39 @@ from robocov_app.viewer.session.robot_properties import RobotProperties
 
 @pytest.mark.parametrize("laws", [(RAPF,), (RPF, LLOYD)])
 def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
-    session = stepped(begun(*laws, robots=4), 100)
-    end = positions_of(session)
+    session = advance_session(start_session(*laws, robots=4), 100)
+    end = get_positions(session)
     session.show_time(0.5)
     assert session.branch()
     assert session.timeline.is_live
     assert session.timeline.end_time == pytest.approx(0.5)
     assert session.timeline.history.steps[-1] == 30
-    stepped(session, 70)
-    for now, before in zip(positions_of(session), end, strict=True):
+    advance_session(session, 70)
+    for now, before in zip(get_positions(session), end, strict=True):
         # bit for bit
         np.testing.assert_array_equal(now, before)
 
 
 def test_so_it_does_from_a_thinned_past_after_touches(short):
-    session = stepped(begun(RAPF, LLOYD, robots=4), 100)
+    session = advance_session(start_session(RAPF, LLOYD, robots=4), 100)
     session.edit_map(
         replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn"
     )
     session.fail_robot(3)
-    stepped(session, 400)
-    end = positions_of(session)
+    advance_session(session, 400)
+    end = get_positions(session)
     assert session.timeline.history.thinned > 0
     session.show_time(2.5)
     assert session.branch()
     while session.timeline.end_time < 500 / 60 - 1e-9:
         session.playback.step()
-    for now, before in zip(positions_of(session), end, strict=True):
+    for now, before in zip(get_positions(session), end, strict=True):
         np.testing.assert_array_equal(now, before)
 
 
 def test_a_branch_leaves_a_ghost():
-    session = begun(RAPF, LLOYD)
-    with_curves(session, 60)
+    session = start_session(RAPF, LLOYD)
+    advance_with_costs(session, 60)
     serial = session.timeline.past_version
     session.show_time(0.5)
     assert session.branch()
@@ -70,21 +80,21 @@ def test_a_branch_leaves_a_ghost():
 
 
 def test_the_present_is_no_branch():
-    session = stepped(begun(), 10)
-    before = all_told(session)
+    session = advance_session(start_session(), 10)
+    before = describe_state(session)
     assert not session.branch()
     session.show_time(99.0)
     assert not session.branch()
-    assert all_told(session) == before
+    assert describe_state(session) == before
 
 
 def test_a_branch_takes_back_what_was_chosen_later():
-    session = stepped(begun(RAPF, RPF), 20)
+    session = advance_session(start_session(RAPF, RPF), 20)
     session.set_controller(session.timeline.panes[0], LLOYD)
     session.set_properties(RobotProperties(max_speed=0.5))
     session.edit_map(replace(HALL, obstacles=()), "emptied")
     session.add_robot((1.0, 3.0))
-    stepped(session, 20)
+    advance_session(session, 20)
     session.show_time(10 / 60)
     assert session.displayed.environment is HALL
     assert session.displayed.numbers == (1, 2, 3)
@@ -96,15 +106,15 @@ def test_a_branch_takes_back_what_was_chosen_later():
     assert session.timeline.panes[0].starts.shape == (3, 2)
     assert list(session.timeline.events) == []
     assert session.timeline.head.parent is None
-    stepped(session, 5)
+    advance_session(session, 5)
 
 
 def test_events_up_to_the_branch_stay():
-    session = stepped(begun(), 10)
+    session = advance_session(start_session(), 10)
     session.fail_robot(2)
-    stepped(session, 10)
+    advance_session(session, 10)
     session.fail_robot(3)
-    stepped(session, 10)
+    advance_session(session, 10)
     session.show_time(10 / 60)
     session.branch()
     assert [event.text for event in session.timeline.events] == ["robot 2 failed"]
@@ -112,10 +122,10 @@ def test_events_up_to_the_branch_stay():
 
 
 def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
-    session = begun(RAPF, RPF)
-    with_curves(session, 40)
+    session = start_session(RAPF, RPF)
+    advance_with_costs(session, 40)
     session.show_time(0.3)
-    before = all_told(session)
+    before = describe_state(session)
 
     def no_room(moment):
         raise StartError("no room")
@@ -128,14 +138,14 @@ def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
     ):
         with pytest.raises(StartError, match="no room"):
             touch()
-        assert all_told(session) == before
+        assert describe_state(session) == before
 
 
 # events
 
 
 def test_a_slider_that_is_dragged_is_one_event():
-    session = stepped(begun(RAPF, RPF), 3)
+    session = advance_session(start_session(RAPF, RPF), 3)
     for k in range(1, 20):
         session.set_controller(session.timeline.panes[0], RAPF.with_gain("k_rep", k / 10))
         session.playback.step()
@@ -153,7 +163,7 @@ def test_a_slider_that_is_dragged_is_one_event():
         "limits changed",
     ]
     # later it is another one
-    stepped(session, 70)
+    advance_session(session, 70)
     session.set_properties(RobotProperties(max_speed=3.0))
     session.set_controller(session.timeline.panes[0], LLOYD)
     session.set_controller(session.timeline.panes[1], LLOYD)

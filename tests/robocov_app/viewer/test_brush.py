@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from driven_window import opened
-from touched_run import HALL, LLOYD, RAPF, all_told, begun, stepped
+from sample_sessions import HALL, LLOYD, RAPF, advance_session, describe_state, start_session
 
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
@@ -40,7 +40,7 @@ def value_at(session, point) -> float:
 
 
 def test_left_raises_and_right_lowers():
-    brush, session = Brush(radius=0.8), begun()
+    brush, session = Brush(radius=0.8), start_session()
     assert stroke(brush, session, (1.0, 1.0), (2.0, 1.0)) == "density raised"
     raised = value_at(session, (1.5, 1.0))
     assert raised > 1.3 and value_at(session, (1.5, 1.5)) > 1.0
@@ -57,7 +57,7 @@ def test_left_raises_and_right_lowers():
 
 
 def test_a_stroke_is_undone_as_a_whole_and_done_again():
-    brush, session = Brush(radius=0.5), stepped(begun(), 5)
+    brush, session = Brush(radius=0.5), advance_session(start_session(), 5)
     before = session.displayed.environment
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0), (3.0, 2.0))
     painted = session.displayed.environment
@@ -74,12 +74,12 @@ def test_a_stroke_is_undone_as_a_whole_and_done_again():
 
 def test_robots_know_of_it_while_it_is_painted():
     now = [0.0]
-    brush, session = Brush(radius=1.0, clock=lambda: now[0]), begun(RAPF, LLOYD)
+    brush, session = Brush(radius=1.0, clock=lambda: now[0]), start_session(RAPF, LLOYD)
     brush.press(session, (5.0, 3.0), REACH, None)
     for k in range(20):
         now[0] += 0.1
         brush.move(session, (5.0 - 0.02 * k, 3.0))
-        stepped(session, 1)
+        advance_session(session, 1)
         for pane in session.timeline.panes:
             assert pane.simulation.observe_and_decide().seen.density is session.displayed.environment.density
     assert session.displayed.environment.density is not None
@@ -91,7 +91,7 @@ def test_robots_know_of_it_while_it_is_painted():
 
 def test_it_does_not_tell_the_robots_more_often_than_is_seen():
     now, told = [0.0], []
-    brush, session = Brush(radius=1.0, clock=lambda: now[0]), begun()
+    brush, session = Brush(radius=1.0, clock=lambda: now[0]), start_session()
     brush.press(session, (1.0, 1.0), REACH, None)
     for k in range(200):
         now[0] += 0.01
@@ -101,7 +101,7 @@ def test_it_does_not_tell_the_robots_more_often_than_is_seen():
 
 
 def test_escape_gives_the_stroke_up():
-    brush, session = Brush(radius=1.0), begun()
+    brush, session = Brush(radius=1.0), start_session()
     before = session.displayed.environment
     brush.press(session, (1.0, 1.0), REACH, None)
     assert session.displayed.environment != before
@@ -113,7 +113,7 @@ def test_escape_gives_the_stroke_up():
 
 def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
     """Only the density changes: nobody is pushed, and an obstacle of in between stays."""
-    brush, session = Brush(radius=0.5), stepped(begun(), 3)
+    brush, session = Brush(radius=0.5), advance_session(start_session(), 3)
     places = session.timeline.panes[0].simulation.positions.copy()
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0))
     assert np.array_equal(session.timeline.panes[0].simulation.positions, places)
@@ -131,7 +131,7 @@ def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
 
 
 def test_another_map_in_the_midst_of_a_stroke_ends_it():
-    brush, session = Brush(radius=0.5), begun()
+    brush, session = Brush(radius=0.5), start_session()
     brush.press(session, (1.0, 1.0), REACH, None)
     session.restart(environment=load_map("square"))
     brush.move(session, (2.0, 1.0))
@@ -153,7 +153,7 @@ def test_what_is_painted_on():
 
 
 def test_its_size():
-    brush, session = Brush(), begun()
+    brush, session = Brush(), start_session()
     first = brush.size(session)
     assert first == pytest.approx(0.1 * HALL.region.diameter, rel=0.05)
     assert brush.widen(session, 2.0).startswith("the brush has a radius of ")
@@ -167,11 +167,11 @@ def test_its_size():
 
 
 def test_nothing_is_touched_before_a_press():
-    brush, session = Brush(), begun()
-    before = all_told(session)
+    brush, session = Brush(), start_session()
+    before = describe_state(session)
     brush.move(session, (1.0, 1.0))
     assert brush.release(session, (1.0, 1.0)) is None and not brush.cancel(session)
-    assert all_told(session) == before
+    assert describe_state(session) == before
 
 
 def test_in_the_window(tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import Driver, opened
-from touched_run import RAPF, positions_of
+from sample_sessions import RAPF, get_positions
 
 from robocov.environment import Environment
 from robocov.record import Record
@@ -22,7 +22,7 @@ ROOM = Environment("room", ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)))
 
 def state(session: Session) -> tuple[list[np.ndarray], float, tuple[int, ...], int]:
     return (
-        positions_of(session),
+        get_positions(session),
         session.timeline.end_time,
         session.displayed.numbers,
         len(session.displayed.environment.obstacles),

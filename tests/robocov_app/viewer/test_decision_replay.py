@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from touched_run import LLOYD, RAPF, RPF, begun, stepped
+from sample_sessions import LLOYD, RAPF, RPF, advance_session, start_session
 
 from robocov_app.viewer.session import decision_replay as module
 from robocov_app.viewer.session.controller_choice import ControllerChoice
@@ -53,7 +53,7 @@ def file(tmp_path_factory):
 
 @pytest.mark.parametrize("law", [RAPF, RPF, LLOYD])
 def test_the_past_is_explained_as_it_was(law):
-    session = begun(law)
+    session = start_session(law)
     pane = session.timeline.panes[0]
     seen = []
     for _ in range(20):
@@ -69,7 +69,7 @@ def test_the_past_is_explained_as_it_was(law):
 
 
 def test_a_controller_may_remember_what_it_did(file):
-    session = stepped(begun(ControllerChoice(f"{file}:Counting")), 10)
+    session = advance_session(start_session(ControllerChoice(f"{file}:Counting")), 10)
     for k in (3, 8):
         for _ in range(3):
             told = rebuild_snapshot(
@@ -80,7 +80,7 @@ def test_a_controller_may_remember_what_it_did(file):
 
 @pytest.mark.parametrize("way", range(5))
 def test_a_controller_that_fails_decided_nothing(file, way):
-    session = stepped(begun(ControllerChoice(f"{file}:Late", {"way": float(way)})), 3)
+    session = advance_session(start_session(ControllerChoice(f"{file}:Late", {"way": float(way)})), 3)
     state = session.timeline.history[2].states[0]
     assert rebuild_snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
     told = rebuild_snapshot(state, 1.0)
@@ -90,7 +90,7 @@ def test_a_controller_that_fails_decided_nothing(file, way):
 
 
 def test_panes_do_not_take_turns_in_preparing_the_map(monkeypatch):
-    session = stepped(begun(RAPF, RPF, LLOYD, RAPF), 3)
+    session = advance_session(start_session(RAPF, RPF, LLOYD, RAPF), 3)
     made = []
     real = module.RangeSensor
     monkeypatch.setattr(module, "RangeSensor", lambda pieces, movers=(): made.append(1) or real(pieces))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import opened
-from touched_run import HALL, RAPF
+from sample_sessions import HALL, RAPF
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov_app.viewer.session.map_edits import add_obstacle

@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import MIDDLE, opened
-from touched_run import HALL, RAPF, begun, stepped
+from sample_sessions import HALL, RAPF, advance_session, start_session
 
 from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
@@ -175,7 +175,7 @@ def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options
     monkeypatch.setattr(
         opening, "open_display", lambda headless, missing_message: open_display(headless=True)
     )
-    return Launcher(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
+    return Launcher(start_session(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 
 def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
@@ -208,7 +208,7 @@ def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
 ) -> None:
     monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
     for _ in range(2):
-        workspace = SessionWorkspace(stepped(begun(), 5), tmp_path / "drafts")
+        workspace = SessionWorkspace(advance_session(start_session(), 5), tmp_path / "drafts")
         workspace.session.fail_robot(2)
         workspace.save_draft({})
         workspace.close()

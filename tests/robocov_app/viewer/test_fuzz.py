@@ -11,7 +11,7 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import KEYS, MODIFIERS, Driver, opened, typed
-from touched_run import RAPF, RPF, too_deep
+from sample_sessions import RAPF, RPF, compute_penetration
 
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.scenario import MAX_PANES
@@ -237,7 +237,7 @@ def check(driver: Driver) -> None:
         assert (
             np.diff(pane.distance_curve.times) > 0
         ).all() and pane.distance_curve.last_time <= session.timeline.end_time + 1e-6
-    assert too_deep(session) < 0.01
+    assert compute_penetration(session) < 0.01
     assert 0.0 <= session.displayed.time <= session.timeline.end_time + 1e-9
     assert 0 <= driver.viewer.active < MAX_PANES
     assert window.panel.tab in ("parameters", "show", "robot", "keep")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kept_run import record_of, same_arrays
-from touched_run import HALL, LLOYD, RAPF, begun, stepped, with_curves
+from sample_sessions import HALL, LLOYD, RAPF, advance_session, advance_with_costs, start_session
+from session_records import build_record, have_same_arrays
 
 from robocov.environment import CircleObstacle
 from robocov.metrics import compute_path_lengths
@@ -35,19 +35,19 @@ def saved(session: Session, folder: Path) -> str:
 
 def played() -> Session:
     """A robot fails; in another branch a circle is drawn and a robot joins."""
-    session = stepped(begun(RAPF, LLOYD), 12)
+    session = advance_session(start_session(RAPF, LLOYD), 12)
     session.fail_robot(2)
-    stepped(session, 12)
+    advance_session(session, 12)
     session.undo()
     session.edit_map(add_obstacle(HALL, CircleObstacle((1.5, 3.0), 0.3)), "circle drawn")
-    stepped(session, 12).add_robot((5.0, 3.0))
-    return stepped(session, 12)
+    advance_session(session, 12).add_robot((5.0, 3.0))
+    return advance_session(session, 12)
 
 
 def test_a_run_that_nobody_touched_is_saved_byte_for_byte_as_run_does(tmp_path: Path) -> None:
     from robocov.mapfile import load_map
 
-    session = stepped(begun(RAPF, environment=load_map("rooms"), robots=6), 30)
+    session = advance_session(start_session(RAPF, environment=load_map("rooms"), robots=6), 30)
     plain = ["run", "rooms", "--duration", "0.5", *SMALL, "--out", str(tmp_path / "plain")]
     assert main(plain) == 0
     assert main(["run", saved(session, tmp_path), *SMALL, "--out", str(tmp_path / "again")]) == 0
@@ -129,27 +129,27 @@ def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) ->
 
 
 def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
-    session = stepped(begun(RAPF), 6)
+    session = advance_session(start_session(RAPF), 6)
     session.playback.is_playing = True
     for k in range(6):
         session.drag_robot(2, (3.0 + 0.1 * k, 3.0))
         session.playback.advance(1 / 60)
     session.release()
-    stepped(session, 6)
+    advance_session(session, 6)
     (part,) = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
-    record = record_of(session)
+    record = build_record(session)
     assert part.begin == 0 and len(record) == 19
     (touch,) = record.session["touched"]
     assert touch["robots"] == [2] and touch["from_s"] == pytest.approx(0.1)
     assert record.session["repeatable"] is False
-    assert same_arrays(record, record_of(session))
+    assert have_same_arrays(record, build_record(session))
 
 
 def test_what_was_plotted_is_there_again(tmp_path: Path) -> None:
-    session = begun(RAPF)
-    with_curves(session, 200)
+    session = start_session(RAPF)
+    advance_with_costs(session, 200)
     session.fail_robot(1)
-    with_curves(session, 30)
+    advance_with_costs(session, 30)
     again = Session.open(load_session(Path(saved(session, tmp_path))))
     curve = again.timeline.panes[0].distance_curve
     assert 30 < len(curve) <= 61 and curve.last_time == pytest.approx(229 / 60, abs=1e-3)
@@ -189,10 +189,10 @@ def test_a_run_is_saved_by_another_process_and_nothing_else_stays(
 
 
 def test_a_robot_that_is_put_elsewhere_does_not_travel_there() -> None:
-    session = stepped(begun(RAPF), 12)
+    session = advance_session(start_session(RAPF), 12)
     session.apply(PlaceRobot(2, (5.0, 3.0)), "hand", "robot 2 placed")
-    stepped(session, 12)
-    record = record_of(session)
+    advance_session(session, 12)
+    record = build_record(session)
     assert len(record) == 25
     (placed,) = record.session["placed"]
     assert placed["robots"] == [2] and placed["time_s"] == pytest.approx(0.2)

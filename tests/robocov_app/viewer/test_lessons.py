@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import opened
-from touched_run import begun, stepped
+from sample_sessions import advance_session, start_session
 
 from robocov.errors import MapError
 from robocov_app.cli import main
@@ -27,11 +27,11 @@ assert LESSON is not None
 
 def short(tmp_path: Path, **changes: object) -> Path:
     """A lesson of two chapters: a robot fails; what comes then is asked, and a robot is to be dragged."""
-    session = stepped(begun(), 20)
+    session = advance_session(start_session(), 20)
     session.fail_robot(2)
-    stepped(session, 20)
+    advance_session(session, 20)
     session.restart(start="far")
-    stepped(session, 10)
+    advance_session(session, 10)
     content = json.loads(
         format_session(
             build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
@@ -66,7 +66,7 @@ def test_every_chapter_of_the_lesson_ends() -> None:
 
 def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, capsys) -> None:
     with opened(tmp_path) as driver:
-        stepped(driver.session, 10).fail_robot(3)
+        advance_session(driver.session, 10).fail_robot(3)
         before = driver.viewer.session
         driver.window._patient = False
         driver.window.start_lesson(short(tmp_path))
@@ -216,13 +216,13 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_a_script_goes_the_same_way_bit_for_bit() -> None:
-    session = stepped(begun(), 10)
+    session = advance_session(start_session(), 10)
     session.playback.is_playing = True
     for k in range(10):
         session.drag_robot(2, (3.0 + 0.05 * k, 3.0))
         session.playback.advance(1 / 60)
     session.release()
-    stepped(session, 10)
+    advance_session(session, 10)
     end, went = session.timeline.step, session.timeline.panes[0].simulation.positions.copy()
     twin = Session(session.timeline.document.nodes[0].scenario)
     twin.timeline.document, twin.timeline.head = session.timeline.document, session.timeline.document.nodes[0]

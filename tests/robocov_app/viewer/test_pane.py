@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from touched_run import HALL, LLOYD, RAPF, RPF
+from sample_sessions import HALL, LLOYD, RAPF, RPF
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import do, typed
-from touched_run import HALL, LLOYD, RAPF, RPF, all_told, viewer_of
+from sample_sessions import HALL, LLOYD, RAPF, RPF, build_presenter, describe_state
 
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.viewer.session.clock import SPEEDS
@@ -18,7 +18,7 @@ from robocov_app.viewer.session.scenario import MAX_ROBOTS
 
 
 def test_pausing_playing_and_single_steps() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "pause")
     assert viewer.session.playback.is_playing
     do(viewer, "step")
@@ -28,7 +28,7 @@ def test_pausing_playing_and_single_steps() -> None:
 
 
 def test_settling_plays_until_asked_again() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "settle")
     assert viewer.session.playback.is_playing and viewer.session.playback.stop_when_settled
     do(viewer, "pause")
@@ -39,7 +39,7 @@ def test_settling_plays_until_asked_again() -> None:
 
 
 def test_speeds_go_by_steps_and_stop_at_both_ends() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     seen = [viewer.session.playback.clock.speed]
     for _ in SPEEDS:
         do(viewer, "faster")
@@ -52,7 +52,7 @@ def test_speeds_go_by_steps_and_stop_at_both_ends() -> None:
 
 
 def test_a_typed_speed_between_the_steps_goes_on_to_the_next_of_them() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     typed(viewer, "speed 3.3")
     assert viewer.session.playback.clock.speed == 3.3
     do(viewer, "faster")
@@ -60,7 +60,7 @@ def test_a_typed_speed_between_the_steps_goes_on_to_the_next_of_them() -> None:
 
 
 def test_restarting_keeps_controller_and_gains() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     typed(viewer, "k_rep 2")
     do(viewer, "step")
     do(viewer, "restart")
@@ -68,7 +68,7 @@ def test_restarting_keeps_controller_and_gains() -> None:
 
 
 def test_another_seed_gives_other_starts_and_another_start_too() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     places = [viewer.session.displayed.get_positions(viewer.pane).copy()]
     for action in ("seed:next", "start:next", "start:next"):
         do(viewer, action)
@@ -81,7 +81,7 @@ def test_another_seed_gives_other_starts_and_another_start_too() -> None:
 
 
 def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_on() -> None:
-    viewer = viewer_of(start="far")
+    viewer = build_presenter(start="far")
     viewer.tools["circle"].press(viewer.session, (5.2, 3.2), 0.1, None)
     viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (5.2, 3.75)))
     assert viewer.message.endswith("it covers the start far") and "far" not in viewer.starts()
@@ -91,7 +91,7 @@ def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_o
 
 
 def test_more_and_fewer_robots() -> None:
-    viewer = viewer_of(robots=2)
+    viewer = build_presenter(robots=2)
     do(viewer, "more")
     assert viewer.session.timeline.scenario.robots == 3 and len(viewer.session.displayed.numbers) == 3
     for _ in range(3):
@@ -101,18 +101,18 @@ def test_more_and_fewer_robots() -> None:
 
 
 def test_robots_without_room_are_told_and_nothing_changes() -> None:
-    viewer = viewer_of()
-    before = all_told(viewer.session)
+    viewer = build_presenter()
+    before = describe_state(viewer.session)
     viewer.attempt(lambda: typed(viewer, "robots 900"))
     assert viewer.trouble and "room" in viewer.message
-    assert all_told(viewer.session) == before
+    assert describe_state(viewer.session) == before
 
 
 # maps
 
 
 def test_maps_are_turned_through_both_ways() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     typed(viewer, "map rooms")
     names = list(list_bundled_maps())
     do(viewer, "map:next")
@@ -125,7 +125,7 @@ def test_maps_are_turned_through_both_ways() -> None:
 
 
 def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     (tmp_path / "x.json").write_text("{")
     for name in ("nowhere", str(tmp_path / "x.json"), str(tmp_path)):
         viewer.attempt(lambda name=name: viewer.open_map(name))
@@ -135,14 +135,14 @@ def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> N
 
 
 def test_an_own_map_is_offered_beside_the_bundled_ones() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     assert viewer.maps() == [*list_bundled_maps(), "hall"]
     typed(viewer, "map square")
     assert viewer.maps() == list(list_bundled_maps())
 
 
 def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> None:
-    viewer = viewer_of(folder=tmp_path)
+    viewer = build_presenter(folder=tmp_path)
     viewer.tools["circle"].press(viewer.session, (1.0, 3.0), 0.1, None)
     viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (1.3, 3.0)))
     assert viewer.message.startswith("circle drawn")
@@ -156,7 +156,7 @@ def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> Non
 
 def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    viewer = viewer_of(folder=tmp_path / "file")
+    viewer = build_presenter(folder=tmp_path / "file")
     do(viewer, "save:map")
     assert viewer.trouble and viewer.map_name == "hall"
 
@@ -165,7 +165,7 @@ def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
 
 
 def test_looking_back_and_forth() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     for _ in range(120):
         do(viewer, "step")
     session = viewer.session
@@ -183,7 +183,7 @@ def test_looking_back_and_forth() -> None:
 
 
 def test_branching_goes_on_from_the_past_and_at_the_present_says_how() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     for _ in range(30):
         do(viewer, "step")
     do(viewer, "branch:here")
@@ -201,7 +201,7 @@ def test_branching_goes_on_from_the_past_and_at_the_present_says_how() -> None:
 
 
 def test_panes_come_with_controllers_that_are_not_there_yet_and_go() -> None:
-    viewer = viewer_of(RPF)
+    viewer = build_presenter(RPF)
     for count in (2, 3, 4):
         do(viewer, "pane:add")
         assert len(viewer.session.timeline.panes) == count and viewer.active == count - 1
@@ -220,14 +220,14 @@ def test_panes_come_with_controllers_that_are_not_there_yet_and_go() -> None:
 
 
 def test_the_chosen_pane_is_one_that_there_is() -> None:
-    viewer = viewer_of(RAPF, RPF)
+    viewer = build_presenter(RAPF, RPF)
     viewer.active = 1
     viewer.session.remove_pane(viewer.session.timeline.panes[1])
     assert viewer.pane is viewer.session.timeline.panes[0] and viewer.active == 0
 
 
 def test_controllers_take_turns() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     seen = []
     for _ in range(len(viewer.laws)):
         seen.append(viewer.pane.controller.name)
@@ -236,7 +236,7 @@ def test_controllers_take_turns() -> None:
 
 
 def test_choosing_the_controller_that_is_there_keeps_its_gains() -> None:
-    viewer = viewer_of(RAPF, RPF)
+    viewer = build_presenter(RAPF, RPF)
     typed(viewer, "k_rep 2")
     viewer.set_law(0, "rapf")
     assert viewer.session.timeline.panes[0].controller.get_value("k_rep") == 2.0
@@ -248,7 +248,7 @@ def test_choosing_the_controller_that_is_there_keeps_its_gains() -> None:
 
 
 def test_asking_goes_round_all_robots_also_those_that_failed() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     viewer.session.fail_robot(2)
     seen = []
     for _ in range(4):
@@ -260,7 +260,7 @@ def test_asking_goes_round_all_robots_also_those_that_failed() -> None:
 
 
 def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     for action in ("robot:fail", "robot:remove"):
         viewer.trouble = False
         do(viewer, action)
@@ -275,7 +275,7 @@ def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
 
 
 def test_undo_says_what_began_anew_and_the_map_has_its_name_again() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "more")
     viewer.open_map("square")
     viewer.add_pane()
@@ -293,7 +293,7 @@ def test_undo_says_what_began_anew_and_the_map_has_its_name_again() -> None:
 
 
 def test_undo_and_redo_say_what_they_did() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "undo")
     assert viewer.message == "nothing to undo"
     do(viewer, "redo")
@@ -315,7 +315,7 @@ def test_undo_and_redo_say_what_they_did() -> None:
 
 
 def test_another_tool_gives_up_what_was_begun_and_says_how_it_works() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "tool:polygon")
     assert viewer.message == f"Polygon: {viewer.tool.hint}"
     viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
@@ -327,7 +327,7 @@ def test_another_tool_gives_up_what_was_begun_and_says_how_it_works() -> None:
 
 
 def test_cancelling_first_gives_up_then_puts_the_tool_away() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "tool:wall")
     viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
     do(viewer, "cancel")
@@ -337,7 +337,7 @@ def test_cancelling_first_gives_up_then_puts_the_tool_away() -> None:
 
 
 def test_walls_become_wider_and_narrower() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "wider")
     assert viewer.message == "walls are 0.125 m wide"
     do(viewer, "narrower")

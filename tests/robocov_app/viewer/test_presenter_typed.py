@@ -9,7 +9,7 @@ import pytest
 from driven_window import do, listed, typed
 from hypothesis import given
 from hypothesis import strategies as st
-from touched_run import RAPF, RPF, all_told, begun, viewer_of
+from sample_sessions import RAPF, RPF, build_presenter, describe_state, start_session
 
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov_app.terminal.output import find_free_path
@@ -21,7 +21,7 @@ from robocov_app.viewer.session.scenario import MAX_ROBOTS
 
 
 def test_layers_theme_fading_and_panel_are_switched() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     do(viewer, "layer:cells")
     do(viewer, "layer:scan")
     assert viewer.shown == {"robots", "scan"}
@@ -38,7 +38,7 @@ def test_layers_theme_fading_and_panel_are_switched() -> None:
 
 
 def test_messages_stay_for_a_while() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     viewer.say("hello")
     viewer.pass_time(SAID_FOR - 0.1)
     assert viewer.message == "hello"
@@ -47,14 +47,14 @@ def test_messages_stay_for_a_while() -> None:
 
 
 def test_trouble_is_told_without_the_places_in_files() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     viewer.attempt(lambda: viewer.set_parameter("team.radius", -1.0))
     assert viewer.trouble and viewer.message.startswith("radius: ")
     assert plain("obstacles: too many") == "too many"
 
 
 def test_a_new_map_is_told_to_the_cost() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     told = []
     viewer.costs.environment = told.append  # type: ignore[method-assign]
     do(viewer, "step")
@@ -67,7 +67,7 @@ def test_a_new_map_is_told_to_the_cost() -> None:
 
 
 def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
-    viewer = viewer_of(RAPF, RPF)
+    viewer = build_presenter(RAPF, RPF)
     viewer.active = 1
     viewer.set_parameter("k_rep", 1.5)
     viewer.set_parameter("team.max_speed", 0.7)
@@ -81,7 +81,7 @@ def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
 
 
 def test_no_limit_can_be_set_where_there_may_be_none() -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     typed(viewer, "sensing_range none")
     assert viewer.pane.setup.properties.sensing_range == math.inf
     with pytest.raises(ParameterError, match="expected a number"):
@@ -93,13 +93,13 @@ def test_no_limit_can_be_set_where_there_may_be_none() -> None:
 
 @pytest.mark.parametrize("text", ["k_rep 0.5", "k_rep=0.5", " k_rep  =  0.5 ", "k_rep 0,5"])
 def test_gains_can_be_typed(text: str) -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     typed(viewer, text)
     assert viewer.pane.controller.get_value("k_rep") == 0.5
 
 
 def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
-    viewer = viewer_of(folder=tmp_path)
+    viewer = build_presenter(folder=tmp_path)
     typed(viewer, "robots 4")
     typed(viewer, "seed 7")
     typed(viewer, "start far")
@@ -137,7 +137,7 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
         "    def force(self, own):\n"
         "        return np.zeros(2)\n"
     )
-    viewer = viewer_of()
+    viewer = build_presenter()
     typed(viewer, f"controller {mine}:Still")
     assert viewer.laws[-1] == f"{mine}:Still" == viewer.pane.controller.name
     viewer.session.playback.step()
@@ -193,24 +193,29 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
     ],
 )
 def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> None:
-    viewer = viewer_of()
+    viewer = build_presenter()
     for _ in range(3):
         viewer.session.playback.step()
-    before = all_told(viewer.session), viewer.map_name, viewer.hand.selected, list(viewer.laws)
+    before = describe_state(viewer.session), viewer.map_name, viewer.hand.selected, list(viewer.laws)
     viewer.attempt(lambda: typed(viewer, text))
     assert viewer.trouble, text
     assert viewer.message and "\n" not in viewer.message and "Traceback" not in viewer.message
-    assert (all_told(viewer.session), viewer.map_name, viewer.hand.selected, list(viewer.laws)) == before
+    assert (
+        describe_state(viewer.session),
+        viewer.map_name,
+        viewer.hand.selected,
+        list(viewer.laws),
+    ) == before
 
 
 def test_a_slip_of_the_finger_is_answered_with_what_was_meant() -> None:
     with pytest.raises(InputError, match="robots"):
-        typed(viewer_of(), "robts 3")
+        typed(build_presenter(), "robts 3")
 
 
 @given(st.text(max_size=12))
 def test_no_text_is_too_odd(text: str) -> None:
-    viewer = Presenter(begun(robots=1), Costs(2, direct=True), set(), Path(), "hall")
+    viewer = Presenter(start_session(robots=1), Costs(2, direct=True), set(), Path(), "hall")
     try:
         typed(viewer, text)
     except RobocovError as error:

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_run import run_of
-from kept_run import COUNTING, record_of, records_of, same_arrays
-from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
+from sample_sessions import HALL, LLOYD, RAPF, RPF, advance_session, start_session
+from session_records import COUNTING, build_record, build_records, have_same_arrays
 
 from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
@@ -37,7 +37,7 @@ def replayed(*records: Record, controllers: tuple[str, ...] = ()) -> Session:
 
 
 def recorded(*laws: ControllerChoice, steps: int = STEPS, robots: int = 4, **changes) -> Record:
-    return record_of(stepped(begun(*laws, robots=robots, **changes), steps))
+    return build_record(advance_session(start_session(*laws, robots=robots, **changes), steps))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_where_it_went_and_what_it_sensed_is_there(record: Record) -> None:
     assert times[-1] == pytest.approx(0.5, abs=1 / 30)
     np.testing.assert_array_equal(places[-1], record.positions[round(times[-1] * 60)])
     np.testing.assert_array_equal(pane.starts, record.positions[0])
-    live = stepped(begun(robots=4), STEPS).timeline.panes[0]
+    live = advance_session(start_session(robots=4), STEPS).timeline.panes[0]
     np.testing.assert_array_equal(pane.sensed.until(0.9)[0], live.sensed.until(0.9)[0])
 
 
@@ -116,7 +116,7 @@ def test_the_curve_is_that_of_the_file(record: Record) -> None:
 def test_one_moment_is_the_present(record: Record) -> None:
     session = replayed(recorded(steps=0))
     assert session.timeline.is_live
-    stepped(session, 5)
+    advance_session(session, 5)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[5])
 
 
@@ -127,7 +127,7 @@ def test_one_moment_is_the_present(record: Record) -> None:
     "law", [RAPF, LLOYD, ControllerChoice("rpf", {"k_rep": 1.0})], ids=lambda law: law.name
 )
 def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: ControllerChoice) -> None:
-    whole = stepped(begun(law, robots=8, start="spread"), 2 * STEPS)
+    whole = advance_session(start_session(law, robots=8, start="spread"), 2 * STEPS)
     session = replayed(recorded(law, robots=8, start="spread"))
     session.playback.is_playing = True
     for _ in range(STEPS + 5):
@@ -142,8 +142,8 @@ def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: ControllerCho
     assert session.timeline.end_time == whole.timeline.end_time
     for mine, theirs in zip(state_of(session), state_of(whole), strict=True):
         np.testing.assert_array_equal(mine, theirs)
-    assert same_arrays(record_of(session), record_of(whole))
-    assert record_of(session).session == {}
+    assert have_same_arrays(build_record(session), build_record(whole))
+    assert build_record(session).session == {}
 
 
 def test_it_can_be_gone_on_from_any_moment(record: Record) -> None:
@@ -151,7 +151,7 @@ def test_it_can_be_gone_on_from_any_moment(record: Record) -> None:
     session.show_time(0.4)
     assert session.branch()
     assert session.timeline.end_time == pytest.approx(0.4)
-    stepped(session, STEPS - 24)
+    advance_session(session, STEPS - 24)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
 
 
@@ -162,7 +162,7 @@ def test_it_can_be_touched_at_any_moment(record: Record) -> None:
     session.fail_robot(2)
     assert session.timeline.is_live
     assert session.displayed.numbers == (1, 3, 4)
-    stepped(session, 10)
+    advance_session(session, 10)
     assert session.timeline.head.parent is not None
 
 
@@ -170,7 +170,7 @@ def test_it_begins_anew_where_it_began(record: Record) -> None:
     session = replayed(record)
     session.show_time(0.5)
     session.restart()
-    stepped(session, STEPS)
+    advance_session(session, STEPS)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
     session.restart(seed=7)
     np.testing.assert_array_equal(state_of(session)[0], HALL.start("corner").sample(4, seed=7, radius=0.1))
@@ -180,10 +180,10 @@ def test_it_begins_anew_where_it_began(record: Record) -> None:
 
 
 def test_a_part_of_a_session_comes_back_with_its_numbers_and_wrecks() -> None:
-    before = stepped(begun(robots=4), 30)
+    before = advance_session(start_session(robots=4), 30)
     before.fail_robot(2)
-    stepped(before, 30)
-    session = replayed(record_of(before))
+    advance_session(before, 30)
+    session = replayed(build_record(before))
     there = session.displayed.get_setup(session.timeline.panes[0])
     assert session.displayed.numbers == (1, 3, 4)
     assert list(there.failed) == [2]
@@ -192,20 +192,20 @@ def test_a_part_of_a_session_comes_back_with_its_numbers_and_wrecks() -> None:
     session.show_time(session.timeline.end_time)
     for one in (before, session):
         one.revive_robot(2)
-        stepped(one, 20)
+        advance_session(one, 20)
     assert sorted(session.displayed.numbers) == [1, 2, 3, 4]
     assert session.displayed.numbers == before.displayed.numbers
     np.testing.assert_array_equal(state_of(session)[0], state_of(before)[0])
 
 
 def test_who_moved_at_the_beginning_moves_when_it_begins_anew() -> None:
-    before = stepped(begun(robots=4), 30)
+    before = advance_session(start_session(robots=4), 30)
     before.set_controller(before.timeline.panes[0], LLOYD)
-    record = record_of(stepped(before, 30))
+    record = build_record(advance_session(before, 30))
     session = replayed(record)
     assert session.timeline.scenario.start is None
     session.restart()
-    stepped(session, 30)
+    advance_session(session, 30)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
     session.restart(robots=2)
     assert not state_of(session)[1].any(), "other robots begin at rest"
@@ -221,11 +221,11 @@ def test_a_record_with_moments_missing_goes_on_at_the_old_pace(record: Record) -
     session = replayed(coarse)
     assert session.timeline.history.steps[:3] == [0, 4, 8]
     session.show_time(session.timeline.end_time)
-    stepped(session, 12)
+    advance_session(session, 12)
     assert session.timeline.end_time == pytest.approx(1.2)
     session.show_time(0.4)
     session.branch()
-    stepped(session, STEPS - 24)
+    advance_session(session, STEPS - 24)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
 
 
@@ -237,7 +237,7 @@ def test_a_thinned_record_goes_on_at_its_own_pace(record: Record) -> None:
     session.show_time(12 * record.dt)
     session.branch()
     np.testing.assert_array_equal(state_of(session)[0], record.positions[12])
-    stepped(session, STEPS - 12)
+    advance_session(session, STEPS - 12)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
     # as one that was thinned before and is thinned again
     again = replayed(record.thin(rate).thin(rate / 3))
@@ -275,23 +275,23 @@ def test_hands_are_told_of(record: Record) -> None:
 
 
 def test_a_comparison_is_side_by_side() -> None:
-    before = stepped(begun(RAPF, RPF, LLOYD), STEPS)
-    records = records_of(before)
+    before = advance_session(start_session(RAPF, RPF, LLOYD), STEPS)
+    records = build_records(before)
     session = replayed(*records)
     assert [pane.controller.name for pane in session.timeline.panes] == ["rapf", "rpf", "lloyd"]
     session.show_time(0.5)
     for pane, record in zip(session.timeline.panes, records, strict=True):
         np.testing.assert_array_equal(session.displayed.get_positions(pane), record.positions[30])
     session.branch()
-    stepped(session, 30)
+    advance_session(session, 30)
     for pane, record in zip(session.timeline.panes, records, strict=True):
         np.testing.assert_array_equal(pane.simulation.positions, record.positions[-1])
 
 
 def test_robots_that_failed_at_different_places_stay_there() -> None:
-    before = stepped(begun(RAPF, LLOYD), 30)
+    before = advance_session(start_session(RAPF, LLOYD), 30)
     before.fail_robot(1)
-    records = records_of(stepped(before, 10))
+    records = build_records(advance_session(before, 10))
     session = replayed(*records)
     for pane, other in zip(session.timeline.panes, before.timeline.panes, strict=True):
         assert session.displayed.get_setup(pane).failed == other.setup.failed
@@ -366,7 +366,7 @@ def test_at_its_end_another_controller_may_take_over(counting: ControllerChoice)
     session = replayed(record)
     session.show_time(session.timeline.end_time)
     session.set_controller(session.timeline.panes[0], RAPF)
-    stepped(session, 10)
+    advance_session(session, 10)
     assert session.timeline.end_time == pytest.approx(1.0 + 10 / 60)
 
 
@@ -400,16 +400,16 @@ def test_a_controller_that_has_changed_does_not_change_the_past(
     session.show_time(0.5)
     np.testing.assert_array_equal(session.displayed.get_snapshot(pane).decision.forces, record.forces[30])
     session.branch()
-    assert stepped(session, 5).timeline.end_time == pytest.approx(0.5 + 5 / 60)
+    assert advance_session(session, 5).timeline.end_time == pytest.approx(0.5 + 5 / 60)
 
 
 def test_a_controller_remembers_again_what_it_did(counting: ControllerChoice) -> None:
-    whole = stepped(begun(counting, robots=4), STEPS + 20)
+    whole = advance_session(start_session(counting, robots=4), STEPS + 20)
     record = replace(recorded(counting), controller="elsewhere/theirs.py:Counting")
     session = replayed(record, controllers=("lloyd", counting.name))
     session.show_time(0.5)
     session.branch()
-    stepped(session, STEPS + 20 - 30)
+    advance_session(session, STEPS + 20 - 30)
     np.testing.assert_array_equal(state_of(session)[0], state_of(whole)[0])
 
 

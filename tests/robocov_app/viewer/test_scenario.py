@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from touched_run import HALL, LLOYD, RAPF, RPF
+from sample_sessions import HALL, LLOYD, RAPF, RPF
 
 from robocov.controllers import make_controller
 from robocov.errors import ParameterError, StartError

@@ -2,19 +2,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from touched_run import (
+from sample_sessions import (
     HALL,
     LLOYD,
     PILLAR,
     RAPF,
     RPF,
-    all_told,
-    begun,
-    positions_of,
-    robots_of,
-    stepped,
-    too_deep,
-    with_pillar,
+    add_pillar,
+    advance_session,
+    compute_penetration,
+    describe_state,
+    get_positions,
+    get_robot_numbers,
+    start_session,
 )
 
 from robocov.environment import CircleObstacle, Environment
@@ -29,9 +29,9 @@ from robocov_app.viewer.session.session import Session
 
 
 def test_it_begins_anew_as_it_began():
-    session = begun(RAPF, LLOYD)
+    session = start_session(RAPF, LLOYD)
     start = session.displayed.get_positions(session.timeline.panes[0]).copy()
-    stepped(session, 20)
+    advance_session(session, 20)
     session.fail_robot(1)
     session.add_robot((3.0, 3.0))
     serial = session.timeline.past_version
@@ -42,30 +42,30 @@ def test_it_begins_anew_as_it_began():
         [0],
         True,
     )
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     for pane in session.timeline.panes:
         np.testing.assert_array_equal(session.displayed.get_positions(pane), start)
     assert list(session.timeline.events) == list(session.timeline.ghosts) == []
     assert session.undo() == "restarted"
-    assert robots_of(session) == ((2, 3, 4), (1,)) and session.displayed.time == 20 / 60
+    assert get_robot_numbers(session) == ((2, 3, 4), (1,)) and session.displayed.time == 20 / 60
 
 
 def test_everything_can_be_undone_to_the_first_moment_also_restarts() -> None:
-    session = begun()
+    session = start_session()
     session.edit_map(
         add_obstacle(session.displayed.environment, CircleObstacle((5.2, 0.4), 0.2)), "circle drawn"
     )
     session.add_robot((3.4, 3.0))
     session.restart(seed=3)
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     assert [session.undo() for _ in range(4)] == ["seed 3", "robot 4 joined", "circle drawn", None]
     assert session.displayed.environment is HALL and session.timeline.head.parent is None
     assert [session.redo() for _ in range(4)] == ["circle drawn", "robot 4 joined", "seed 3", None]
-    assert session.timeline.scenario.seed == 3 and robots_of(session) == ((1, 2, 3), ())
+    assert session.timeline.scenario.seed == 3 and get_robot_numbers(session) == ((1, 2, 3), ())
 
 
 def test_it_begins_anew_with_changes():
-    session = begun(RAPF)
+    session = start_session(RAPF)
     session.restart(robots=5)
     assert session.displayed.numbers == (1, 2, 3, 4, 5)
     session.restart(start="far", seed=4)
@@ -83,10 +83,10 @@ def test_it_begins_anew_with_changes():
 
 
 def test_what_was_chosen_stays_chosen():
-    session = begun(RAPF, RPF)
+    session = start_session(RAPF, RPF)
     session.set_controller(session.timeline.panes[0], LLOYD)
     session.set_properties(RobotProperties(radius=0.2))
-    session.edit_map(with_pillar(), "circle drawn")
+    session.edit_map(add_pillar(), "circle drawn")
     session.restart()
     assert [pane.controller for pane in session.timeline.panes] == [LLOYD, RPF]
     assert session.timeline.panes[0].setup.properties == RobotProperties(radius=0.2)
@@ -94,10 +94,10 @@ def test_what_was_chosen_stays_chosen():
 
 
 def test_also_while_the_past_is_looked_at():
-    session = stepped(begun(RAPF), 10)
-    session.edit_map(with_pillar(), "circle drawn")
+    session = advance_session(start_session(RAPF), 10)
+    session.edit_map(add_pillar(), "circle drawn")
     session.set_controller(session.timeline.panes[0], LLOYD)
-    stepped(session, 10)
+    advance_session(session, 10)
     session.show_time(0.0)
     assert session.displayed.environment is HALL
     session.restart()
@@ -106,7 +106,7 @@ def test_also_while_the_past_is_looked_at():
 
 
 def test_a_start_that_was_covered_is_not_gone_back_to():
-    session = begun(start="far")
+    session = start_session(start="far")
     session.edit_map(add_obstacle(HALL, CircleObstacle((5.2, 3.2), 0.6)), "circle drawn")
     assert "far" not in session.displayed.environment.starts
     session.restart()
@@ -116,7 +116,7 @@ def test_a_start_that_was_covered_is_not_gone_back_to():
 
 def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
     given_starts = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 3.0]])
-    session = stepped(begun(given_starts=given_starts), 10)
+    session = advance_session(start_session(given_starts=given_starts), 10)
     session.restart(controllers=(RPF,))
     np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[0]), given_starts)
     session.restart(seed=1)
@@ -137,20 +137,20 @@ def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
     ],
 )
 def test_what_cannot_be_begun_leaves_all_as_it_is(changes):
-    session = stepped(begun(RAPF, LLOYD), 12)
+    session = advance_session(start_session(RAPF, LLOYD), 12)
     session.fail_robot(2)
     session.show_time(0.1)
-    before = all_told(session)
+    before = describe_state(session)
     with pytest.raises((StartError, ParameterError)):
         session.restart(**changes)
-    assert all_told(session) == before
+    assert describe_state(session) == before
 
 
 # controllers and limits
 
 
 def test_another_controller_takes_over_in_one_pane():
-    session = stepped(begun(RAPF, RAPF), 20)
+    session = advance_session(start_session(RAPF, RAPF), 20)
     session.set_controller(session.timeline.panes[1], LLOYD)
     assert [pane.controller for pane in session.timeline.panes] == [RAPF, LLOYD]
     assert session.timeline.scenario.controllers == (RAPF, LLOYD)
@@ -158,23 +158,23 @@ def test_another_controller_takes_over_in_one_pane():
     session.set_controller(session.timeline.panes[0], RAPF.with_gain("k_rep", 0.5))
     assert session.timeline.events[-1].text == "RAPF: k_rep = 0.5"
     assert len(session.timeline.history) == 21
-    stepped(session, 20)
+    advance_session(session, 20)
 
 
 def test_the_same_controller_again_is_no_event():
-    session = stepped(begun(RAPF), 10)
+    session = advance_session(start_session(RAPF), 10)
     session.show_time(0.0)
-    before = all_told(session)
+    before = describe_state(session)
     session.set_controller(session.timeline.panes[0], ControllerChoice("rapf"))
     session.set_properties(RobotProperties())
-    assert all_told(session) == before
+    assert describe_state(session) == before
 
 
 def test_what_was_then_counts_not_what_is_now():
-    session = stepped(begun(), 20)
+    session = advance_session(start_session(), 20)
     session.set_properties(RobotProperties(max_speed=0.5))
     session.set_controller(session.timeline.panes[0], LLOYD)
-    stepped(session, 20)
+    advance_session(session, 20)
     session.show_time(0.1)
     session.set_properties(RobotProperties(max_speed=0.5))
     assert session.timeline.is_live
@@ -184,35 +184,35 @@ def test_what_was_then_counts_not_what_is_now():
 
 
 def test_limits_are_those_of_all():
-    session = stepped(begun(RAPF, LLOYD), 20)
+    session = advance_session(start_session(RAPF, LLOYD), 20)
     session.set_properties(RobotProperties(max_speed=0.3, communication_range=0.5))
     for pane in session.timeline.panes:
         assert pane.simulation.team.max_speed.tolist() == [0.3] * 3
         assert not pane.simulation.observe_and_decide().seen.neighbors.is_complete
     assert session.timeline.events[-1].kind == "limits"
-    before = all_told(session)
+    before = describe_state(session)
     for limits in (RobotProperties(max_speed=0.0), RobotProperties(radius=1.9)):
         with pytest.raises((ParameterError, StartError)):
             session.set_properties(limits)
-        assert all_told(session) == before
+        assert describe_state(session) == before
 
 
 def test_larger_robots_make_room_for_each_other():
-    session = begun(robots=6)
+    session = start_session(robots=6)
     session.set_properties(RobotProperties(radius=0.3))
     places = session.displayed.get_positions(session.timeline.panes[0])
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     assert apart[np.triu_indices(6, 1)].min() >= 0.6
-    assert too_deep(session) <= 0.0
+    assert compute_penetration(session) <= 0.0
 
 
 def test_unicycles_go_on_from_any_moment_bit_for_bit() -> None:
-    session = begun(RAPF, properties=RobotProperties(track_width=0.16))
-    stepped(session, 60)
-    wanted, steering = positions_of(session), session.timeline.panes[0].simulation.steering
+    session = start_session(RAPF, properties=RobotProperties(track_width=0.16))
+    advance_session(session, 60)
+    wanted, steering = get_positions(session), session.timeline.panes[0].simulation.steering
     again = Session(session.timeline.document.nodes[0].scenario)
-    stepped(again, 60)
-    assert [each.tobytes() for each in positions_of(again)] == [each.tobytes() for each in wanted]
+    advance_session(again, 60)
+    assert [each.tobytes() for each in get_positions(again)] == [each.tobytes() for each in wanted]
     state = session.timeline.panes[0].build_state()
     going_on = resume_simulation(state, session.timeline.history.dt, 60)
     session.timeline.panes[0].simulation.step()

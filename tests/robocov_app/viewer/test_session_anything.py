@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
-from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, stepped, too_deep
+from sample_sessions import (
+    HALL,
+    LLOYD,
+    RAPF,
+    RPF,
+    advance_session,
+    compute_penetration,
+    describe_state,
+    get_robot_numbers,
+    start_session,
+)
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
@@ -35,24 +45,24 @@ class Anything(RuleBasedStateMachine):
 
     @initialize(laws=st.lists(laws, min_size=1, max_size=2), robots=st.integers(1, 5), seed=st.integers(0, 9))
     def begin(self, laws, robots, seed):
-        self.session = begun(*laws, robots=robots, seed=seed, start="spread")
+        self.session = start_session(*laws, robots=robots, seed=seed, start="spread")
 
     def attempt(self, touch) -> None:
         """Do something; what is refused leaves everything as it was."""
-        before = all_told(self.session)
+        before = describe_state(self.session)
         try:
             touch()
         except RobocovError as error:
             assert str(error)
-            assert all_told(self.session) == before
+            assert describe_state(self.session) == before
 
     def number(self, k: int) -> int:
-        working, failed = robots_of(self.session)
+        working, failed = get_robot_numbers(self.session)
         return [*working, *failed][k % (len(working) + len(failed))]
 
     @rule(steps=st.integers(1, 12))
     def step(self, steps):
-        stepped(self.session, steps)
+        advance_session(self.session, steps)
 
     @rule(playing=st.booleans())
     def pause(self, playing):
@@ -231,7 +241,7 @@ class Anything(RuleBasedStateMachine):
     @invariant()
     def robots_are_where_there_is_room(self):
         if hasattr(self, "session"):
-            assert too_deep(self.session) < 2e-3
+            assert compute_penetration(self.session) < 2e-3
 
 
 @pytest.mark.slow
@@ -245,7 +255,7 @@ undoable = st.tuples(
 
 
 def touched(session, kind, point, k) -> None:
-    working, failed = robots_of(session)
+    working, failed = get_robot_numbers(session)
     obstacles = len(session.displayed.environment.obstacles)
     if kind == "draw":
         session.edit_map(add_obstacle(session.displayed.environment, CircleObstacle(point, 0.2)), "drawn")
@@ -261,25 +271,25 @@ def touched(session, kind, point, k) -> None:
     elif kind == "revive" and failed:
         session.revive_robot(failed[k % len(failed)])
     else:
-        stepped(session, k)
+        advance_session(session, k)
 
 
 @given(st.lists(undoable, max_size=15))
 @settings(max_examples=25)
 def test_who_takes_all_back_has_the_same_map_and_the_same_robots(touches):
-    session = begun(RAPF, LLOYD)
+    session = start_session(RAPF, LLOYD)
     for touch in touches:
         # the last robot that works; a map that cannot be
         with suppress(ParameterError, MapError):
             touched(session, *touch)
-    end = robots_of(session), session.displayed.environment
+    end = get_robot_numbers(session), session.displayed.environment
     while session.undo() is not None:
         pass
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     assert session.displayed.environment == HALL
     while session.redo() is not None:
         pass
-    assert (robots_of(session), session.displayed.environment) == end
+    assert (get_robot_numbers(session), session.displayed.environment) == end
     assert {pane.numbers for pane in session.timeline.panes} == {session.displayed.numbers}
 
 
@@ -291,12 +301,12 @@ def test_who_takes_all_back_has_the_same_map_and_the_same_robots(touches):
 )
 @settings(max_examples=30)
 def test_however_it_came_so_far_from_there_it_goes_the_same_way_again(touches, controllers, steps, back):
-    session = begun(*controllers)
+    session = start_session(*controllers)
     for touch in touches:
         with suppress(ParameterError, MapError):
             touched(session, *touch)
     since = session.timeline.end_time
-    stepped(session, steps)
+    advance_session(session, steps)
     end, went = session.timeline.end_time, [pane.simulation.positions for pane in session.timeline.panes]
     session.show_time(max(end - back / 60, since))
     session.branch()

@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from touched_run import HALL, LLOYD, RAPF, begun, positions_of, stepped, with_curves
+from sample_sessions import (
+    HALL,
+    LLOYD,
+    RAPF,
+    advance_session,
+    advance_with_costs,
+    get_positions,
+    start_session,
+)
 
 from robocov.conditions import Conditions, Failure, Join
 from robocov.density import Gaussian, Gaussians
@@ -92,7 +100,7 @@ def touched(session: Session, kind: str, point: tuple[float, float], k: int) -> 
             session.restart(seed=k)
         else:
             (session.undo if kind == "undo" else session.redo)()
-    stepped(session, k)
+    advance_session(session, k)
 
 
 def again(session: Session) -> Session:
@@ -119,20 +127,20 @@ def test_every_story_is_made_again_bit_for_bit(story, laws, moving):
     if moving:
         door = CircleObstacle((3.4, 2.0), 0.2, "cart", ObstaclePath(((3.4, 2.0), (3.4, 3.0)), 0.4))
         environment = replace(HALL, obstacles=(*HALL.obstacles, door))
-    session = stepped(begun(*laws, environment=environment, robots=4, start="spread"), 5)
+    session = advance_session(start_session(*laws, environment=environment, robots=4, start="spread"), 5)
     for touch in story:
         touched(session, *touch)
     session.show_time(session.timeline.end_time)
     twin = again(session)
     assert twin.timeline.end_time == session.timeline.end_time
     assert twin.timeline.events == session.timeline.events
-    for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
+    for mine, theirs in zip(get_positions(twin), get_positions(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
     here = session.timeline.head, session.timeline.step
     for branch in session.timeline.document.list_branches():
         session.seek(branch.node)
         twin.seek(twin.timeline.document.nodes[branch.node.number])
-        for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
+        for mine, theirs in zip(get_positions(twin), get_positions(session), strict=True):
             np.testing.assert_array_equal(mine, theirs)
     session.seek(*here)
 
@@ -140,7 +148,7 @@ def test_every_story_is_made_again_bit_for_bit(story, laws, moving):
 @pytest.mark.parametrize("how", ["undo", "branch", "touch"])
 def test_a_run_that_goes_on_amid_a_drag_is_made_again_bit_for_bit(how: str) -> None:
     """What is left of the drag is played as it was; who touches something there has let go."""
-    session = stepped(begun(RAPF), 5)
+    session = advance_session(start_session(RAPF), 5)
     session.playback.is_playing = True
     for k in range(60):
         session.drag_robot(2, (1.0 + k / 20, 2.0))
@@ -151,46 +159,46 @@ def test_a_run_that_goes_on_amid_a_drag_is_made_again_bit_for_bit(how: str) -> N
         session.branch()
     else:
         session.fail_robot(1)
-        stepped(session, 5)
+        advance_session(session, 5)
     if how == "undo":
         session.undo()
-    stepped(session, 80)
+    advance_session(session, 80)
     assert session.timeline.drag is None
     twin = again(session)
-    for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
+    for mine, theirs in zip(get_positions(twin), get_positions(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
 
 def test_all_of_a_gesture_while_paused_is_kept() -> None:
     """Dabs add up; robots that were slowed down by a limit do not become faster with the next."""
-    session = stepped(begun(RAPF), 25)
+    session = advance_session(start_session(RAPF), 25)
     for speed in (1.0, 0.05, 1.0):
         session.set_properties(RobotProperties(max_speed=speed, radius=0.11))
     for x in (1.0, 2.0, 3.0):
         session.paint(((x, 2.0),), 0.7, lowers=False, stroke=1)
-    stepped(session, 20)
-    for mine, theirs in zip(positions_of(again(session)), positions_of(session), strict=True):
+    advance_session(session, 20)
+    for mine, theirs in zip(get_positions(again(session)), get_positions(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
 
 def test_any_density_is_in_the_file_and_out_of_it() -> None:
-    session = stepped(begun(RAPF), 5)
+    session = advance_session(start_session(RAPF), 5)
     for density in (Gaussians((Gaussian((2.0, 2.0), 0.5, 3.0),), 0.2), None):
         session.apply(SetDensity(density), "density", "density changed")
-        stepped(session, 5)
+        advance_session(session, 5)
         twin = again(session)
         assert twin.displayed.environment.density == density
-        np.testing.assert_array_equal(positions_of(twin)[0], positions_of(session)[0])
+        np.testing.assert_array_equal(get_positions(twin)[0], get_positions(session)[0])
 
 
 def test_limits_hold_for_controllers_without_memory_also_when_a_moment_is_resumed() -> None:
-    session = stepped(begun(LLOYD), 5)
+    session = advance_session(start_session(LLOYD), 5)
     session.set_properties(RobotProperties(max_speed=0.5))
-    stepped(session, 10)
+    advance_session(session, 10)
     session.show_time(7 / 60)
     session.branch()
-    stepped(session, 20)
-    for mine, theirs in zip(positions_of(again(session)), positions_of(session), strict=True):
+    advance_session(session, 20)
+    for mine, theirs in zip(get_positions(again(session)), get_positions(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
 
@@ -204,9 +212,9 @@ def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -
         joins=(Join(4, 0.8, (3.0, 3.0)),),
         seed=3,
     )
-    session = stepped(begun(RAPF, robots=4, conditions=conditions), 40)
+    session = advance_session(start_session(RAPF, robots=4, conditions=conditions), 40)
     session.edit_map(add_obstacle(HALL, CircleObstacle((2.0, 3.0), 0.3)), "circle drawn")
-    stepped(session, 40)
+    advance_session(session, 40)
     assert [event.text for event in session.timeline.events] == [
         "robot 2 failed",
         "circle drawn",
@@ -228,13 +236,13 @@ def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -
 
 
 def test_branches_are_a_tree_that_can_be_walked() -> None:
-    session = stepped(begun(RAPF), 10)
+    session = advance_session(start_session(RAPF), 10)
     session.fail_robot(1)
-    with_curves(session, 20)
+    advance_with_costs(session, 20)
     failed = session.timeline.head
     assert session.undo() == "robot 1 failed" and session.displayed.time == 10 / 60
     session.add_robot((3.0, 3.0))
-    with_curves(session, 30)
+    advance_with_costs(session, 30)
     assert [branch.description for branch in session.timeline.document.list_branches()] == [
         "robot 1 failed",
         "robot 4 joined",
@@ -253,12 +261,12 @@ def test_branches_are_a_tree_that_can_be_walked() -> None:
 
 
 def test_branches_of_a_file_are_told_before_anybody_has_been_there(tmp_path: Path) -> None:
-    session = stepped(begun(RAPF), 10)
+    session = advance_session(start_session(RAPF), 10)
     session.fail_robot(1)
-    with_curves(session, 20)
+    advance_with_costs(session, 20)
     session.undo()
     session.add_robot((3.0, 3.0))
-    with_curves(session, 20)
+    advance_with_costs(session, 20)
     path = tmp_path / "story.robocov"
     save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     opened = Session.open(load_session(path))
@@ -269,9 +277,9 @@ def test_branches_of_a_file_are_told_before_anybody_has_been_there(tmp_path: Pat
 
 def test_a_long_way_back_is_made_in_slices(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "SEEK_SLICE_S", 0.0)
-    session = stepped(begun(RAPF), 400)
+    session = advance_session(start_session(RAPF), 400)
     session.fail_robot(1)
-    stepped(session, 5)
+    advance_session(session, 5)
     for node in session.timeline.document.nodes:
         node.cached_states = []
     last, session.timeline.history = session.timeline.history.last, session.timeline.history.copy_until(0)
@@ -289,7 +297,7 @@ def test_a_long_way_back_is_made_in_slices(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_file_is_small_and_says_what_it_is(tmp_path: Path) -> None:
     rooms = load_map("rooms")
-    session = stepped(begun(RAPF, environment=rooms, robots=6), 30)
+    session = advance_session(start_session(RAPF, environment=rooms, robots=6), 30)
     session.playback.is_playing = True
     for k in range(60):
         session.drag_robot(2, (3.0 + 0.01 * k, 2.0))
@@ -330,9 +338,9 @@ def test_a_file_is_small_and_says_what_it_is(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, place, value, words) -> None:
-    session = stepped(begun(RAPF), 10)
+    session = advance_session(start_session(RAPF), 10)
     session.fail_robot(1)
-    stepped(session, 20)
+    advance_session(session, 20)
     content = json.loads(
         format_session(
             build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
@@ -350,9 +358,9 @@ def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, place,
 
 
 def test_what_cannot_be_done_again_is_said_with_the_file_and_the_touch(tmp_path: Path, capsys) -> None:
-    session = stepped(begun(RAPF), 10)
+    session = advance_session(start_session(RAPF), 10)
     session.fail_robot(1)
-    stepped(session, 20)
+    advance_session(session, 20)
     content = json.loads(
         format_session(
             build_session_content(session.timeline.document, session.timeline.head, session.timeline.step, {})
@@ -373,7 +381,7 @@ def test_a_controller_of_ones_own_is_never_run_because_a_file_says_so(tmp_path: 
         "class Mine(rc.Lloyd):\n    label = 'Mine'\n"
     )
     name = f"{mine}:Mine"
-    session = stepped(begun(ControllerChoice(name)), 5)
+    session = advance_session(start_session(ControllerChoice(name)), 5)
     path = tmp_path / "story.robocov"
     save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     with pytest.raises(InputError, match=f"open the session with --controller .*{mine.name}:Mine"):

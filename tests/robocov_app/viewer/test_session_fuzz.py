@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from touched_run import LLOYD, RAPF, begun, positions_of
+from sample_sessions import LLOYD, RAPF, get_positions, start_session
 
 from robocov.conditions import Conditions, Failure
 from robocov.environment import CircleObstacle
@@ -40,7 +40,7 @@ class RandomUser:
             Conditions(delay=0.1, loss=0.2, seed=seed),
             Conditions(failures=(Failure(2, 0.4),), seed=seed),
         ]
-        self.session = begun(
+        self.session = start_session(
             *controllers, robots=4, start="spread", conditions=self.random.choice(conditions)
         )
         self.actions = [
@@ -172,5 +172,5 @@ def assert_same_state(session: Session, other: Session) -> None:
     """Assert that two sessions are in the same state, bit for bit."""
     assert session.timeline.drag == other.timeline.drag
     assert len(session.timeline.panes) == len(other.timeline.panes)
-    for positions, other_positions in zip(positions_of(session), positions_of(other), strict=True):
+    for positions, other_positions in zip(get_positions(session), get_positions(other), strict=True):
         np.testing.assert_array_equal(positions, other_positions)

@@ -5,7 +5,16 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from touched_run import HALL, LLOYD, RAPF, all_told, begun, robots_of, stepped, too_deep
+from sample_sessions import (
+    HALL,
+    LLOYD,
+    RAPF,
+    advance_session,
+    compute_penetration,
+    describe_state,
+    get_robot_numbers,
+    start_session,
+)
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
@@ -51,31 +60,31 @@ def test_the_box_has_every_tool_once():
 
 @pytest.mark.parametrize("name", [*toolbox(), ""])
 def test_a_tool_that_was_not_used_does_nothing(name):
-    tool, session = toolbox().get(name, Tool()), begun()
-    before = all_told(session)
+    tool, session = toolbox().get(name, Tool()), start_session()
+    before = describe_state(session)
     tool.move(session, (1.0, 1.0))
     assert tool.release(session, (1.0, 1.0)) is None
     assert tool.finish(session) is None
     assert not tool.cancel(session)
     assert tool.preview(session) is None
-    assert all_told(session) == before
+    assert describe_state(session) == before
 
 
 class TestHand:
     def test_a_click_chooses_a_robot_and_moves_nothing(self):
-        hand, session = Hand(), begun()
-        before = all_told(session)
+        hand, session = Hand(), start_session()
+        before = describe_state(session)
         x, y = place_of(session, 2)
         assert dragged(hand, session, (x, y), (x + 0.01, y), number=2) is None
         assert hand.selected == 2
         assert not hand.holds
-        assert all_told(session) == before
+        assert describe_state(session) == before
         assert hand.cancel(session)
         assert hand.selected is None
         assert not hand.cancel(session)
 
     def test_it_drags_robots(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         x, y = place_of(session, 2)
         hand.press(session, (x, y), REACH, 2)
         assert hand.holds
@@ -87,7 +96,7 @@ class TestHand:
         assert hand.release(session, (x, y)) is None
 
     def test_it_throws_robots(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
@@ -100,7 +109,7 @@ class TestHand:
         assert session.timeline.events[-1].text == "robot 2 was dragged"
 
     def test_who_gives_up_lets_go(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
@@ -111,7 +120,7 @@ class TestHand:
         assert session.timeline.drag is None
 
     def test_it_drags_robots_that_failed(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         session.fail_robot(2)
         session.playback.is_playing = True
         failed = session.timeline.panes[0].setup.failed
@@ -119,7 +128,7 @@ class TestHand:
         assert session.timeline.panes[0].setup.failed == {2: (3.0, 3.2)}
 
     def test_a_robot_that_is_gone_meanwhile(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
@@ -129,7 +138,7 @@ class TestHand:
         assert session.timeline.drag is None
 
     def test_it_moves_obstacles(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         hand.press(session, (4.2, 1.2), REACH, None)
         assert hand.obstacle == 0
         assert hand.preview(session) is None
@@ -145,15 +154,15 @@ class TestHand:
         assert session.displayed.environment == HALL
 
     def test_a_click_on_an_obstacle_or_the_floor_moves_nothing(self):
-        hand, session = Hand(), begun()
-        before = all_told(session)
+        hand, session = Hand(), start_session()
+        before = describe_state(session)
         assert clicked(hand, session, (4.2, 1.2), (5.5, 3.5)) is None
         hand.press(session, (5.5, 3.5), REACH, None)
         assert not hand.holds
-        assert all_told(session) == before
+        assert describe_state(session) == before
 
     def test_another_map_meanwhile(self):
-        hand, session = Hand(), begun()
+        hand, session = Hand(), start_session()
         hand.press(session, (4.2, 1.2), REACH, None)
         hand.move(session, (4.5, 2.2))
         session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "turned round")
@@ -167,7 +176,7 @@ class TestHand:
         assert session.displayed.environment.obstacles == ()
 
     def test_from_the_past(self):
-        hand, session = Hand(), stepped(begun(), 20)
+        hand, session = Hand(), advance_session(start_session(), 20)
         session.fail_robot(2)
         session.show_time(0.1)
         dragged(hand, session, place_of(session, 1), (3.0, 3.0), number=2)
@@ -180,7 +189,7 @@ class TestPolygon:
     CORNERS = ((3.2, 3.2), (4.2, 3.2), (4.2, 3.8))
 
     def test_enter_closes_it(self):
-        tool, session = Polygon(), begun()
+        tool, session = Polygon(), start_session()
         assert clicked(tool, session, *self.CORNERS) is None
         assert session.displayed.environment is HALL
         assert tool.finish(session) == "polygon drawn"
@@ -189,12 +198,12 @@ class TestPolygon:
         assert tool.finish(session) is None
 
     def test_a_click_on_the_first_corner_closes_it(self):
-        tool, session = Polygon(), begun()
+        tool, session = Polygon(), start_session()
         assert clicked(tool, session, *self.CORNERS, (3.25, 3.2)) == "polygon drawn"
         assert session.displayed.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
 
     def test_it_shows_what_it_would_be(self):
-        tool, session = Polygon(), begun()
+        tool, session = Polygon(), start_session()
         clicked(tool, session, self.CORNERS[0])
         tool.move(session, (3.2, 3.7))
         preview = tool.preview(session)
@@ -206,25 +215,25 @@ class TestPolygon:
         assert tool.preview(session) is None
 
     def test_a_double_click_closes_it_and_is_one_corner(self):
-        tool, session = Polygon(), begun()
+        tool, session = Polygon(), start_session()
         assert clicked(tool, session, *self.CORNERS, self.CORNERS[-1]) == "polygon drawn"
         assert len(session.displayed.environment.obstacles[-1].vertices) == 3
 
     def test_what_is_none_is_refused(self):
-        tool, session = Polygon(), begun()
-        before = all_told(session)
+        tool, session = Polygon(), start_session()
+        before = describe_state(session)
         clicked(tool, session, *self.CORNERS[:2])
         with pytest.raises(MapError, match="three corners"):
             tool.finish(session)
         clicked(tool, session, (3.2, 3.2), (4.2, 3.8), (4.2, 3.2), (3.2, 3.8))
         with pytest.raises(MapError, match="crosses itself"):
             tool.finish(session)
-        assert all_told(session) == before
+        assert describe_state(session) == before
 
 
 class TestWall:
     def test_enter_ends_it(self):
-        tool, session = Wall(), begun()
+        tool, session = Wall(), start_session()
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
         tool.move(session, (3.8, 3.8))
         preview = tool.preview(session)
@@ -237,11 +246,11 @@ class TestWall:
         assert tool.finish(session) is None
 
     def test_a_click_on_the_last_point_ends_it(self):
-        tool, session = Wall(), begun()
+        tool, session = Wall(), start_session()
         assert clicked(tool, session, (3.2, 3.2), (3.2, 3.8), (3.21, 3.8)) == "wall drawn"
 
     def test_a_wall_may_come_round_to_its_first_point(self):
-        tool, session = Wall(), begun()
+        tool, session = Wall(), start_session()
         clicked(tool, session, (3.2, 3.0), (4.0, 3.0), (4.0, 3.8), (3.2, 3.8), (3.2, 3.0))
         assert tool.finish(session) == (
             "wall drawn; 0.5 m² cut off; a gap of 15 cm, too narrow for a robot"  # to the wall above
@@ -249,7 +258,7 @@ class TestWall:
         assert len(session.displayed.environment.obstacles[-1].points) == 5
 
     def test_wider_and_narrower(self):
-        tool, session = Wall(), begun()
+        tool, session = Wall(), start_session()
         tool.widen(session, 1.25)
         assert tool.width == 0.125
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
@@ -261,7 +270,7 @@ class TestWall:
             assert tool.width == end
 
     def test_a_point_is_no_wall(self):
-        tool, session = Wall(), begun()
+        tool, session = Wall(), start_session()
         clicked(tool, session, (3.2, 3.2))
         assert tool.preview(session).obstacle is None
         with pytest.raises(MapError, match="two points that are apart"):
@@ -271,7 +280,7 @@ class TestWall:
 
 class TestCircle:
     def test_it_is_drawn_from_its_middle(self):
-        tool, session = Circle(), begun()
+        tool, session = Circle(), start_session()
         tool.press(session, (3.5, 3.2), REACH, None)
         assert tool.preview(session).obstacle is None
         tool.move(session, (3.5, 3.5))
@@ -282,7 +291,7 @@ class TestCircle:
         assert tool.release(session, (3.5, 3.5)) is None
 
     def test_a_click_is_no_circle(self):
-        tool, session = Circle(), begun()
+        tool, session = Circle(), start_session()
         with pytest.raises(MapError, match="drag from its middle"):
             clicked(tool, session, (3.5, 3.2))
         tool.press(session, (3.5, 3.2), REACH, None)
@@ -293,42 +302,42 @@ class TestCircle:
 
 class TestEraser:
     def test_it_deletes_obstacles(self):
-        session = begun()
+        session = start_session()
         assert clicked(toolbox()["eraser"], session, (2.53, 3.0)) == "wall deleted"
         assert clicked(toolbox()["eraser"], session, (4.2, 1.73)) == "circle “pillar” deleted"
         assert session.displayed.environment.obstacles == ()
         assert clicked(toolbox()["eraser"], session, (4.2, 1.2)) is None
 
     def test_a_robot_before_an_obstacle(self):
-        session = begun()
+        session = start_session()
         assert clicked(toolbox()["eraser"], session, (4.2, 1.2), number=2) == "robot 2 taken out"
-        assert robots_of(session) == ((1, 3), ())
+        assert get_robot_numbers(session) == ((1, 3), ())
         assert session.displayed.environment is HALL
 
     def test_the_last_robot_stays(self):
-        session = begun(robots=1)
+        session = start_session(robots=1)
         with pytest.raises(ParameterError, match="cannot remove the last working robot"):
             clicked(toolbox()["eraser"], session, (1.0, 1.0), number=1)
 
 
 def test_robots_join_where_it_is_clicked():
-    session = begun()
+    session = start_session()
     assert clicked(toolbox()["robot"], session, (3.5, 3.2)) == "robot 4 joined"
     assert place_of(session, 4) == [3.5, 3.2]
     # in an obstacle it is as near as there is room
     assert clicked(toolbox()["robot"], session, (4.2, 1.2)) == "robot 5 joined"
-    assert too_deep(session) <= 0.0
+    assert compute_penetration(session) <= 0.0
 
 
 def test_robots_fail_and_work_again():
-    tool, session = toolbox()["failure"], stepped(begun(RAPF, LLOYD), 5)
+    tool, session = toolbox()["failure"], advance_session(start_session(RAPF, LLOYD), 5)
     assert clicked(tool, session, (1.0, 1.0)) is None
     assert clicked(tool, session, (1.0, 1.0), number=2) == "robot 2 failed"
-    assert robots_of(session) == ((1, 3), (2,))
+    assert get_robot_numbers(session) == ((1, 3), (2,))
     assert clicked(tool, session, (1.0, 1.0), number=2) == "robot 2 works again"
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     # as it was at the moment that is looked at
-    stepped(session, 5)
+    advance_session(session, 5)
     session.fail_robot(3)
     session.show_time(0.1)
     assert clicked(tool, session, (1.0, 1.0), number=3) == "robot 3 failed"
@@ -336,8 +345,8 @@ def test_robots_fail_and_work_again():
 
 class TestRuler:
     def test_it_measures(self):
-        tool, session = Ruler(), begun()
-        before = all_told(session)
+        tool, session = Ruler(), start_session()
+        before = describe_state(session)
         tool.press(session, (1.0, 1.0), REACH, None)
         tool.move(session, (4.0, 5.0))
         assert tool.preview(session).line == ((1.0, 1.0), (4.0, 5.0))
@@ -349,11 +358,11 @@ class TestRuler:
         assert tool.cancel(session)
         assert tool.preview(session) is None
         assert not tool.cancel(session)
-        assert all_told(session) == before
+        assert describe_state(session) == before
 
 
 def test_it_is_told_who_was_pushed_and_which_starts_are_covered():
-    session = begun(start="spread")
+    session = start_session(start="spread")
     session.place_robot(1, (5.2, 3.2))
     said = dragged(Circle(), session, (5.2, 3.2), (5.2, 3.75))
     assert said == "circle drawn; 1 robot pushed out of the way; it covers the start far"
@@ -376,11 +385,11 @@ uses = st.tuples(
 @given(st.lists(uses, max_size=30))
 @settings(max_examples=60)
 def test_however_tools_are_used_nothing_breaks(actions):
-    session, tools = begun(), toolbox()
+    session, tools = start_session(), toolbox()
     session.playback.is_playing = True
     for name, action, point, number in actions:
         tool = tools[name]
-        working, failed = robots_of(session)
+        working, failed = get_robot_numbers(session)
         number = number if number in (*working, *failed) else None
         try:
             if action == "press":
@@ -401,4 +410,4 @@ def test_however_tools_are_used_nothing_breaks(actions):
         for each in tools.values():
             preview = each.preview(session)
             assert preview is None or len(preview.line) >= 2
-    assert too_deep(session) < 2e-3
+    assert compute_penetration(session) < 2e-3

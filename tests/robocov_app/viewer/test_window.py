@@ -11,7 +11,7 @@ import pygame
 import pytest
 from driven_window import FRAME, Driver, opened, resized
 from PIL import Image
-from touched_run import RAPF, begun
+from sample_sessions import RAPF, start_session
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.input import shown_cursor
@@ -305,7 +305,7 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
     (tmp_path / "settings/window.json").write_text('{"width": 1000, "height": 640}')
 
     def window():
-        return Launcher(begun(), "hall", tmp_path, lattice=4).window()
+        return Launcher(start_session(), "hall", tmp_path, lattice=4).window()
 
     with window() as first:
         driver = Driver(first)

@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import MIDDLE, Driver, opened, place
-from touched_run import RAPF, RPF
+from sample_sessions import RAPF, RPF
 
 # the hand
 

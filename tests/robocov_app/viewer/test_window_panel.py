@@ -10,7 +10,7 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import MIDDLE, Driver, opened, resized
-from touched_run import RAPF, RPF
+from sample_sessions import RAPF, RPF
 
 from robocov.controllers import CONTROLLERS
 from robocov_app.toolkit.input import DOUBLE, KEY_REPEAT

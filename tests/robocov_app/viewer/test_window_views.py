@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import MIDDLE, Driver, opened
-from touched_run import RAPF, RPF
+from sample_sessions import RAPF, RPF
 
 # time line
 

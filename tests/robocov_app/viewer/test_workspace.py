@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from driven_window import opened
-from touched_run import begun, positions_of, stepped, viewer_of
+from sample_sessions import advance_session, build_presenter, get_positions, start_session
 
 from robocov.errors import MapError
 from robocov_app.viewer.presenter import Presenter
@@ -29,12 +29,12 @@ def kept(workspace: SessionWorkspace) -> None:
 
 
 def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
-    session = begun()
+    session = start_session()
     workspace = SessionWorkspace(session, tmp_path)
     workspace.save_draft({})
     assert not workspace.has_unsaved_edits
-    stepped(session, 20).fail_robot(2)
-    stepped(session, 10)
+    advance_session(session, 20).fail_robot(2)
+    advance_session(session, 10)
     kept(workspace)
     (found,) = find_recoverable_drafts(tmp_path)
     assert "1 edit, " in describe_draft(found) and describe_draft(found).endswith("never saved")
@@ -44,7 +44,7 @@ def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
         again.session.displayed.numbers == (1, 3)
         and again.session.timeline.end_time == session.timeline.end_time
     )
-    for mine, theirs in zip(positions_of(again.session), positions_of(session), strict=True):
+    for mine, theirs in zip(get_positions(again.session), get_positions(session), strict=True):
         assert (mine == theirs).all()
     again.save(tmp_path, {}, tmp_path / "story.robocov")
     assert not again.has_unsaved_edits
@@ -63,7 +63,7 @@ def test_a_broken_draft_is_not_offered(session: object, tmp_path: Path) -> None:
 
 
 def test_a_session_that_was_saved_and_closed_leaves_nothing(tmp_path: Path) -> None:
-    session = stepped(begun(), 5)
+    session = advance_session(start_session(), 5)
     workspace = SessionWorkspace(session, tmp_path / "kept")
     session.fail_robot(1)
     path = workspace.save(tmp_path, {})
@@ -75,7 +75,7 @@ def test_a_session_that_was_saved_and_closed_leaves_nothing(tmp_path: Path) -> N
 
 
 def test_ctrl_q_with_work_that_is_not_saved_keeps_it(tmp_path: Path) -> None:
-    session = stepped(begun(), 5)
+    session = advance_session(start_session(), 5)
     workspace = SessionWorkspace(session, tmp_path)
     session.fail_robot(1)
     workspace.save_draft({})
@@ -85,8 +85,8 @@ def test_ctrl_q_with_work_that_is_not_saved_keeps_it(tmp_path: Path) -> None:
 
 def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        stepped(driver.session, 10).fail_robot(2)
-        stepped(driver.session, 10)
+        advance_session(driver.session, 10).fail_robot(2)
+        advance_session(driver.session, 10)
         driver.key("ctrl+z")
         assert driver.viewer.message.startswith("undone: robot 2 failed; back at 0.2 s")
         driver.session.fail_robot(1)
@@ -111,7 +111,7 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
 
 
 def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
-    viewer: Presenter = viewer_of(folder=tmp_path)
+    viewer: Presenter = build_presenter(folder=tmp_path)
     (tmp_path / "no.robocov").write_text("{}")
     before = viewer.session
     with pytest.raises(MapError, match="format: missing"):

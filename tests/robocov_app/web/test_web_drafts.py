@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from sample_sessions import start_session
 from served_window import Link, served
-from touched_run import begun
 
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.ui.launch import editor_window
@@ -60,14 +60,16 @@ def test_a_served_editor_offers_its_draft_at_the_next_start(tmp_path: Path) -> N
 
 
 def test_a_served_viewer_offers_its_draft_at_the_next_start(tmp_path: Path) -> None:
-    session = begun()
+    session = start_session()
     with Launcher(session, "hall", tmp_path, lattice=4, size=(900, 600), served=True).window() as window:
         assert window.dialogs.asked is None
         session.fail_robot(2)
         window.frame(0.1)
         window.close()
     assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
-    with Launcher(begun(), "hall", tmp_path, lattice=4, size=(900, 600), served=True).window() as window:
+    with Launcher(
+        start_session(), "hall", tmp_path, lattice=4, size=(900, 600), served=True
+    ).window() as window:
         assert window.dialogs.asked.title == "Recover unsaved work?"
         window.dialogs.asked.answers[0].call()
         assert window.viewer.session.displayed.numbers == (1, 3)

@@ -1,4 +1,4 @@
-"""Records of what a session holds, for the tests of saved runs."""
+"""Records of sessions, for the tests of saved runs."""
 
 import numpy as np
 
@@ -17,24 +17,24 @@ class Counting:
     def begin(self, region, team):
         return 0
     def decide(self, seen, memory):
-        way = np.array([np.cos(0.05 * memory), np.sin(0.05 * memory)])
-        forces = self.strength * np.tile(way, (len(seen.positions), 1))
+        direction = np.array([np.cos(0.05 * memory), np.sin(0.05 * memory)])
+        forces = self.strength * np.tile(direction, (len(seen.positions), 1))
         return rc.Decision(forces=forces, memory=memory + 1)
 """
-"""A controller that remembers something."""
+"""A controller with memory."""
 
 
-def records_of(session: Session) -> list[Record]:
-    """Return the records of the last part of a session's story, one for each pane."""
+def build_records(session: Session) -> list[Record]:
+    """Build the records of the time since the last edit, one for each pane."""
     parts = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
     return records_of_part(parts[-1], session.timeline.document.get_path(session.timeline.head)[0])
 
 
-def record_of(session: Session) -> Record:
-    (record,) = records_of(session)
+def build_record(session: Session) -> Record:
+    (record,) = build_records(session)
     return record
 
 
-def same_arrays(one: Record, other: Record) -> bool:
+def have_same_arrays(one: Record, other: Record) -> bool:
     """Whether two records are the same, bit for bit."""
     return all(np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in ARRAYS)

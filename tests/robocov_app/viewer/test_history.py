@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from touched_run import HALL, RAPF
+from sample_sessions import HALL, RAPF
 
 from robocov.environment import CircleObstacle
 from robocov_app.viewer.session import history as module

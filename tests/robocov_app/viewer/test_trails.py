@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from touched_run import LLOYD, RAPF, begun, stepped
+from sample_sessions import LLOYD, RAPF, advance_session, start_session
 
 from robocov_app.viewer.session import trails as module
 from robocov_app.viewer.session.trails import MAX_TRAIL_RATE_HZ, MAX_TRAIL_ROWS, Trail, rebuild_trail
@@ -101,7 +101,7 @@ def test_a_trail_of_moments():
 
 
 def test_the_trail_of_a_past_is_that_which_was_left():
-    session = stepped(begun(RAPF, LLOYD), 60)
+    session = advance_session(start_session(RAPF, LLOYD), 60)
     for pane in session.timeline.panes:
         told, starts = rebuild_trail(session.timeline.history, pane.number, 60)
         np.testing.assert_array_equal(told.positions, pane.trail.positions)
@@ -110,11 +110,11 @@ def test_the_trail_of_a_past_is_that_which_was_left():
 
 
 def test_robots_that_came_later_were_nowhere_before():
-    session = stepped(begun(robots=2), 10)
+    session = advance_session(start_session(robots=2), 10)
     place = session.add_robot((3.5, 3.0))
-    stepped(session, 10)
+    advance_session(session, 10)
     session.fail_robot(1)
-    stepped(session, 10)
+    advance_session(session, 10)
     assert session.displayed.numbers == (2, place)
     told, starts = rebuild_trail(session.timeline.history, 0, 30)
     assert told.positions.shape[1] == 2
@@ -130,9 +130,9 @@ def test_robots_that_came_later_were_nowhere_before():
 
 @pytest.mark.parametrize("steps", range(1, 7))
 def test_who_came_in_between_two_rows_is_in_the_last_one(steps):
-    session = stepped(begun(robots=1), 3)
+    session = advance_session(start_session(robots=1), 3)
     session.add_robot((3.5, 3.0))
-    stepped(session, steps)
+    advance_session(session, steps)
     for last in range(3, 3 + steps + 1):
         told, _ = rebuild_trail(session.timeline.history, 0, last)
         np.testing.assert_array_equal(told.positions[-1], session.timeline.history[last].states[0].positions)

@@ -7,7 +7,17 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, stepped, too_deep
+from sample_sessions import (
+    HALL,
+    LLOYD,
+    RAPF,
+    RPF,
+    advance_session,
+    compute_penetration,
+    describe_state,
+    get_robot_numbers,
+    start_session,
+)
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError, ParameterError, StartError
@@ -71,7 +81,7 @@ def test_a_room_that_is_full():
 
 
 def test_a_robot_is_placed_in_all_panes():
-    session = stepped(begun(RAPF, LLOYD), 20)
+    session = advance_session(start_session(RAPF, LLOYD), 20)
     others = [pane.simulation.positions[1:].copy() for pane in session.timeline.panes]
     session.place_robot(1, (5.0, 3.0))
     for k, pane in enumerate(session.timeline.panes):
@@ -85,19 +95,19 @@ def test_a_robot_is_placed_in_all_panes():
 @given(st.lists(st.tuples(st.integers(1, 6), places), min_size=1, max_size=6))
 @settings(max_examples=40)
 def test_wherever_robots_are_placed_they_fit(drags):
-    session = begun(robots=6)
+    session = start_session(robots=6)
     for number, point in drags:
         others = [k for k in range(6) if k != number - 1]
         before = session.timeline.panes[0].simulation.positions[others]
         session.place_robot(number, point)
         np.testing.assert_array_equal(session.timeline.panes[0].simulation.positions[others], before)
-        assert too_deep(session) <= 1e-9
+        assert compute_penetration(session) <= 1e-9
     session.playback.step()
-    assert too_deep(session) < 2e-3
+    assert compute_penetration(session) < 2e-3
 
 
 def test_a_robot_that_failed_is_placed_too():
-    session = stepped(begun(RAPF, RPF), 10)
+    session = advance_session(start_session(RAPF, RPF), 10)
     session.fail_robot(2)
     session.fail_robot(3)
     session.place_robot(2, (5.0, 3.0))
@@ -106,11 +116,11 @@ def test_a_robot_that_failed_is_placed_too():
     assert np.hypot(*np.subtract(failed_at(session, 2), failed_at(session, 3))) >= 2 * RADIUS
     session.place_robot(2, (9.0, 9.0))
     assert failed_at(session, 2) == pytest.approx((5.899, 3.899))
-    assert robots_of(session) == ((1,), (2, 3))
+    assert get_robot_numbers(session) == ((1,), (2, 3))
 
 
 def test_grabbing_places_while_it_is_paused():
-    session = stepped(begun(), 5)
+    session = advance_session(start_session(), 5)
     session.drag_robot(2, (3.0, 3.0))
     assert session.timeline.drag is None
     assert place_of(session, 2) == [3.0, 3.0]
@@ -126,7 +136,7 @@ def test_grabbing_places_while_it_is_paused():
 
 
 def test_what_has_failed_is_not_pulled():
-    session = begun()
+    session = start_session()
     session.fail_robot(2)
     session.playback.is_playing = True
     session.drag_robot(2, (3.0, 3.0))
@@ -138,7 +148,7 @@ def test_what_has_failed_is_not_pulled():
 
 
 def test_robots_join_at_rest():
-    session = stepped(begun(RAPF, LLOYD), 10)
+    session = advance_session(start_session(RAPF, LLOYD), 10)
     velocities = session.timeline.panes[0].simulation.velocities
     assert session.add_robot((5.0, 3.0)) == 4
     assert session.add_robot((5.0, 3.0)) == 5
@@ -154,34 +164,34 @@ def test_robots_join_at_rest():
 
 
 def test_robots_leave_and_come_back_to_their_rows():
-    session = stepped(begun(RAPF, LLOYD, robots=4), 15)
+    session = advance_session(start_session(RAPF, LLOYD, robots=4), 15)
     where = [place_of(session, 2, pane) for pane in (0, 1)]
     assert where[0] != where[1]
     session.remove_robot(2)
-    assert robots_of(session) == ((1, 3, 4), ())
+    assert get_robot_numbers(session) == ((1, 3, 4), ())
     session.undo()
-    assert robots_of(session) == ((1, 2, 3, 4), ())
+    assert get_robot_numbers(session) == ((1, 2, 3, 4), ())
     # in each pane to its own place
     assert [place_of(session, 2, pane) for pane in (0, 1)] == where
     session.redo()
-    assert robots_of(session) == ((1, 3, 4), ())
+    assert get_robot_numbers(session) == ((1, 3, 4), ())
 
 
 def test_a_robot_that_failed_leaves_and_comes_back_failed():
-    session = stepped(begun(RAPF, LLOYD, robots=3), 15)
+    session = advance_session(start_session(RAPF, LLOYD, robots=3), 15)
     session.fail_robot(1)
     where = [failed_at(session, 1, pane) for pane in (0, 1)]
     session.remove_robot(1)
-    assert robots_of(session) == ((2, 3), ())
+    assert get_robot_numbers(session) == ((2, 3), ())
     session.undo()
-    assert robots_of(session) == ((2, 3), (1,))
+    assert get_robot_numbers(session) == ((2, 3), (1,))
     assert [failed_at(session, 1, pane) for pane in (0, 1)] == where
     assert session.undo() == "robot 1 failed"
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
 
 
 def test_numbers_are_not_given_twice():
-    session = begun()
+    session = start_session()
     session.fail_robot(3)
     assert session.add_robot((3.0, 3.0)) == 4
     session.remove_robot(4)
@@ -195,7 +205,7 @@ def test_numbers_are_not_given_twice():
 
 
 def test_who_fails_is_not_heard_but_sensed():
-    session = begun(RPF, robots=3, given_starts=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
+    session = start_session(RPF, robots=3, given_starts=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
     pane = session.timeline.panes[0]
     before = pane.simulation.observe_and_decide()
     assert before.seen.neighbors.list_neighbors(0).tolist() == [1, 2]
@@ -215,7 +225,7 @@ def test_who_fails_is_not_heard_but_sensed():
 
 
 def test_who_failed_stands_still_and_in_the_way():
-    session = stepped(begun(LLOYD, robots=2), 10)
+    session = advance_session(start_session(LLOYD, robots=2), 10)
     session.playback.is_playing = True
     session.fail_robot(2)
     there = failed_at(session, 2)
@@ -231,7 +241,7 @@ def test_who_failed_stands_still_and_in_the_way():
 
 
 def test_who_fails_is_let_go():
-    session = stepped(begun(), 3)
+    session = advance_session(start_session(), 3)
     session.playback.is_playing = True
     for touch in (session.fail_robot, session.remove_robot):
         session.drag_robot(2, (3.0, 3.0))
@@ -241,31 +251,31 @@ def test_who_fails_is_let_go():
         assert session.timeline.drag is None
         session.undo()
         session.undo()
-        assert robots_of(session) == ((1, 2, 3), ())
+        assert get_robot_numbers(session) == ((1, 2, 3), ())
 
 
 def test_revival_beside_an_obstacle_that_was_drawn_meanwhile():
-    session = stepped(begun(), 3)
+    session = advance_session(start_session(), 3)
     session.fail_robot(1)
     there = failed_at(session, 1)
     session.edit_map(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle(there, 0.3))), "circle drawn")
     session.revive_robot(1)
     away = np.hypot(*np.subtract(place_of(session, 1), there))
     assert 0.39 < away < 0.8
-    assert too_deep(session) < 2e-3
+    assert compute_penetration(session) < 2e-3
 
 
 # refusals
 
 
 def test_what_cannot_be_changes_nothing():
-    session = stepped(begun(RAPF, RPF), 12)
+    session = advance_session(start_session(RAPF, RPF), 12)
     session.fail_robot(3)
     session.undo()
     session.redo()
     for paused in (True, False):
         session.playback.is_playing = not paused
-        before = all_told(session)
+        before = describe_state(session)
         for touch, match in (
             (lambda: session.fail_robot(3), "robot 3 has failed already"),
             (lambda: session.fail_robot(9), "there is no robot 9"),
@@ -278,51 +288,51 @@ def test_what_cannot_be_changes_nothing():
         ):
             with pytest.raises(ParameterError, match=match):
                 touch()
-            assert all_told(session) == before
+            assert describe_state(session) == before
 
 
 def test_the_last_that_works_stays():
-    session = begun(robots=2)
+    session = start_session(robots=2)
     session.fail_robot(1)
-    before = all_told(session)
+    before = describe_state(session)
     for touch in (session.fail_robot, session.remove_robot):
         with pytest.raises(ParameterError, match="cannot remove the last working robot"):
             touch(2)
-        assert all_told(session) == before
+        assert describe_state(session) == before
     # who does not work may go
     session.remove_robot(1)
-    assert robots_of(session) == ((2,), ())
+    assert get_robot_numbers(session) == ((2,), ())
 
 
 def test_a_full_map_and_a_full_team(monkeypatch):
     cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
-    session = begun(robots=1, environment=cell, given_starts=np.array([[0.225, 0.225]]))
-    before = all_told(session)
+    session = start_session(robots=1, environment=cell, given_starts=np.array([[0.225, 0.225]]))
+    before = describe_state(session)
     with pytest.raises(StartError, match="no room"):
         session.add_robot((0.1, 0.1))
-    assert all_told(session) == before
-    session = begun(robots=3)
+    assert describe_state(session) == before
+    session = start_session(robots=3)
     monkeypatch.setattr(module, "MAX_ROBOTS", 3)
-    before = all_told(session)
+    before = describe_state(session)
     with pytest.raises(ParameterError, match="there are 3 robots already"):
         session.add_robot((3.0, 3.0))
-    assert all_told(session) == before
+    assert describe_state(session) == before
 
 
 # from the past
 
 
 def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
-    session = stepped(begun(RAPF, LLOYD), 20)
+    session = advance_session(start_session(RAPF, LLOYD), 20)
     session.remove_robot(2)
-    stepped(session, 20)
+    advance_session(session, 20)
     session.show_time(10 / 60)
     then = session.displayed.get_positions(session.timeline.panes[1]).copy()
     # it is not there any more, but was then
     session.remove_robot(2)
     assert session.timeline.is_live
     assert session.timeline.end_time == pytest.approx(10 / 60)
-    assert robots_of(session) == ((1, 3), ())
+    assert get_robot_numbers(session) == ((1, 3), ())
     np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[1]), then[[0, 2]])
     session.undo()
     np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[1]), then)
@@ -343,39 +353,39 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
     ],
 )
 def test_what_could_not_be_then_keeps_what_came_after(touch):
-    session = stepped(begun(RAPF, LLOYD), 20)
+    session = advance_session(start_session(RAPF, LLOYD), 20)
     for pane in session.timeline.panes:
         for k in range(20):
             pane.distance_curve.add(k / 60, 2.0)
     session.add_robot((3.0, 3.0))
     session.undo()
     session.redo()
-    stepped(session, 20)
+    advance_session(session, 20)
     session.show_time(10 / 60)
     session.playback.is_playing = True
-    before = all_told(session)
+    before = describe_state(session)
     with pytest.raises((ParameterError, StartError, MapError)):
         touch(session)
-    assert all_told(session) == before
+    assert describe_state(session) == before
     assert not session.timeline.is_live
     session.show_time(99.0)
-    stepped(session, 3)
-    assert robots_of(session) == ((1, 2, 3, 4), ())
+    advance_session(session, 3)
+    assert get_robot_numbers(session) == ((1, 2, 3, 4), ())
 
 
 def test_undo_is_of_the_present():
-    session = stepped(begun(), 20)
+    session = advance_session(start_session(), 20)
     session.remove_robot(2)
-    stepped(session, 20)
+    advance_session(session, 20)
     session.show_time(10 / 60)
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     assert session.undo() == "robot 2 removed"
     assert session.timeline.is_live
     assert session.timeline.end_time == pytest.approx(20 / 60)
-    assert robots_of(session) == ((1, 2, 3), ())
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     session.show_time(10 / 60)
     assert session.redo() == "robot 2 removed"
-    assert robots_of(session) == ((1, 3), ())
+    assert get_robot_numbers(session) == ((1, 3), ())
     assert session.timeline.is_live
 
 
@@ -383,7 +393,7 @@ def test_robots_that_differ_keep_what_is_theirs():
     """Under their numbers, whether they work, fail, or work again; new ones are as the first."""
     radius, speeds = np.array([0.1, 0.3, 0.2]), np.array([1.0, 0.3, 0.3])
     limits = RobotProperties.from_team(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
-    session = begun(RAPF, robots=3, properties=limits)
+    session = start_session(RAPF, robots=3, properties=limits)
     team = session.timeline.panes[0].simulation.team
     assert team.radius.tolist() == radius.tolist()
     positions = session.timeline.panes[0].simulation.positions
@@ -400,6 +410,6 @@ def test_robots_that_differ_keep_what_is_theirs():
     assert gap >= 0.5 - 1e-6
     session.add_robot((3.0, 2.0))
     assert session.timeline.panes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
-    stepped(session, 3)
+    advance_session(session, 3)
     session.set_properties(RobotProperties())
     assert set(session.timeline.panes[0].simulation.team.radius.tolist()) == {0.1}
