@@ -98,10 +98,11 @@ def _decide(seen: Observations, state: PaneState) -> Decision:
         if memory is None:
             memory = controller.begin(state.setup.sensed_environment.region, state.setup.team)
         decision = controller.decide(seen, memory)
-        is_usable = _is_usable(decision, seen.positions.shape)
+        if _is_usable(decision, seen.positions.shape):
+            return decision
     except BaseException:  # A user's controller may raise anything.
         return no_forces
-    return decision if is_usable else no_forces
+    return no_forces
 
 
 def _is_usable(decision: object, shape: tuple[int, ...]) -> bool:

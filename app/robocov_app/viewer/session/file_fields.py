@@ -56,6 +56,17 @@ def convert_field(
     return GetPydanticSchema(build_schema)
 
 
+def keep_none(convert: Callable[[Any, Any], object]) -> Callable[[Any, Any], object]:
+    """Return a conversion for `convert_field` that leaves None as it is."""
+
+    def convert_unless_none(value: Any, context: Any) -> object:
+        if value is None:
+            return None
+        return convert(value, context)
+
+    return convert_unless_none
+
+
 def build_refusal(error: object) -> PydanticCustomError:
     """Build the validation error of a value that cannot be used, with the text of another error."""
     return PydanticCustomError("refused", "{words}", {"words": str(error)})

@@ -13,7 +13,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
 from robocov.scenario import Scenario
 from robocov_app.viewer.session.controller_choice import ControllerChoice, FileController
-from robocov_app.viewer.session.file_fields import Position, Text, convert_field
+from robocov_app.viewer.session.file_fields import Position, Text, convert_field, keep_none
 from robocov_app.viewer.session.robot_properties import FileProperties, RobotProperties
 
 MAX_ROBOTS = 1000
@@ -33,13 +33,13 @@ _MAP = convert_field(
 )
 _ROWS = convert_field(
     list[Position] | None,
-    load=lambda rows, _: None if rows is None else np.array(rows),
-    dump=lambda rows, _: None if rows is None else np.asarray(rows).tolist(),
+    load=keep_none(lambda rows, _: np.array(rows)),
+    dump=keep_none(lambda rows, _: np.asarray(rows).tolist()),
 )
 _CONDITIONS = convert_field(
     dict[str, Any] | None,
-    load=lambda content, _: None if content is None else Conditions.from_dict(content),
-    dump=lambda conditions, _: None if conditions is None else conditions.to_dict(),
+    load=keep_none(lambda content, _: Conditions.from_dict(content)),
+    dump=keep_none(lambda conditions, _: conditions.to_dict()),
 )
 
 

@@ -1,7 +1,8 @@
 """The session of the window: every edit that users can make."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -46,6 +47,8 @@ MIN_PUSH_M = 5e-3
 GESTURE_WINDOW_S = 1.0
 """Simulated time within which changes of the same value, for example by a slider, count as one edit."""
 _DRAG_DECIMALS = 4
+_FIELDS_OF_STARTS = {"environment", "robots", "start", "seed"}
+"""Fields of a scenario that determine the starting positions, unless these are given."""
 
 
 @dataclass(frozen=True)
@@ -205,25 +208,18 @@ class Session:
         ParameterError
             If a value cannot be used.
         """
+        requested = {
+            "environment": environment,
+            "controllers": controllers,
+            "robots": robots,
+            "start": start,
+            "seed": seed,
+            "dt": dt,
+        }
+        changes = {name: value for name, value in requested.items() if value is not None}
         timeline = self.timeline
         old = timeline.scenario
-        new = old
-        if environment is not None:
-            new = replace(new, environment=environment, start=None)
-        # An edit may have covered the start.
-        if new.start not in {None, "uniform", *old.environment.starts}:
-            new = replace(new, start=None)
-        if start is not None:
-            new = replace(new, start=start)
-        changes_starts = any(value is not None for value in (environment, robots, start, seed))
-        new = replace(
-            new,
-            controllers=old.controllers if controllers is None else controllers,
-            robots=old.robots if robots is None else robots,
-            seed=old.seed if seed is None else seed,
-            dt=old.dt if dt is None else dt,
-            given_starts=None if changes_starts else old.given_starts,
-        )
+        new = _change_scenario(old, changes)
         timeline.finish_seek()
         node = timeline.document.build_node(
             timeline.head, timeline.step, "begin", _describe_restart(old, new), Restart(new)
@@ -441,6 +437,18 @@ def _extend_node(node: Node, edit: RunEdit, kind: str, description: str) -> None
     node.edits.append(edit)
     node.kind = kind
     node.description = description
+
+
+def _change_scenario(old: SessionScenario, changes: Mapping[str, Any]) -> SessionScenario:
+    """Return a scenario with changes, and with starting positions that fit them."""
+    changed = dict(changes)
+    if changed.keys() & _FIELDS_OF_STARTS:
+        changed["given_starts"] = None
+    # An edit may have covered the start.
+    is_start_available = old.start in {None, "uniform", *old.environment.starts}
+    if "environment" in changed or not is_start_available:
+        changed.setdefault("start", None)
+    return replace(old, **changed)
 
 
 def _describe_restart(old: SessionScenario, new: SessionScenario) -> str:
