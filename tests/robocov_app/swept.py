@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart
-from robocov_app.sweep.executors import Executor, Returned
+from robocov_app.sweep.executor import Executor, Result
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import perform
@@ -68,7 +68,7 @@ def run_folders(folder: Path) -> list[str]:
 class InProcess(Executor):
     """Does tasks in this process, in place of a `LocalPool`."""
 
-    most = 2
+    capacity = 2
 
     def __init__(self, workers: int) -> None:
         super().__init__()
@@ -76,10 +76,10 @@ class InProcess(Executor):
 
     def __exit__(self, *exception: object) -> None: ...
 
-    def _hand_out(self, task: Task) -> None:
+    def _start(self, task: Task) -> None:
         self._tasks.append(task)
 
-    def _returned(self, timeout: float) -> Returned | None:
+    def _wait_for_result(self, timeout: float) -> Result | None:
         if not self._tasks:
             return None
         task = self._tasks.pop(0)

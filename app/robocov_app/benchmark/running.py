@@ -16,7 +16,7 @@ from robocov_app.benchmark.results import (
     describe_method,
     identify_suite,
 )
-from robocov_app.sweep.ledger import RUNS, Ledger
+from robocov_app.sweep.ledger import RUNS_FOLDER, Ledger
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.sweep.tasks import generate_tasks
@@ -103,10 +103,10 @@ def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:
     """Yield the rows of a finished sweep."""
     ledger = Ledger(folder)
     for task in generate_tasks(study):
-        entry = ledger.entry(task)
+        entry = ledger.read_entry(task)
         if entry is None:
             raise OutputError(f"{folder}: {task.name} was removed by somebody else")
-        effort_path = folder / RUNS / task.name / EFFORT_FILE
+        effort_path = folder / RUNS_FOLDER / task.name / EFFORT_FILE
         effort = effort_path.read_bytes() if effort_path.exists() else b"{}"
         yield build_row(track, task, entry, effort)
 

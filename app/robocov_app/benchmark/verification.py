@@ -9,10 +9,11 @@ import numpy as np
 from robocov.errors import InputError
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_result
-from robocov_app.sweep.executors import LocalPool
-from robocov_app.sweep.ledger import difference_of
+from robocov_app.sweep.ledger import describe_version_differences
+from robocov_app.sweep.local_pool import LocalPool
+from robocov_app.sweep.progress import SweepProgress, report_progress
 from robocov_app.sweep.study import Study
-from robocov_app.sweep.sweeping import Count, sweep_progress, worked_off
+from robocov_app.sweep.sweeping import execute_tasks
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption
@@ -82,14 +83,14 @@ def verify_result(
         row = build_row(key[0], task, outcome, outcome.files.get(EFFORT_FILE, b"{}"))
         differences.extend(_list_differences(key, rows[key], row))
 
-    count = Count(len(sampled))
+    progress = SweepProgress(len(sampled))
     sampled_tasks = [tasks[key] for key in sampled]
-    with sweep_progress("verify", count, quiet=quiet) as tell:
-        for _ in worked_off(
-            sampled_tasks, lambda: LocalPool(min(workers, len(sampled))), count, stop, compare
+    with report_progress("verify", progress, quiet=quiet) as reporter:
+        for _ in execute_tasks(
+            sampled_tasks, lambda: LocalPool(min(workers, len(sampled))), progress, stop, compare
         ):
-            tell(count)
-    return count.over, list(dict.fromkeys(differences))
+            reporter.update(progress)
+    return progress.finished, list(dict.fromkeys(differences))
 
 
 def _build_studies(result: Mapping[str, Any], path: Path, controller: str | None) -> dict[str, Study]:
@@ -112,7 +113,7 @@ def _compare_without_running(
     result: Mapping[str, Any], rows: Mapping[RunKey, Row], tasks: Mapping[RunKey, Task]
 ) -> Iterator[str]:
     """Yield the differences of versions, of the selection of runs, and of the gaps."""
-    versions = difference_of(result["versions"])
+    versions = describe_version_differences(result["versions"])
     if versions:
         yield f"made with {versions}"
     for key in tasks:

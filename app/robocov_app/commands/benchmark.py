@@ -174,7 +174,7 @@ def _print_suite(options: Arguments) -> int:
 def _verify(options: Arguments) -> int:
     """Repeat some runs of a result, and print the differences."""
     from robocov_app.benchmark.verification import verify_result
-    from robocov_app.sweep.executors import processors
+    from robocov_app.sweep.local_pool import count_processors
 
     path = options.paths[0]
     with Interruption() as interruption:
@@ -183,7 +183,7 @@ def _verify(options: Arguments) -> int:
             controller=options.controller,
             sample=options.sample,
             seed=options.seed,
-            workers=options.workers or processors(),
+            workers=options.workers or count_processors(),
             stop=interruption,
             quiet=options.json,
         )
@@ -221,14 +221,14 @@ def _compute_references(options: Arguments) -> int:
     """Compute missing references and bounds of the suite."""
     from robocov_app.benchmark import suite
     from robocov_app.benchmark.references import compute_references
-    from robocov_app.sweep.executors import processors
+    from robocov_app.sweep.local_pool import count_processors
 
     target = options.out or suite.SUITE_FILE
     if target.is_dir():
         raise InputError(f"--out: {target}: expected a file for the references, got a folder")
     with Interruption() as interruption:
         count, left = compute_references(
-            target, workers=options.workers or processors(), quiet=options.json, stop=interruption
+            target, workers=options.workers or count_processors(), quiet=options.json, stop=interruption
         )
     answer = {"path": str(target), "references_and_bounds": count, "left": left}
     print_answer(options, answer, f"{target}: {count} references and bounds, {left} left")

@@ -103,13 +103,13 @@ def command(options: Arguments) -> int:
     from robocov_app.replication.forecast import forecast_study
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.runner import RunnerOptions, StudyInterrupted, open_folder
-    from robocov_app.sweep.executors import processors
+    from robocov_app.sweep.local_pool import count_processors
 
     plan = QUICK if options.quick else FULL
     out = options.out
     open_folder(out, plan)
     with Interruption() as interruption:
-        workers = options.workers or processors()
+        workers = options.workers or count_processors()
         runner = RunnerOptions(
             workers=workers,
             scheduler=options.scheduler,
@@ -133,7 +133,7 @@ def command(options: Arguments) -> int:
 
 def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) -> str:
     """Return the number of runs and the expected time as text."""
-    from robocov_app.sweep.sweeping import duration
+    from robocov_app.sweep.progress import format_duration
 
     if not expected.left:
         return f"all {expected.runs:,} runs are done"
@@ -142,9 +142,9 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
     seconds_per_run = ", ".join(
         f"{name} {seconds:.2f} s" for name, seconds in expected.seconds_per_run.items()
     )
-    time = f"{duration(expected.seconds)} on {workers} processes"
+    time = f"{format_duration(expected.seconds)} on {workers} processes"
     if on_cluster:
-        time = f"{duration(expected.seconds * workers)} of computing, on a Dask cluster"
+        time = f"{format_duration(expected.seconds * workers)} of computing, on a Dask cluster"
     return (
         f"{expected.runs:,} runs{reused}, about {time} (measured: {seconds_per_run} a run); "
         "Ctrl-C keeps finished runs"

@@ -15,8 +15,9 @@ from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import print_answer
 
 if TYPE_CHECKING:
+    from robocov_app.sweep.estimate import SweepEstimate
     from robocov_app.sweep.study import Study
-    from robocov_app.sweep.sweeping import Rehearsal, Totals
+    from robocov_app.sweep.sweeping import Totals
 
 FAILED = 1
 """Exit status of a sweep with failed runs."""
@@ -70,52 +71,53 @@ def command(options: Arguments) -> int:
     study = read_study(options.study)
     out = options.out or Path(options.study.stem)
     if options.dry_run:
-        _rehearse(options, study, out)
+        _estimate(options, study, out)
         return 0
     return _sweep(options, study, out)
 
 
-def _rehearse(options: Arguments, study: Study, out: Path) -> None:
+def _estimate(options: Arguments, study: Study, out: Path) -> None:
     """Do one run of the study, and print an estimate for all."""
-    from robocov_app.sweep.sweeping import rehearsed
+    from robocov_app.sweep.estimate import estimate_sweep
 
     workers = _count_workers(options)
-    rehearsal = rehearsed(
+    estimate = estimate_sweep(
         study,
         out,
         workers=workers,
         retry_failed=options.retry_failed,
         keep_versions=options.keep_versions,
     )
-    answer = {"out": str(out), "workers": workers, **asdict(rehearsal)}
-    print_answer(options, answer, *_describe_rehearsal(rehearsal, workers))
+    answer = {"out": str(out), "workers": workers, **asdict(estimate)}
+    print_answer(options, answer, *_describe_estimate(estimate, workers))
 
 
 def _count_workers(options: Arguments) -> int:
     """Return the number of runs that are done at the same time."""
-    from robocov_app.sweep.executors import Cluster, processors
+    from robocov_app.sweep.cluster import Cluster
+    from robocov_app.sweep.local_pool import count_processors
 
     if options.scheduler is None:
-        return options.workers or processors()
+        return options.workers or count_processors()
     with Cluster(options.scheduler) as cluster:
         return max(1, cluster.threads)
 
 
-def _describe_rehearsal(rehearsal: Rehearsal, workers: int) -> list[str]:
+def _describe_estimate(estimate: SweepEstimate, workers: int) -> list[str]:
     """Return the estimate of a sweep as lines of text."""
-    from robocov_app.sweep.sweeping import duration
+    from robocov_app.sweep.progress import format_duration
 
-    lines = [f"{name:<20} {count:>7}" for name, count in rehearsal.axes.items()]
-    finished = rehearsal.runs - rehearsal.left
+    lines = [f"{name:<20} {count:>7}" for name, count in estimate.axes.items()]
+    finished = estimate.runs - estimate.left
     note = f"   ({finished} of them done already)" if finished else ""
-    lines.append(f"{'runs':<20} {rehearsal.runs:>7}{note}")
-    lines += rehearsal.notes
-    if rehearsal.error is not None:
-        lines.append(f"the trial run, {rehearsal.run}, failed: {rehearsal.error}")
-    lines.append(f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB")
+    lines.append(f"{'runs':<20} {estimate.runs:>7}{note}")
+    lines += estimate.notes
+    if estimate.error is not None:
+        lines.append(f"the trial run, {estimate.run}, failed: {estimate.error}")
+    lines.append(f"a run takes {estimate.seconds_a_run:.2f} s and {estimate.bytes_a_run / 1e3:.0f} kB")
     lines.append(
-        f"all remaining runs: about {duration(rehearsal.seconds)} on {format_count(workers, 'worker')}; "
-        f"{rehearsal.bytes / 1e6:.0f} MB in all"
+        f"all remaining runs: about {format_duration(estimate.seconds)} on "
+        f"{format_count(workers, 'worker')}; {estimate.bytes / 1e6:.0f} MB in all"
     )
     return lines
 

@@ -13,10 +13,11 @@ from robocov.files.writing import replace_file
 from robocov_app.replication.plan import Plan
 from robocov_app.replication.references import References, find_references
 from robocov_app.sweep import worker
-from robocov_app.sweep.executors import LocalPool
-from robocov_app.sweep.ledger import Ledger, opened
+from robocov_app.sweep.ledger import Ledger, open_ledger
+from robocov_app.sweep.local_pool import LocalPool
+from robocov_app.sweep.progress import SweepProgress, report_progress
 from robocov_app.sweep.study import Study, StudyMap
-from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
+from robocov_app.sweep.sweeping import execute_tasks, sweep
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.terminal.interruption import Interruption
 
@@ -150,25 +151,25 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
 
     def store(task: Task, outcome: worker.Outcome) -> None:
         for ledger in ledgers[task.digest]:
-            ledger.keep(task, outcome)
+            ledger.store(task, outcome)
 
     with ExitStack() as stack:
         for name, study in studies.items():
-            ledger = stack.enter_context(opened(get_study_folder(folder, name), study.to_json()))
+            ledger = stack.enter_context(open_ledger(get_study_folder(folder, name), study.to_json()))
             survey = ledger.survey(generate_tasks(study), keep_versions=options.keep_versions)
-            for task in compress(generate_tasks(study), survey.todo):
+            for task in compress(generate_tasks(study), survey.is_left):
                 tasks[task.digest] = task
                 ledgers.setdefault(task.digest, []).append(ledger)
-            notes += [f"{name}: {line}" for line in survey.words(keep_versions=options.keep_versions)]
+            notes += [f"{name}: {line}" for line in survey.describe(keep_versions=options.keep_versions)]
         if not tasks and not notes:
             return
-        count = Count(len(tasks))
+        progress = SweepProgress(len(tasks))
         workers = min(options.workers, len(tasks))
-        tell = stack.enter_context(sweep_progress(title, count, quiet=options.quiet))
+        reporter = stack.enter_context(report_progress(title, progress, quiet=options.quiet))
         for note in notes:
-            tell.say(note)
-        for _ in worked_off(tasks.values(), lambda: LocalPool(workers), count, options.stop, store):
-            tell(count)
+            reporter.print_line(note)
+        for _ in execute_tasks(tasks.values(), lambda: LocalPool(workers), progress, options.stop, store):
+            reporter.update(progress)
 
 
 def find_map_references(

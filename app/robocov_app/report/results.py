@@ -27,7 +27,7 @@ from robocov.optimum import find_optimum
 from robocov.record import Record
 from robocov_app.runs.saved_runs import ComparisonDocument, SavedRun, build_roster, load_saved_runs
 from robocov_app.sweep.parameters import UNITS, name_parameter_column
-from robocov_app.sweep.table import gain_column
+from robocov_app.sweep.table import get_gain_column
 
 RESTARTS = 24  # searches of which the best counts
 
@@ -302,7 +302,7 @@ def _of_sweep(folder: Path) -> Result:
                 team=tuple((name, row.get(name_parameter_column(name))) for name in swept),
                 start=printable(str(row["start"])),
                 seed=row["seed"],
-                gains=_gains({name: row.get(gain_column(name)) for name in gains.get(controller, ())}),
+                gains=_gains({name: row.get(get_gain_column(name)) for name in gains.get(controller, ())}),
                 figures={name: row.get(name) for name in FIGURES} if trouble is None else {},
                 error=None if trouble is None else printable(str(trouble)),
                 folder=folder / "runs" / Path(str(row["run"])).name,
@@ -317,7 +317,7 @@ def _of_sweep(folder: Path) -> Result:
                 facts["versions"] = _json(entry.folder / "run.json").get("versions")
                 break
     columns = {each["name"]: (each["unit"], each["meaning"]) for each in study.get("columns", ())}
-    text = {name: columns.get(gain_column(name), ("", "")) for own in gains.values() for name in own}
+    text = {name: columns.get(get_gain_column(name), ("", "")) for own in gains.values() for name in own}
     maps = {printable(name): environment for name, environment in maps.items()}
     known = _known_gains(entries, text)
     return Result("sweep", folder, _labeled(entries), maps, wanted, *known, facts, {})

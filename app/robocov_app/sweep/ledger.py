@@ -1,4 +1,6 @@
-"""The folder of a sweep: each run in a folder of its own, there whole or not at all, with check sums."""
+"""The folder of a sweep: each run in a folder of its own, complete or absent, with checksums."""
+
+from __future__ import annotations
 
 import json
 import os
@@ -20,140 +22,239 @@ from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, list_result_versions
 from robocov_app.terminal.output import write_json
 
-RUNS = "runs"  # name of the folder of the runs' folders
-STUDY, CSV = "study.json", "results.csv"
-_ROW = "row.json"  # what the table holds of a run, in its folder
-_HEAD = {"format": "robocov-row", "version": 2}
-_LEFT_OVER = re.compile(
+RUNS_FOLDER = "runs"
+"""Name of the folder that contains the folders of the runs."""
+STUDY_FILE = "study.json"
+CSV_FILE = "results.csv"
+_ROW_FILE = "row.json"
+"""File in the folder of a run with its figures in the table and the checksums of its other files."""
+_ROW_FORMAT = "robocov-row"
+_ROW_VERSION = 2
+_DIGEST_BYTES = 16
+_TEMPORARY_NAME = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
 )
-"""Names of what a sweep that was killed has left half-written."""
-_NAMED = 5  # damaged runs that are named
+"""Names of incomplete files and folders, which a killed sweep leaves behind."""
+_MAX_NAMED_RUNS = 5
+"""Maximum number of damaged runs that are named."""
 
 
 class Entry(NamedTuple):
-    """Ledger entry of a run; no figures where it failed, not `checked` in version 1."""
+    """The ledger's entry of a run."""
 
     figures: Mapping[str, float | int | None]
+    """Figures in the table; none if the run failed."""
     error: str | None
+    """Reason why it failed."""
     versions: Mapping[str, str] = {}
-    checked: bool = True
+    """Versions on which the results depend, by package."""
+    has_checksums: bool = True
+    """Whether its files were written with checksums."""
 
 
-class Damaged(ValueError):  # noqa: N818 - it is handled
-    """A run is there, but is not as it was written."""
+class DamagedRunError(ValueError):
+    """The folder of a run exists, but is not as it was written."""
 
 
 @dataclass
 class Survey:
-    """Inventory of a study's runs: `todo` has 1 for each, in order, that is to be done."""
+    """State of the runs of a study.
 
-    todo: bytearray = field(default_factory=bytearray)
+    Attributes
+    ----------
+    is_left : bytearray
+        1 for each run that is to be done, 0 for the others, in the order of the tasks.
+    damaged : list of str
+        Names of damaged runs.
+    outdated : Counter
+        Number of runs of other versions, by the differences.
+    without_checksums : int
+        Number of used runs without checksums.
+    failed : int
+        Number of used runs that failed.
+    """
+
+    is_left: bytearray = field(default_factory=bytearray)
     damaged: list[str] = field(default_factory=list)
     outdated: Counter[str] = field(default_factory=Counter)
-    unchecked: int = 0
+    without_checksums: int = 0
     failed: int = 0
 
-    def words(self, *, keep_versions: bool) -> list[str]:
+    def describe(self, *, keep_versions: bool) -> list[str]:
+        """Return remarks on damaged and earlier runs, one per line.
+
+        Parameters
+        ----------
+        keep_versions : bool
+            Whether runs of other versions are used.
+        """
         lines = []
         if self.damaged:
-            count, rest = len(self.damaged), len(self.damaged) - _NAMED
-            names = ", ".join(self.damaged[:_NAMED]) + (f" and {rest} more" if rest > 0 else "")
-            lines.append(f"{format_count(count, 'damaged run')} will be done again: {names}")
-        for difference, count in self.outdated.items():
-            then = "will be used all the same" if keep_versions else "will be done again"
-            lines.append(f"{format_count(count, 'run')} made with {difference} {then}")
+            names = ", ".join(self.damaged[:_MAX_NAMED_RUNS])
+            unnamed = len(self.damaged) - _MAX_NAMED_RUNS
+            if unnamed > 0:
+                names = f"{names} and {unnamed} more"
+            runs = format_count(len(self.damaged), "damaged run")
+            lines.append(f"{runs} will be repeated: {names}")
+        decision = "will be used nevertheless" if keep_versions else "will be repeated"
+        for differences, count in self.outdated.items():
+            lines.append(f"{format_count(count, 'run')} made with {differences} {decision}")
         if self.outdated and not keep_versions:
             lines.append("--keep-versions uses them as they are")
-        if self.unchecked:
-            runs = (
-                f"{format_count(self.unchecked, 'run')} of an earlier version of robocov without check sums"
+        if self.without_checksums:
+            runs = format_count(self.without_checksums, "run")
+            lines.append(
+                f"{runs} of an earlier version of robocov without checksums will be used; damage to their "
+                "cost curves and trajectories would not be noticed"
             )
-            damage = "damage to their cost curves and trajectories would not be noticed"
-            lines.append(f"{runs} will be used; {damage}")
         return lines
 
 
 class Ledger:
-    """The runs in the folder of a sweep."""
+    """The runs in the folder of a sweep.
+
+    Parameters
+    ----------
+    folder : Path
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._runs = folder / RUNS
+        self.runs_folder = folder / RUNS_FOLDER
 
-    def entry(self, task: Task) -> Entry | None:
-        """Return what came of a task, None where nothing (or nothing that can be used) is there."""
-        with suppress(Damaged):
-            return self._entry(task)
+    def read_entry(self, task: Task) -> Entry | None:
+        """Return the entry of a task; None if there is none, or if it is damaged."""
+        with suppress(DamagedRunError):
+            return self._read_entry(task, checks_files=False)
         return None
 
     def survey(
         self, tasks: Iterable[Task], *, retry_failed: bool = False, keep_versions: bool = False
     ) -> Survey:
-        found = Survey()
-        for task in tasks:
-            entry = None
-            try:
-                entry = self._entry(task, files=True)
-            except Damaged:
-                found.damaged.append(task.name)
-            todo = entry is None or (retry_failed and entry.error is not None)
-            if entry is not None and not todo:
-                if difference := difference_of(entry.versions):
-                    found.outdated[difference] += 1
-                    todo = not keep_versions
-                found.unchecked += not todo and not entry.checked
-                found.failed += not todo and entry.error is not None
-            found.todo.append(todo)
-        return found
+        """Find the runs that are left.
 
-    def _entry(self, task: Task, *, files: bool = False) -> Entry | None:
-        """Return what came of a task, None for nothing; with `files`, check all of them."""
-        folder = self._runs / task.name
+        Parameters
+        ----------
+        tasks : iterable of Task
+        retry_failed : bool
+            Whether failed runs are repeated.
+        keep_versions : bool
+            Whether runs of other versions are used.
+
+        Returns
+        -------
+        Survey
+        """
+        survey = Survey()
+        for task in tasks:
+            is_left = self._survey_task(survey, task, retry_failed=retry_failed, keep_versions=keep_versions)
+            survey.is_left.append(is_left)
+        return survey
+
+    def _survey_task(self, survey: Survey, task: Task, *, retry_failed: bool, keep_versions: bool) -> bool:
+        """Add a task to the counts of a survey; return whether it is left."""
+        try:
+            entry = self._read_entry(task, checks_files=True)
+        except DamagedRunError:
+            survey.damaged.append(task.name)
+            return True
+        if entry is None or (retry_failed and entry.error is not None):
+            return True
+        differences = describe_version_differences(entry.versions)
+        if differences:
+            survey.outdated[differences] += 1
+            if not keep_versions:
+                return True
+        if not entry.has_checksums:
+            survey.without_checksums += 1
+        if entry.error is not None:
+            survey.failed += 1
+        return False
+
+    def _read_entry(self, task: Task, *, checks_files: bool) -> Entry | None:
+        """Return the entry of a task; None if there is none.
+
+        Raises
+        ------
+        DamagedRunError
+            If the entry, or with `checks_files` any file of the run, is not as it was written.
+        """
+        folder = self.runs_folder / task.name
         if not os.path.lexists(folder):
             return None
         try:
-            row = json.loads(_content(folder / _ROW))
-            figures, error = row["figures"], row["error"]
-            _require(row["format"] == _HEAD["format"] and row["digest"] == task.digest)
+            row = json.loads(_read_file(folder / _ROW_FILE))
+            figures = row["figures"]
+            error = row["error"]
+            _require(row["format"] == _ROW_FORMAT and row["digest"] == task.digest)
             _require(all(value is None or type(value) in (int, float) for value in figures.values()))
             _require(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
-                run = _content(folder / ("run.json" if error is None else "error.json"))
-                return Entry(figures, error, _versions_1(json.loads(run), figures, error), checked=False)
-            _require(row.pop("check_sum") == _check_sum(row))
-            for name, (size, digest) in row["files"].items() if files else ():
-                content = _content(folder / name)
-                _require(len(content) == size and _digest(content) == digest)
+                versions = _read_versions_of_format_1(folder, figures, error)
+                return Entry(figures, error, versions, has_checksums=False)
+            _require(row.pop("check_sum") == _compute_checksum(row))
+            if checks_files:
+                _check_files(folder, row["files"])
             return Entry(figures, error, row["versions"])
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
-            raise Damaged from fault
+            raise DamagedRunError from fault
 
-    def keep(self, task: Task, outcome: Outcome) -> None:
-        """Write the folder of a run, in the place of an earlier one: all of it, or nothing."""
-        target = self._runs / task.name
-        part = self._runs / f".{task.name}.part"
-        row: dict[str, Any] = {**_HEAD, "digest": task.digest, "versions": dict(outcome.versions)}
-        row |= {"figures": dict(outcome.figures), "error": outcome.error}
-        row["files"] = {name: (len(content), _digest(content)) for name, content in outcome.files.items()}
-        row["check_sum"] = _check_sum(row)
-        files = {**outcome.files, _ROW: (json.dumps(row, allow_nan=False) + "\n").encode()}
+    def store(self, task: Task, outcome: Outcome) -> None:
+        """Write the folder of a run, completely or not at all; an earlier one is replaced.
+
+        Parameters
+        ----------
+        task : Task
+        outcome : Outcome
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        target = self.runs_folder / task.name
+        temporary = self.runs_folder / f".{task.name}.part"
+        row: dict[str, Any] = {
+            "format": _ROW_FORMAT,
+            "version": _ROW_VERSION,
+            "digest": task.digest,
+            "versions": dict(outcome.versions),
+            "figures": dict(outcome.figures),
+            "error": outcome.error,
+            "files": {
+                name: (len(content), _compute_digest(content)) for name, content in outcome.files.items()
+            },
+        }
+        row["check_sum"] = _compute_checksum(row)
+        row_content = (json.dumps(row, allow_nan=False) + "\n").encode()
+        files = {**outcome.files, _ROW_FILE: row_content}
         try:
-            _remove(part)
-            part.mkdir()
+            _remove(temporary)
+            temporary.mkdir()
             for name, content in files.items():
-                (part / name).write_bytes(content)
-            flush_to_disk([*(part / name for name in files), part])
+                (temporary / name).write_bytes(content)
+            flush_to_disk([*(temporary / name for name in files), temporary])
             _remove(target)
-            part.rename(target)
+            temporary.rename(target)
         except OSError as error:
             with suppress(OSError):
-                _remove(part)
+                _remove(temporary)
             raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
 
 
-def difference_of(versions: Mapping[str, str]) -> str:
-    """Return how known versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``."""
+def describe_version_differences(versions: Mapping[str, str]) -> str:
+    """Return the differences of versions from those of this process.
+
+    Parameters
+    ----------
+    versions : mapping of str to str
+        Versions by package; a missing one does not count as different.
+
+    Returns
+    -------
+    str
+        As in ``numpy 2.0.1 instead of 2.1.0``; empty without differences.
+    """
     differences = []
     for name, current in list_result_versions().items():
         if versions.get(name, current) != current:
@@ -162,35 +263,53 @@ def difference_of(versions: Mapping[str, str]) -> str:
 
 
 @contextmanager
-def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
-    """Give the ledger of a sweep, for one process at a time; `study` is the content of ``study.json``."""
+def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
+    """Open the ledger of a sweep, for one process at a time.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sweep; it is created.
+    study : mapping
+        Content of ``study.json``.
+
+    Yields
+    ------
+    Ledger
+
+    Raises
+    ------
+    InputError
+        If the folder contains something else than a sweep.
+    OutputError
+        If it cannot be written to.
+    """
     with report_folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        used = any(not path.name.startswith(".") for path in folder.iterdir())
-    if used and not is_sweep(folder):
-        foreign = "the folder is not empty, and what is in it is no sweep"
-        raise InputError(f"{folder}: {foreign}; choose another --out")
+        is_used = any(not path.name.startswith(".") for path in folder.iterdir())
+    if is_used and not is_sweep(folder):
+        raise InputError(f"{folder}: expected an empty folder or a sweep; choose another --out")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be used for results: Permission denied")
     with lock_folder(folder):
         ledger = Ledger(folder)
         try:
-            for part in (*ledger._runs.glob(".*"), *folder.glob(".*")):
-                if _LEFT_OVER.fullmatch(part.name):
-                    _remove(part)
-            # first: it says that the folder is ours
+            for path in (*ledger.runs_folder.glob(".*"), *folder.glob(".*")):
+                if _TEMPORARY_NAME.fullmatch(path.name):
+                    _remove(path)
+            # This file is written first, because it marks the folder as that of a sweep.
             if not has_all_rows(folder):
-                write_json(folder / STUDY, study)
-            (folder / RUNS).mkdir(exist_ok=True)
+                write_json(folder / STUDY_FILE, study)
+            ledger.runs_folder.mkdir(exist_ok=True)
         except OSError as error:
-            at = error.filename or folder
-            raise OutputError(f"{at}: cannot be used for results: {error.strerror or error}") from error
+            path = error.filename or folder
+            raise OutputError(f"{path}: cannot be used for results: {error.strerror or error}") from error
         yield ledger
 
 
-def rows_in(folder: Path) -> int:
-    """Return the number of rows in the table of a sweep, 0 where there is none."""
-    with suppress(OSError), (folder / CSV).open("rb") as file:
+def count_rows(folder: Path) -> int:
+    """Return the number of rows in the table of a sweep, 0 if there is no table."""
+    with suppress(OSError), (folder / CSV_FILE).open("rb") as file:
         return max(0, sum(1 for _ in file) - 1)
     return 0
 
@@ -198,53 +317,67 @@ def rows_in(folder: Path) -> int:
 def has_all_rows(folder: Path) -> bool:
     """Return whether the table of a sweep has a row for each run of ``study.json``."""
     try:
-        return rows_in(folder) >= int(json.loads(_content(folder / STUDY))["runs"])
+        return count_rows(folder) >= int(json.loads(_read_file(folder / STUDY_FILE))["runs"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 
 def is_sweep(folder: Path) -> bool:
-    """Return whether a folder is that of a sweep, also of one whose ``study.json`` is damaged."""
+    """Return whether a folder is that of a sweep, even if its ``study.json`` is damaged."""
     try:
-        content = json.loads(_content(folder / STUDY))
+        content = json.loads(_read_file(folder / STUDY_FILE))
     except OSError:
         return False
     except (ValueError, RecursionError):
-        return (folder / RUNS).is_dir() and (folder / ".lock").is_file()
+        return (folder / RUNS_FOLDER).is_dir() and (folder / ".lock").is_file()
     return isinstance(content, dict) and content.get("format") == "robocov-study"
 
 
-def _versions_1(run: Mapping[str, Any], figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
-    """Return what a run of version 1 was made with, if its row agrees with its other file."""
+def _read_versions_of_format_1(
+    folder: Path, figures: Mapping[str, Any], error: str | None
+) -> Mapping[str, str]:
+    """Return the versions of a run of format 1; raise DamagedRunError if its two files disagree."""
+    file_name = "run.json" if error is None else "error.json"
+    run = json.loads(_read_file(folder / file_name))
     if error is not None:
         _require(run["error"] == error)
         return {}
     for name in FIGURES:
         value = run["summary"][name]
-        _require(figures[name] == (sum(value) / len(value) if isinstance(value, list) else value))
+        expected = sum(value) / len(value) if isinstance(value, list) else value
+        _require(figures[name] == expected)
     return dict(run["versions"])
 
 
-def _require(sound: bool) -> None:
-    if not sound:
-        raise Damaged
+def _check_files(folder: Path, files: Mapping[str, tuple[int, str]]) -> None:
+    """Raise DamagedRunError if a file does not have its size and digest."""
+    for name, (size, digest) in files.items():
+        content = _read_file(folder / name)
+        _require(len(content) == size and _compute_digest(content) == digest)
 
 
-def _content(path: Path) -> bytes:
-    if not path.is_file():  # a pipe, say, might have no end
+def _require(is_valid: bool) -> None:
+    if not is_valid:
+        raise DamagedRunError
+
+
+def _read_file(path: Path) -> bytes:
+    # A pipe, for example, may have no end.
+    if not path.is_file():
         raise FileNotFoundError(path)
     return path.read_bytes()
 
 
-def _digest(content: bytes) -> str:
-    return blake2b(content, digest_size=16).hexdigest()
+def _compute_digest(content: bytes) -> str:
+    return blake2b(content, digest_size=_DIGEST_BYTES).hexdigest()
 
 
-def _check_sum(row: Mapping[str, Any]) -> str:
-    return _digest(json.dumps(row, sort_keys=True, allow_nan=False).encode())
+def _compute_checksum(row: Mapping[str, Any]) -> str:
+    return _compute_digest(json.dumps(row, sort_keys=True, allow_nan=False).encode())
 
 
 def _remove(path: Path) -> None:
+    """Remove a file or a folder with its content, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

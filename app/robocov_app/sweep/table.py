@@ -1,4 +1,4 @@
-"""The table of a sweep: ``results.csv``, which grows in a first sweep, and as Parquet ``results.parquet``."""
+"""The table of a sweep: ``results.csv``, which grows during a first sweep, and ``results.parquet``."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ from robocov.errors import OutputError
 from robocov.files.writing import flush_to_disk, resolve_target
 from robocov.metrics.results import read_rows
 from robocov.optional_imports import import_optional
-from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
+from robocov_app.sweep.ledger import CSV_FILE, STUDY_FILE, Entry, count_rows, has_all_rows
 from robocov_app.sweep.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, MEAN_TIME
 from robocov_app.terminal.output import format_csv_line
 
-PARQUET = "results.parquet"
-_CSV_PART, _PARQUET_PART = ".results.part.csv", ".results.part.parquet"  # names while a table is written
-ROW_GROUP = 4096  # rows of a row group of Parquet, and the most that are in memory
+PARQUET_FILE = "results.parquet"
+_TEMPORARY_CSV_FILE = ".results.part.csv"
+_TEMPORARY_PARQUET_FILE = ".results.part.parquet"
+_TEMPORARY_STUDY_FILE = ".study.part.json"
+ROW_GROUP_SIZE = 4096
+"""Number of rows of a row group in Parquet, and maximum number of rows in memory."""
 
 
 class Column(NamedTuple):
@@ -33,27 +36,28 @@ class Column(NamedTuple):
 
     name: str
     kind: str
+    """Name of its type in Parquet."""
     unit: str
     meaning: str
 
 
-_BEFORE = (
+_RUN_COLUMNS = (
     Column("map", "string", "", "the map, as the study calls it"),
     Column("controller", "string", "", "the controller"),
     Column("robots", "int64", "", "number of robots"),
     Column("start", "string", "", "the start, as the map calls it"),
     Column("seed", "int64", "", "seed of the starting positions"),
 )
-_DURATION = Column("duration_s", "double", "s", "simulated time")
-_FIGURES = tuple(Column(name, *facts) for name, facts in FIGURES.items())
-_AFTER = (
+_DURATION_COLUMN = Column("duration_s", "double", "s", "simulated time")
+_FIGURE_COLUMNS = tuple(Column(name, *facts) for name, facts in FIGURES.items())
+_FINAL_COLUMNS = (
     Column("run", "string", "", "the run's folder in runs/"),
     Column("error", "string", "", "why the run failed, null if it did not"),
 )
-_TIME = Column(
+_MEAN_TIME_COLUMN = Column(
     MEAN_TIME, "double", "s", "mean time until the first robot is at a place, each at its top speed"
 )
-_METRICS = (
+_METRIC_COLUMNS = (
     Column("sensed_area_m2", "double", "m²", "free area in a robot's sensing range and line of sight"),
     Column("range_area_m2", "double", "m²", "free area in a robot's sensing range, walls or not"),
     Column("visible_area_m2", "double", "m²", "free area in a robot's line of sight"),
@@ -66,147 +70,238 @@ _METRICS = (
 )
 
 
-def columns_of(study: Study) -> tuple[Column, ...]:
-    """Return the columns of a study's table: the gains and the teams that it tries among those of all."""
-    gains: dict[str, Column] = {}
-    for controller in study.controllers:
-        known = get_gains(study.load_controller_class(controller))
-        for name in study.get_gains(controller).choices[0]:
-            kind = "string" if isinstance(known[name], Option) else "double"
-            column = Column(gain_column(name), kind, known[name].unit, known[name].meaning)
-            if gains.setdefault(name, column).kind != kind:
-                # a number here and a word there: both can be written as words
-                gains[name] = gains[name]._replace(kind="string")
-    team = []
+def build_columns(study: Study) -> tuple[Column, ...]:
+    """Return the columns of a study's table.
+
+    They include the gains of its controllers, and the parameters of robots and conditions that it varies.
+    """
+    parameter_columns = []
     for name in study.varied_parameters:
-        meaning = f"{name.replace('_', ' ')} {'of the run' if name in CONDITIONS else 'of the robots'}"
+        owner = "of the run" if name in CONDITIONS else "of the robots"
+        meaning = f"{name.replace('_', ' ')} {owner}"
         kind = "string" if name in TEXT_PARAMETERS else "double"
-        team.append(Column(name_parameter_column(name), kind, UNITS[name], meaning))
-    figures = (*_FIGURES, *((_TIME,) if study.has_mixed_speeds else ()), *(_METRICS if study.metrics else ()))
-    return (*_BEFORE, *gains.values(), *team, _DURATION, *figures, *_AFTER)
+        parameter_columns.append(Column(name_parameter_column(name), kind, UNITS[name], meaning))
+    figure_columns = [*_FIGURE_COLUMNS]
+    if study.has_mixed_speeds:
+        figure_columns.append(_MEAN_TIME_COLUMN)
+    if study.metrics:
+        figure_columns += _METRIC_COLUMNS
+    return (
+        *_RUN_COLUMNS,
+        *_build_gain_columns(study),
+        *parameter_columns,
+        _DURATION_COLUMN,
+        *figure_columns,
+        *_FINAL_COLUMNS,
+    )
 
 
-def gain_column(name: str) -> str:
+def _build_gain_columns(study: Study) -> list[Column]:
+    """Return a column for each gain of the study's controllers."""
+    columns: dict[str, Column] = {}
+    for controller in study.controllers:
+        gains = get_gains(study.load_controller_class(controller))
+        for name in study.get_gains(controller).choices[0]:
+            kind = "string" if isinstance(gains[name], Option) else "double"
+            column = Column(get_gain_column(name), kind, gains[name].unit, gains[name].meaning)
+            if columns.setdefault(name, column).kind != kind:
+                # A number of one controller and a word of another one can both be written as words.
+                columns[name] = columns[name]._replace(kind="string")
+    return list(columns.values())
+
+
+def get_gain_column(name: str) -> str:
     """Return the name of the column of a gain: its own, unless another column has it."""
-    taken = {column.name for column in (*_BEFORE, _DURATION, *_FIGURES, _TIME, *_METRICS, *_AFTER)}
-    taken |= {name_parameter_column(name) for name in UNITS}
-    return f"gain_{name}" if name in taken else name
+    other_columns = (
+        *_RUN_COLUMNS,
+        _DURATION_COLUMN,
+        *_FIGURE_COLUMNS,
+        _MEAN_TIME_COLUMN,
+        *_METRIC_COLUMNS,
+        *_FINAL_COLUMNS,
+    )
+    other_names = {column.name for column in other_columns}
+    other_names |= {name_parameter_column(parameter) for parameter in UNITS}
+    return f"gain_{name}" if name in other_names else name
 
 
-def row_of(task: Task, entry: Entry) -> dict[str, Any]:
-    row: dict[str, Any] = {column.name: getattr(task, column.name) for column in _BEFORE}
-    row |= {gain_column(name): value for name, value in task.gains.items()}
+def build_row(task: Task, entry: Entry) -> dict[str, Any]:
+    """Return the row of a task in the table, by the names of the columns."""
+    row: dict[str, Any] = {column.name: getattr(task, column.name) for column in _RUN_COLUMNS}
+    row |= {get_gain_column(name): value for name, value in task.gains.items()}
     row |= {name_parameter_column(name): value for name, value in task.team.items()}
-    return {**row, "duration_s": task.duration, **entry.figures, "run": task.name, "error": entry.error}
+    row["duration_s"] = task.duration
+    row |= entry.figures
+    row["run"] = task.name
+    row["error"] = entry.error
+    return row
 
 
 class Table:
-    """Writes the rows of a sweep in the order in which they come; a context.
+    """Writes the rows of a sweep in the order in which they are added; a context manager.
 
-    The files are written aside, and replace earlier ones, with ``study.json``, when the context ends well;
-    if not `complete`, none with more rows. A first ``results.csv`` appears as soon as it is no shorter than
-    what is there, and grows. `replaced`: whether the files are of these rows. No half of a row is ever left.
-    Parquet is written on request, and where a file of it is there already.
+    The files are written under temporary names. They replace earlier ones, together with ``study.json``, when
+    the context ends without an exception; if the table is not complete, only if it has no fewer rows. A first
+    ``results.csv`` appears as soon as it is no shorter than the earlier one, and grows from then on. It never
+    ends in an incomplete row.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sweep.
+    columns : sequence of Column
+    study : bytes, optional
+        Content of ``study.json``.
+    parquet : bool
+        Whether a Parquet file is written, too. One that exists is replaced in any case.
+
+    Attributes
+    ----------
+    is_complete : bool
+        Whether all rows were added; set by the caller before the end.
+    is_replaced : bool
+        Whether the files contain these rows.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
     """
 
     def __init__(
         self, folder: Path, columns: Sequence[Column], study: bytes | None = None, *, parquet: bool = False
     ) -> None:
-        self.complete, self.replaced = True, False
-        self._names = (CSV, *[PARQUET] * (parquet or (folder / PARQUET).exists()))
-        self._folder, self._columns, self._study = folder, columns, study
-        self._broken: OutputError | None = None
-        self._size, self._count = 0, -1  # the header is no row
+        self.is_complete = True
+        self.is_replaced = False
+        self._folder = folder
+        self._columns = columns
+        self._study = study
+        self._has_parquet = parquet or (folder / PARQUET_FILE).exists()
+        self._error: OutputError | None = None
+        self._size = 0  # bytes
+        self._row_count = -1  # The header is no row.
 
     def __enter__(self) -> Table:
-        for name in self._names:
-            resolve_target(self._folder / name)
-            if name == PARQUET:
-                import_optional("pyarrow", "parquet", f"{self._folder / name}: ")
-        # rows of an earlier table, which only one that grows replaces before the end
-        self._former = rows_in(self._folder)
-        self._shown_from = math.inf if has_all_rows(self._folder) else self._former
+        resolve_target(self._folder / CSV_FILE)
+        if self._has_parquet:
+            resolve_target(self._folder / PARQUET_FILE)
+            import_optional("pyarrow", "parquet", f"{self._folder / PARQUET_FILE}: ")
+        # Before the end, an earlier table is only replaced by one that grows beyond it.
+        self._earlier_row_count = count_rows(self._folder)
+        self._rows_until_shown = math.inf if has_all_rows(self._folder) else self._earlier_row_count
         with ExitStack() as stack:
-            for part in (_CSV_PART, _PARQUET_PART):
-                stack.callback((self._folder / part).unlink, missing_ok=True)
-            with _told(self._folder / CSV):
-                self._csv = (self._folder / _CSV_PART).open("wb", buffering=0)
-            stack.callback(lambda: self._csv.close())  # it may be another one by then
-            self._write(format_csv_line(column.name for column in self._columns))
+            for name in (_TEMPORARY_CSV_FILE, _TEMPORARY_PARQUET_FILE):
+                stack.callback((self._folder / name).unlink, missing_ok=True)
+            with _report_write_errors(self._folder / CSV_FILE):
+                self._csv = (self._folder / _TEMPORARY_CSV_FILE).open("wb", buffering=0)
+            # Another file may be open by then.
+            stack.callback(lambda: self._csv.close())
+            self._write_line(format_csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(self, *exception: Any) -> None:
-        """Replace the files of an earlier sweep by those of this one, all after another at once."""
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
         with self._stack:
-            if exception[0] is not None:
+            if error_type is not None:
                 return
             self._csv.close()
-            if not self.complete and self._count < self._former and not self.replaced:
+            is_shorter = self._row_count < self._earlier_row_count
+            if not self.is_complete and is_shorter and not self.is_replaced:
                 return
-            names = {} if self.replaced else {CSV: _CSV_PART}
-            with _told(self._folder / self._names[-1]):
-                if PARQUET in self._names:
-                    names = {PARQUET: _PARQUET_PART} | names
-                    self._write_parquet(self._folder / names.get(CSV, CSV))
-                study = self._folder / STUDY
-                if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
-                    names[STUDY] = ".study.part.json"
-                    (self._folder / names[STUDY]).write_bytes(self._study)
-                grown = [self._folder / CSV] * self.replaced
-                flush_to_disk([self._folder / part for part in names.values()] + grown)
-                for name, part in names.items():
-                    (self._folder / part).replace(self._folder / name)
-                flush_to_disk([self._folder])
-            self.replaced = True
+            self._replace_files()
+            self.is_replaced = True
+
+    def _replace_files(self) -> None:
+        """Replace the files of an earlier sweep by those of this one, in quick succession."""
+        temporary_names = {}
+        with _report_write_errors(self._folder / (PARQUET_FILE if self._has_parquet else CSV_FILE)):
+            if self._has_parquet:
+                temporary_names[PARQUET_FILE] = _TEMPORARY_PARQUET_FILE
+                self._write_parquet(self._folder / (CSV_FILE if self.is_replaced else _TEMPORARY_CSV_FILE))
+            if not self.is_replaced:
+                temporary_names[CSV_FILE] = _TEMPORARY_CSV_FILE
+            if self._study is not None and not self._has_study(self._study):
+                temporary_names[STUDY_FILE] = _TEMPORARY_STUDY_FILE
+                (self._folder / _TEMPORARY_STUDY_FILE).write_bytes(self._study)
+            written = [self._folder / name for name in temporary_names.values()]
+            if self.is_replaced:
+                written.append(self._folder / CSV_FILE)
+            flush_to_disk(written)
+            for name, temporary_name in temporary_names.items():
+                (self._folder / temporary_name).replace(self._folder / name)
+            flush_to_disk([self._folder])
+
+    def _has_study(self, content: bytes) -> bool:
+        """Return whether ``study.json`` has this content."""
+        path = self._folder / STUDY_FILE
+        return path.is_file() and path.read_bytes() == content
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Append a row; what it does not hold is null."""
-        if self._broken is not None:
-            raise self._broken
+        """Append a row.
+
+        Parameters
+        ----------
+        row : mapping
+            Values by the names of the columns; missing ones are null.
+
+        Raises
+        ------
+        OutputError
+            If this row, or an earlier one, could not be written.
+        """
+        if self._error is not None:
+            raise self._error
         try:
-            self._write(format_csv_line(row.get(column.name) for column in self._columns))
+            self._write_line(format_csv_line(row.get(column.name) for column in self._columns))
         except OutputError as error:
-            self._broken = error
+            self._error = error
             raise
 
-    def _write(self, line: str) -> None:
-        """Append a line to the CSV file, all of it or nothing, and show the file when it is time."""
-        rest = memoryview(line.encode())
-        size = self._size + len(rest)
-        with _told(self._folder / CSV):
+    def _write_line(self, line: str) -> None:
+        """Append a line to the CSV file, completely or not at all; show the file when it is long enough."""
+        remaining = memoryview(line.encode())
+        new_size = self._size + len(remaining)
+        with _report_write_errors(self._folder / CSV_FILE):
             try:
-                while rest:
-                    rest = rest[self._csv.write(rest) :]
+                while remaining:
+                    remaining = remaining[self._csv.write(remaining) :]
             except OSError:
                 with suppress(OSError):
                     os.ftruncate(self._csv.fileno(), self._size)
                 raise
-            self._size, self._count = size, self._count + 1
-            if self._count >= self._shown_from:
-                self._csv.close()  # open files cannot be renamed everywhere
-                (self._folder / _CSV_PART).replace(self._folder / CSV)
-                self._csv = (self._folder / CSV).open("ab", buffering=0)
-                self._shown_from, self.replaced = math.inf, True
+            self._size = new_size
+            self._row_count += 1
+            if self._row_count >= self._rows_until_shown:
+                self._show()
 
-    def _write_parquet(self, table: Path) -> None:
+    def _show(self) -> None:
+        """Give the growing CSV file its final name."""
+        # Not every system can rename open files.
+        self._csv.close()
+        (self._folder / _TEMPORARY_CSV_FILE).replace(self._folder / CSV_FILE)
+        self._csv = (self._folder / CSV_FILE).open("ab", buffering=0)
+        self._rows_until_shown = math.inf
+        self.is_replaced = True
+
+    def _write_parquet(self, csv_path: Path) -> None:
+        """Convert a CSV file to Parquet."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        fields = (
-            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
-            for name, kind, unit, meaning in self._columns
-        )
+        fields = [
+            pa.field(column.name, column.kind, metadata={"unit": column.unit, "meaning": column.meaning})
+            for column in self._columns
+        ]
         schema = pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})
-        rows = read_rows(table, {column.name: column.kind for column in self._columns})
-        with pq.ParquetWriter(self._folder / _PARQUET_PART, schema) as writer:
-            while group := list(islice(rows, ROW_GROUP)):
+        rows = read_rows(csv_path, {column.name: column.kind for column in self._columns})
+        with pq.ParquetWriter(self._folder / _TEMPORARY_PARQUET_FILE, schema) as writer:
+            while group := list(islice(rows, ROW_GROUP_SIZE)):
                 writer.write_table(pa.Table.from_pylist(group, schema))
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Raise OutputError where the system refuses to write a file."""
+def _report_write_errors(path: Path) -> Iterator[None]:
+    """Raise OutputError if the system refuses to write a file."""
     try:
         yield
     except OSError as error:

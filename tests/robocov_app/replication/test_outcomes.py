@@ -26,7 +26,7 @@ from robocov_app.replication.outcomes import (
     find_best_gains,
     merge_outcomes,
 )
-from robocov_app.sweep.ledger import _check_sum
+from robocov_app.sweep.ledger import _compute_checksum
 from robocov_app.sweep.sweeping import sweep
 
 REFERENCES = {"blocks-a": ReferencePlacement(1.5, ((1.0, 1.0),), 1.0)}
@@ -86,7 +86,8 @@ def test_a_run_that_failed_is_nan(study, folder, tmp_path):
     row = next(row for row in read_rows(folder) if row["controller"] == "lloyd")
     entry = broken / "runs" / row["run"] / "row.json"
     content = json.loads(entry.read_text()) | {"figures": {}, "error": "it fell over"}
-    content["check_sum"] = _check_sum({key: value for key, value in content.items() if key != "check_sum"})
+    del content["check_sum"]
+    content["check_sum"] = _compute_checksum(content)
     entry.write_text(json.dumps(content))
     sweep(study.study, broken, workers=1, quiet=True)
     outcomes = read_outcomes(broken, study, REFERENCES)

@@ -17,8 +17,8 @@ from swept import controller, small_study, tables
 
 from robocov.errors import OutputError, RobocovError
 from robocov_app.cli import main
-from robocov_app.sweep import executors as cluster_module
-from robocov_app.sweep.executors import Cluster
+from robocov_app.sweep import cluster as cluster_module
+from robocov_app.sweep.cluster import Cluster
 from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
@@ -48,7 +48,7 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFi
         address = cluster.scheduler_address
         assert sweep(study, tmp_path / "there", scheduler=address, quiet=True) == expected
         with Cluster(address) as executor:
-            assert (executor.threads, executor.most) == (2, 4)
+            assert (executor.threads, executor.capacity) == (2, 4)
         file = tmp_path / "study.toml"
         file.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
         words = ("sweep", str(file), "--dry-run", "--scheduler", address)
@@ -72,17 +72,17 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
 
 
 def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster_module, "_LOOK", 0.05)
+    monkeypatch.setattr(cluster_module, "_THREAD_COUNT_INTERVAL_S", 0.05)
     task = next(generate_tasks(small_study()))
     with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
-        assert executor.next(0.1) is None
-        assert executor.waiting == f"no workers are connected to {cluster.scheduler_address}; waiting"
+        assert executor.wait_for_next(0.1) is None
+        assert executor.waiting_reason == f"no workers are connected to {cluster.scheduler_address}; waiting"
         cluster.scale(1)
-        while (back := executor.next(0.1)) is None:
+        while (back := executor.wait_for_next(0.1)) is None:
             pass
         assert back[1].error is None
-        while executor.waiting:  # until it looks again
+        while executor.waiting_reason:  # until it looks again
             pass
 
 
@@ -98,7 +98,7 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
         path.unlink()
     with a_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
-        while (back := executor.next(0.1)) is None:
+        while (back := executor.wait_for_next(0.1)) is None:
             pass
     assert back[1] == here
     assert here.error is None
@@ -110,18 +110,18 @@ def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp
     with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         for task in generate_tasks(study):
             executor.submit(task)
-        while executor.next(0.1) is None:
+        while executor.wait_for_next(0.1) is None:
             pass
         cluster.close()
-        with pytest.raises(OutputError, match=r"--scheduler: inproc://.*: the runs cannot go on: "):
-            while executor.busy:
-                executor.next(0.1)
+        with pytest.raises(OutputError, match=r"--scheduler: inproc://.*: the runs cannot continue: "):
+            while executor.unfinished_tasks:
+                executor.wait_for_next(0.1)
 
 
 def test_nobody_at_the_address_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster_module, "CONNECTION_TIMEOUT_S", 0.5)
     study = tmp_path / "study.toml"
     study.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
     with socket.socket() as silent:
@@ -157,8 +157,8 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
     with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         with pytest.raises(OutputError, match="ModuleNotFoundError: No module named 'robocov_app'"):
-            while executor.busy:
-                executor.next(0.1)
+            while executor.unfinished_tasks:
+                executor.wait_for_next(0.1)
 
 
 def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:

@@ -10,7 +10,7 @@ from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.parameters import CONDITIONS, build_conditions, parse_condition_axes
 from robocov_app.sweep.study_file import study_of
-from robocov_app.sweep.table import columns_of, row_of
+from robocov_app.sweep.table import build_columns, build_row
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
@@ -20,11 +20,11 @@ def test_every_combination_is_tried() -> None:
     assert len(study.teams) == 4
     assert study.varied_parameters == ("loss", "fail")
     assert len(list(generate_tasks(study))) == len(study) == 16
-    columns = [column.name for column in columns_of(study)]
+    columns = [column.name for column in build_columns(study)]
     assert "loss" in columns
     assert "fail" in columns
     assert "delay_s" not in columns
-    row = row_of(list(generate_tasks(study))[-1], Entry({}, None))
+    row = build_row(list(generate_tasks(study))[-1], Entry({}, None))
     assert (row["loss"], row["fail"], row["delay_s"]) == (0.5, "1@0.2", 0.1)
 
 

@@ -11,8 +11,9 @@ import pytest
 from swept import controller, small_study
 
 from robocov.errors import OutputError
-from robocov_app.sweep import executors as pool_module
-from robocov_app.sweep.executors import Executor, LocalPool, Lost, Returned, processors
+from robocov_app.sweep import local_pool as pool_module
+from robocov_app.sweep.executor import Executor, LostWorker, Result
+from robocov_app.sweep.local_pool import LocalPool, count_processors
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import Outcome, perform
 
@@ -20,8 +21,8 @@ PATIENCE = 60.0
 
 FINE = Outcome({}, {"contacts": 0})
 
-KILLED = Lost("its process ended (signal 9)", "", blamed=False)
-CRASHED = Lost("its process ended (exit status 3)", "Fatal", blamed=True)
+KILLED = LostWorker("its process ended (signal 9)", "", is_caused_by_task=False)
+CRASHED = LostWorker("its process ended (exit status 3)", "Fatal", is_caused_by_task=True)
 
 
 def done_by(executor: Executor, tasks: list[Task]) -> dict[str, Outcome]:
@@ -30,9 +31,9 @@ def done_by(executor: Executor, tasks: list[Task]) -> dict[str, Outcome]:
     end = time.monotonic() + PATIENCE
     for task in tasks:
         executor.submit(task)
-    while executor.busy:
+    while executor.unfinished_tasks:
         assert time.monotonic() < end
-        back = executor.next(0.1)
+        back = executor.wait_for_next(0.1)
         if back is not None:
             outcomes[back[0].name] = back[1]
     return outcomes
@@ -41,7 +42,7 @@ def done_by(executor: Executor, tasks: list[Task]) -> dict[str, Outcome]:
 class Scripted(Executor):
     """Returns what it is told to, first in, first out; remembers what was out at the same time."""
 
-    def __init__(self, most: int, script: dict[str, list[Outcome | Lost]]) -> None:
+    def __init__(self, most: int, script: dict[str, list[Outcome | LostWorker]]) -> None:
         super().__init__()
         self._most, self._script = most, script
         self._queue: list[Task] = []
@@ -50,13 +51,13 @@ class Scripted(Executor):
     def __exit__(self, *exception: object) -> None: ...
 
     @property
-    def most(self) -> int:
+    def capacity(self) -> int:
         return self._most
 
-    def _hand_out(self, task: Task) -> None:
+    def _start(self, task: Task) -> None:
         self._queue.append(task)
 
-    def _returned(self, timeout: float) -> Returned | None:
+    def _wait_for_result(self, timeout: float) -> Result | None:
         if not self._queue:
             return None
         self.together.append((self._queue[0].name, len(self._queue)))
@@ -72,10 +73,10 @@ def tasks() -> list[Task]:
 
 def test_no_more_is_handed_out_than_is_wanted(tasks: list[Task]) -> None:
     with Scripted(2, {}) as executor:
-        assert executor.busy < executor.most
+        assert executor.unfinished_tasks < executor.capacity
         for task in tasks[:2]:
             executor.submit(task)
-        assert executor.busy == executor.most
+        assert executor.unfinished_tasks == executor.capacity
         assert done_by(executor, tasks[2:]) == {task.name: FINE for task in tasks}
         assert max(count for _, count in executor.together) == 2
 
@@ -110,7 +111,7 @@ def test_workers_that_end_again_and_again_end_the_sweep() -> None:
         told = pytest.raises(OutputError, match=r"workers have ended one after the other.*signal 9")
         with told:
             done_by(executor, tasks)
-    assert executor.lost == 21
+    assert executor.lost_workers == 21
 
 
 @pytest.mark.slow
@@ -164,7 +165,7 @@ def test_nothing_is_left_of_a_pool(tmp_path: Path) -> None:
             pool.submit(task)
         end = time.monotonic() + PATIENCE
         while len(children() - others) < 2 and time.monotonic() < end:
-            pool.next(0.05)
+            pool.wait_for_next(0.05)
         assert len(children() - others) == 2
     assert not awake.exists(), "nobody waits for what nobody wants any more"
     assert not children() - others
@@ -221,9 +222,9 @@ def test_where_no_process_can_begin_it_is_said_why(
 
 
 def test_the_number_of_processors_is_what_this_process_may_use() -> None:
-    assert 1 <= processors() <= (os.cpu_count() or 1)
+    assert 1 <= count_processors() <= (os.cpu_count() or 1)
     if sys.platform == "linux":
-        assert processors() == len(os.sched_getaffinity(0))
+        assert count_processors() == len(os.sched_getaffinity(0))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are ended by signals")
@@ -240,4 +241,4 @@ def test_a_worker_that_is_killed_while_it_starts_is_told(monkeypatch: pytest.Mon
         pool.submit(next(iter(generate_tasks(small_study()))))
         ending = r"worker killed by signal 9 \(SIGKILL\) while starting$"
         with pytest.raises(OutputError, match=ending):
-            pool.next(PATIENCE)
+            pool.wait_for_next(PATIENCE)

@@ -18,7 +18,7 @@ from robocov.metrics import compute_cost_history, summarize
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
 from robocov_app.sweep.study import Study, StudyMap
-from robocov_app.sweep.table import columns_of
+from robocov_app.sweep.table import build_columns
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepare_cost, simulate
 
@@ -188,11 +188,11 @@ def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
     study = small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
     outcome = perform(first(study))
     assert outcome.error is None
-    known = [column.name for column in columns_of(study)]
+    known = [column.name for column in build_columns(study)]
     assert set(outcome.figures) <= {*known, "range_area_m2", "wall_clearance_m"}
     assert {"mean_time_s", "sensed_area_m2", "near_final_s", "robot_clearance_m"} <= set(outcome.figures)
     assert outcome.figures["mean_time_s"] > outcome.figures["mean_distance_m"]
     assert outcome.files["cost.csv"].splitlines()[0].endswith(b",mean_time_s")
     plain = small_study()
     assert set(perform(first(plain)).figures) == set(FIGURES)
-    assert not {"mean_time_s", "sensed_area_m2"} & {column.name for column in columns_of(plain)}
+    assert not {"mean_time_s", "sensed_area_m2"} & {column.name for column in build_columns(plain)}

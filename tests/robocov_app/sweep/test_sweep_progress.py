@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from robocov_app.sweep import sweeping as telling
-from robocov_app.sweep.sweeping import Count, sweep_progress
+from robocov_app.sweep import progress as progress_module
+from robocov_app.sweep.progress import SweepProgress, report_progress
 
 
 class Clock:
@@ -14,7 +14,7 @@ class Clock:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
-        monkeypatch.setattr(telling.time, "perf_counter", lambda: self.now)
+        monkeypatch.setattr(progress_module.time, "perf_counter", lambda: self.now)
 
 
 @pytest.fixture
@@ -23,24 +23,26 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_what_is_left_is_estimated_from_what_was_done_now(clock: Clock) -> None:
-    count = Count(100, began=clock.now)
-    assert (count.rate, count.left) == (0.0, None)
-    count.reused, count.done, count.failed = 40, 8, 2
+    progress = SweepProgress(100, start_time=clock.now)
+    assert (progress.rate, progress.remaining_time) == (0.0, None)
+    progress.reused = 40
+    progress.done = 8
+    progress.failed = 2
     clock.now += 5.0
-    assert count.rate == 2.0
-    assert count.left == 25.0
-    assert str(count) == "50 of 100 runs, 2 failed, 40 were there, 2 a second"
+    assert progress.rate == 2.0
+    assert progress.remaining_time == 25.0
+    assert progress.describe() == "50 of 100 runs, 2 failed, 40 reused, 2 a second"
 
 
 def test_where_there_is_no_terminal_a_line_comes_now_and_then(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    count = Count(1000, began=clock.now)
-    with sweep_progress("sweep", count, quiet=False) as tell:
+    progress = SweepProgress(1000, start_time=clock.now)
+    with report_progress("sweep", progress, quiet=False) as reporter:
         for _ in range(100):
             clock.now += 0.5
-            count.done += 1
-            tell(count)
+            progress.done += 1
+            reporter.update(progress)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 5 + 1
     assert lines[0] == "sweep: 20 of 1000 runs, 2 a second, 8 min 10 s left"
@@ -50,12 +52,13 @@ def test_where_there_is_no_terminal_a_line_comes_now_and_then(
 def test_a_wait_is_told_once_in_place_of_an_estimate(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    count = Count(10, began=clock.now, done=2, waiting="nobody is there; waiting")
-    with sweep_progress("sweep", count, quiet=False) as tell:
+    progress = SweepProgress(10, start_time=clock.now, done=2, waiting_reason="nobody is there; waiting")
+    with report_progress("sweep", progress, quiet=False) as reporter:
         for _ in range(100):
             clock.now += 1.0
-            tell(count)
-        count.waiting, count.lost = "", 3
+            reporter.update(progress)
+        progress.waiting_reason = ""
+        progress.lost_workers = 3
     assert capsys.readouterr().err.splitlines() == [
         "sweep: 2 of 10 runs, 2 a second, nobody is there; waiting",
         "sweep: 2 of 10 runs, 3 workers lost, 0.02 a second, 6 min 40 s left",
@@ -63,8 +66,8 @@ def test_a_wait_is_told_once_in_place_of_an_estimate(
 
 
 def test_nobody_is_told_when_nobody_wants_to_know(capsys: pytest.CaptureFixture[str]) -> None:
-    with sweep_progress("sweep", Count(1), quiet=True) as tell:
-        tell(Count(1))
+    with report_progress("sweep", SweepProgress(1), quiet=True) as reporter:
+        reporter.update(SweepProgress(1))
     assert capsys.readouterr() == ("", "")
 
 
@@ -78,10 +81,11 @@ def test_a_terminal_gets_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "120")
-    count = Count(4)
-    with sweep_progress("[bold]mine[/] [/x]", count, quiet=False) as tell:
-        count.done, count.failed = 1, 1
-        tell(count)
+    progress = SweepProgress(4)
+    with report_progress("[bold]mine[/] [/x]", progress, quiet=False) as reporter:
+        progress.done = 1
+        progress.failed = 1
+        reporter.update(progress)
     said = terminal.getvalue()
     assert "2 of 4 runs, 1 failed" in said
     assert "[bold]mine[/] [/x]" in said

@@ -21,8 +21,8 @@ from robocov.mapfile import save_map
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.sweep import sweeping
-from robocov_app.sweep.executors import Executor, Returned
-from robocov_app.sweep.ledger import opened
+from robocov_app.sweep.executor import Executor, Result
+from robocov_app.sweep.ledger import open_ledger
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.tasks import Task, generate_tasks
@@ -54,18 +54,18 @@ class Here(Executor):
     def __exit__(self, *exception: object) -> None: ...
 
     @property
-    def most(self) -> int:
+    def capacity(self) -> int:
         return self._most
 
     @property
-    def waiting(self) -> str:
+    def waiting_reason(self) -> str:
         return "nobody is there; waiting" if self.lonesome else ""
 
-    def _hand_out(self, task: Task) -> None:
+    def _start(self, task: Task) -> None:
         self._stack.append(task)
         self.longest = max(self.longest, len(self._stack))
 
-    def _returned(self, timeout: float) -> Returned | None:
+    def _wait_for_result(self, timeout: float) -> Result | None:
         self.before()
         if self.lonesome:
             self.lonesome -= 1
@@ -155,7 +155,7 @@ def test_a_run_that_was_damaged_or_removed_is_done_again_and_that_is_told(
     second.rmdir()
     totals = sweep(study, tmp_path)
     assert (totals, totals.damaged) == (Totals(2, 0, 16, False), [first.name])
-    assert f"sweep: 1 damaged run will be done again: {first.name}\n" in capsys.readouterr().err
+    assert f"sweep: 1 damaged run will be repeated: {first.name}\n" in capsys.readouterr().err
     assert tables(tmp_path) == undisturbed
 
 
@@ -188,15 +188,15 @@ def test_after_an_upgrade_all_is_done_again_and_a_mixed_table_is_told(
 ) -> None:
     study = small_study()
     old = {**list_result_versions(), "pymunk": "6.0"}
-    with opened(tmp_path, study.to_json()) as ledger:
+    with open_ledger(tmp_path, study.to_json()) as ledger:
         for task in generate_tasks(study):
-            ledger.keep(task, replace(perform(task), versions=old))
+            ledger.store(task, replace(perform(task), versions=old))
     more = small_study(seeds=range(3))
     totals = sweep(more, tmp_path, quiet=True, keep_versions=True)
     assert (totals, sorted(totals.versions.values())) == (Totals(2, 0, 4, False), [2, 4])
     totals = sweep(more, tmp_path, quiet=True)
     assert (totals, list(totals.versions.values())) == (Totals(4, 0, 2, False), [6])
-    monkeypatch.setattr(sweeping, "difference_of", lambda versions: "numpy 1.9 instead of 2.3")
+    monkeypatch.setattr(sweeping, "describe_version_differences", lambda versions: "numpy 1.9 instead of 2.3")
     told = pytest.raises(OutputError, match=r"expected the same versions everywhere, or --keep-versions")
     with told:
         sweep(small_study(seeds=(9,)), tmp_path, quiet=True)
@@ -311,7 +311,7 @@ def test_the_number_of_workers_is_checked(workers: int, tmp_path: Path) -> None:
 
 def test_a_folder_of_something_else_is_no_place_for_a_sweep(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text('{"format": "robocov-run"}')
-    with pytest.raises(InputError, match="what is in it is no sweep"):
+    with pytest.raises(InputError, match="expected an empty folder or a sweep"):
         sweep(small_study(), tmp_path)
 
 

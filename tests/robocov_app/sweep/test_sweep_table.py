@@ -21,7 +21,7 @@ from robocov_app.cli import main
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.study import Study
-from robocov_app.sweep.table import Table, columns_of, gain_column, row_of
+from robocov_app.sweep.table import Table, build_columns, build_row, get_gain_column
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import FIGURES
 
@@ -41,19 +41,19 @@ FAILED = Entry({}, 'a "start", and no room')
 
 def study_json(study: Study) -> bytes:
     return json.dumps(
-        {"runs": len(study), "columns": [each._asdict() for each in columns_of(study)]}
+        {"runs": len(study), "columns": [each._asdict() for each in build_columns(study)]}
     ).encode()
 
 
 def written(folder: Path, study: Study, entries: list[Entry], *, parquet: bool = False) -> None:
-    with Table(folder, columns_of(study), study_json(study), parquet=parquet) as table:
+    with Table(folder, build_columns(study), study_json(study), parquet=parquet) as table:
         for task, entry in zip(generate_tasks(study), entries, strict=True):
-            table.add(row_of(task, entry))
+            table.add(build_row(task, entry))
 
 
 def test_the_columns_are_those_of_the_study() -> None:
     study = small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
-    assert [column.name for column in columns_of(study)] == [
+    assert [column.name for column in build_columns(study)] == [
         *("map", "controller", "robots", "start", "seed"),
         *get_gains(Rapf),
         "max_speed_m_s",
@@ -62,13 +62,13 @@ def test_the_columns_are_those_of_the_study() -> None:
         *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
         *("run", "error"),
     ]
-    assert "max_speed_m_s" not in [column.name for column in columns_of(small_study())]
+    assert "max_speed_m_s" not in [column.name for column in build_columns(small_study())]
 
 
 def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> None:
-    assert gain_column("k_rep") == "k_rep"
-    assert gain_column("seed") == "gain_seed"
-    assert gain_column("radius_m") == "gain_radius_m"
+    assert get_gain_column("k_rep") == "k_rep"
+    assert get_gain_column("seed") == "gain_seed"
+    assert get_gain_column("radius_m") == "gain_radius_m"
 
 
 def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
@@ -100,8 +100,8 @@ def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
 def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: Path) -> None:
     study = small_study()
     task = replace(next(iter(generate_tasks(study))), map="=1+1", start="-1")
-    with Table(tmp_path, columns_of(study), study_json(study), parquet=True) as table:
-        table.add(row_of(task, FAILED._replace(error="+ of 'two'")))
+    with Table(tmp_path, build_columns(study), study_json(study), parquet=True) as table:
+        table.add(build_row(task, FAILED._replace(error="+ of 'two'")))
     line = (tmp_path / "results.csv").read_text().splitlines()[1]
     assert line.startswith("'=1+1,")
     assert not re.search(r'(^|,)"?[=@+-][^,0-9]', line)
@@ -132,7 +132,7 @@ def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path
 
 def test_the_same_rows_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    monkeypatch.setattr(table_module, "ROW_GROUP", 3)
+    monkeypatch.setattr(table_module, "ROW_GROUP_SIZE", 3)
     study = small_study(seeds=range(5))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
@@ -154,7 +154,7 @@ def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
 ) -> None:
     study = small_study()
     written(tmp_path, study, [FIGURED] * len(study))
-    assert [len(row) for row in read_results(tmp_path).rows()] == [len(columns_of(study))] * len(study)
+    assert [len(row) for row in read_results(tmp_path).rows()] == [len(build_columns(study))] * len(study)
     wanted = 'pyarrow is not installed: pip install "robocov[parquet]"'
     for dry in ([], ["--dry-run"]):
         assert main(["sweep", "study.toml", "--parquet", *dry]) == 2
@@ -163,7 +163,7 @@ def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
     (tmp_path / "results.parquet").touch()  # of an earlier version, say: it would not be of these rows
     for asked in (True, False):
         refused = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {wanted}"))
-        with refused, Table(tmp_path, columns_of(study), parquet=asked):
+        with refused, Table(tmp_path, build_columns(study), parquet=asked):
             pass
     assert tables(tmp_path) == [*before, b""]
     assert not list(tmp_path.glob(".*"))
@@ -178,7 +178,7 @@ def test_parquet_that_is_there_is_kept_up_to_date(tmp_path: Path) -> None:
 
 def test_a_table_without_rows_has_columns(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    with Table(tmp_path, columns_of(small_study()), parquet=True):
+    with Table(tmp_path, build_columns(small_study()), parquet=True):
         pass
     assert pq.read_table(tmp_path / "results.parquet").num_rows == len(read_results(tmp_path)) == 0
 
@@ -187,9 +187,9 @@ def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Pat
     pq = pytest.importorskip("pyarrow.parquet")
     study = small_study()
     tasks = list(generate_tasks(study))
-    with Table(tmp_path, columns_of(study), b"{}", parquet=True) as table:
+    with Table(tmp_path, build_columns(study), b"{}", parquet=True) as table:
         for k, task in enumerate(tasks):
-            table.add(row_of(task, FIGURED))
+            table.add(build_row(task, FIGURED))
             assert len((tmp_path / "results.csv").read_text().splitlines()) == k + 2
             assert not (tmp_path / "results.parquet").exists()
     assert pq.read_table(tmp_path / "results.parquet").num_rows == len(tasks)
@@ -209,15 +209,15 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
     if not finished:  # as a sweep leaves it that was killed
         (tmp_path / "study.json").write_bytes(study_json(small_study(seeds=range(5))))
     before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
-    with Table(tmp_path, columns_of(study), b"{}") as table:
+    with Table(tmp_path, build_columns(study), b"{}") as table:
         for k, task in enumerate(list(generate_tasks(study))[:rows]):
-            table.add(row_of(task, FAILED))
+            table.add(build_row(task, FAILED))
             if k == 3 and not finished:
                 break  # it has grown as long, and may be seen
             assert [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")] == before
-        table.complete = complete
+        table.is_complete = complete
     replaced = complete or rows == 4  # no shorter
-    assert table.replaced == replaced == ((tmp_path / "study.json").read_bytes() == b"{}")
+    assert table.is_replaced == replaced == ((tmp_path / "study.json").read_bytes() == b"{}")
     assert len((tmp_path / "results.csv").read_text().splitlines()) == (1 + rows if replaced else 5)
     assert not list(tmp_path.glob(".*"))
 
@@ -229,9 +229,9 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
     written(tmp_path, study, [FIGURED] * len(study))
     (tmp_path / "study.json").unlink()
     lengths = []
-    with Table(tmp_path, columns_of(study)) as table:
+    with Table(tmp_path, build_columns(study)) as table:
         for task in [*generate_tasks(study)] * 2:
-            table.add(row_of(task, FAILED))
+            table.add(build_row(task, FAILED))
             text = (tmp_path / "results.csv").read_text()
             lengths.append(text.count("\n") - 1 if "no room" in text else None)
     assert lengths == [None, None, None, 4, 5, 6, 7, 8]
@@ -241,14 +241,14 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
 def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     told = pytest.raises(OutputError, match=f"{name}: expected a file, got a folder")
-    with told, Table(tmp_path, columns_of(small_study()), parquet=True):
+    with told, Table(tmp_path, build_columns(small_study()), parquet=True):
         pass
 
 
 def test_an_error_leaves_no_half_of_a_table(tmp_path: Path) -> None:
     study = small_study()
-    with pytest.raises(ZeroDivisionError), Table(tmp_path, columns_of(study)) as table:
-        table.add(row_of(next(generate_tasks(study)), FIGURED))
+    with pytest.raises(ZeroDivisionError), Table(tmp_path, build_columns(study)) as table:
+        table.add(build_row(next(generate_tasks(study)), FIGURED))
         raise ZeroDivisionError
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
@@ -272,9 +272,9 @@ class Full:
 
 def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
     study = small_study()
-    row = row_of(next(generate_tasks(study)), FIGURED)
+    row = build_row(next(generate_tasks(study)), FIGURED)
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
-    with full, Table(tmp_path, columns_of(study)) as table:
+    with full, Table(tmp_path, build_columns(study)) as table:
         table.add(row)
         whole = table._csv
         table._csv = Full(whole, 40)  # type: ignore[assignment]
@@ -298,16 +298,16 @@ def test_a_full_disk_leaves_no_half_of_parquet(
     pq = pytest.importorskip("pyarrow.parquet")
     study = small_study()
     told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
-    with told, Table(tmp_path, columns_of(study), parquet=True) as table:
+    with told, Table(tmp_path, build_columns(study), parquet=True) as table:
         monkeypatch.setattr(pq.ParquetWriter, broken, full)
-        table.add(row_of(next(generate_tasks(study)), FIGURED))
+        table.add(build_row(next(generate_tasks(study)), FIGURED))
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
 
 def test_no_table_can_be_made_where_there_is_no_folder(tmp_path: Path) -> None:
     told = pytest.raises(OutputError, match=r"results.csv: cannot be written")
-    with told, Table(tmp_path / "none", columns_of(small_study())):
+    with told, Table(tmp_path / "none", build_columns(small_study())):
         pass
 
 
@@ -322,8 +322,8 @@ def test_columns_have_different_names_whatever_gains_are_called(tmp_path: Path) 
         "        return own.centroid - own.position\n"
     )
     study = small_study(controllers=("rapf", "rpf", "lloyd", "odd.py:Odd"), folder=tmp_path)
-    names = [column.name for column in columns_of(study)]
+    names = [column.name for column in build_columns(study)]
     assert len(set(names)) == len(names)
-    rows = [row_of(task, FIGURED) for task in generate_tasks(study) if task.seed == 1]
+    rows = [build_row(task, FIGURED) for task in generate_tasks(study) if task.seed == 1]
     assert [(row["seed"], row.get("gain_seed")) for row in rows] == [(1, None)] * 3 + [(1, 1.0)]
     assert rows[-1]["k_rep"] == 2.0

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from swept import HALL, ROOM, small_study
 
-from robocov_app.sweep import sweeping as rehearsal_module
-from robocov_app.sweep.ledger import opened
+from robocov_app.sweep import estimate as estimate_module
+from robocov_app.sweep.estimate import count_axes, estimate_sweep
+from robocov_app.sweep.ledger import open_ledger
 from robocov_app.sweep.study import StudyMap
-from robocov_app.sweep.sweeping import axes_of, rehearsed
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
@@ -18,7 +18,7 @@ def test_the_axes_are_counted() -> None:
     study = small_study(
         maps=maps, starts="*", robots=(2, 3), max_speed=(1, 2), gains={"rapf": {"k_rep": [1, 2]}}
     )
-    assert axes_of(study) == {
+    assert count_axes(study) == {
         "maps": 2,
         "robots": 2,
         "teams": 2,
@@ -36,29 +36,29 @@ def test_time_and_space_are_those_of_one_run_times_their_number(
 ) -> None:
     study = small_study(seeds=range(5))
     moments = iter([10.0, 12.5])
-    monkeypatch.setattr(rehearsal_module.time, "perf_counter", lambda: next(moments))
-    found = rehearsed(study, tmp_path / "none", workers=4)
+    monkeypatch.setattr(estimate_module.time, "perf_counter", lambda: next(moments))
+    estimate = estimate_sweep(study, tmp_path / "none", workers=4)
     first = next(generate_tasks(study))
     size = sum(map(len, perform(first).files.values()))
-    assert (found.runs, found.left, found.run, found.error) == (10, 10, first.name, None)
-    assert found.seconds_a_run == 2.5
-    assert found.seconds == 2.5 * 10 / 4
-    assert (found.bytes_a_run, found.bytes) == (size, 10 * size)
+    assert (estimate.runs, estimate.left, estimate.run, estimate.error) == (10, 10, first.name, None)
+    assert estimate.seconds_a_run == 2.5
+    assert estimate.seconds == 2.5 * 10 / 4
+    assert (estimate.bytes_a_run, estimate.bytes) == (size, 10 * size)
     assert not (tmp_path / "none").exists()
 
 
 def test_what_is_done_already_is_not_counted(tmp_path: Path) -> None:
     study = small_study(seeds=range(3))
     tasks = list(generate_tasks(study))
-    with opened(tmp_path, study.to_json()) as ledger:
+    with open_ledger(tmp_path, study.to_json()) as ledger:
         for task in tasks[:2]:
-            ledger.keep(task, perform(task))
+            ledger.store(task, perform(task))
     before = sorted(path.stat().st_mtime_ns for path in tmp_path.rglob("*"))
-    found = rehearsed(study, tmp_path, workers=1)
-    assert (found.left, found.run) == (4, tasks[2].name)
+    estimate = estimate_sweep(study, tmp_path, workers=1)
+    assert (estimate.left, estimate.run) == (4, tasks[2].name)
     assert sorted(path.stat().st_mtime_ns for path in tmp_path.rglob("*")) == before
 
 
 def test_a_run_that_fails_says_so(tmp_path: Path) -> None:
-    found = rehearsed(small_study(robots=(500,)), tmp_path, workers=1)
-    assert found.error is not None and "room for about" in found.error
+    estimate = estimate_sweep(small_study(robots=(500,)), tmp_path, workers=1)
+    assert estimate.error is not None and "room for about" in estimate.error

@@ -1,0 +1,110 @@
+"""Estimate of the time and space that a sweep needs, from one of its runs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from itertools import compress
+from pathlib import Path
+
+from robocov_app.sweep.ledger import Ledger
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.tasks import generate_tasks
+from robocov_app.sweep.worker import perform, prepare_cost
+
+
+@dataclass(frozen=True)
+class SweepEstimate:
+    """Estimate of a sweep.
+
+    Attributes
+    ----------
+    runs : int
+        Number of all runs.
+    left : int
+        Number of runs that are still to be done.
+    axes : dict of str to int
+        Number of values of each parameter.
+    run : str
+        Name of the trial run.
+    error : str or None
+        Reason why it failed.
+    seconds_a_run : float, s
+        Computing time of the trial run.
+    bytes_a_run : int
+        Size of its files.
+    seconds : float, s
+        Estimated time for all runs that are left.
+    bytes : int
+        Estimated size of the files of all runs.
+    notes : list of str
+        Remarks on runs that were done before.
+    """
+
+    runs: int
+    left: int
+    axes: dict[str, int]
+    run: str
+    error: str | None
+    seconds_a_run: float
+    bytes_a_run: int
+    seconds: float
+    bytes: int
+    notes: list[str]
+
+
+def estimate_sweep(
+    study: Study, folder: Path, *, workers: int, retry_failed: bool = False, keep_versions: bool = False
+) -> SweepEstimate:
+    """Estimate a sweep from its first run that is left, without writing anything.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Folder of the sweep; it need not exist.
+    workers : int
+        Number of runs at the same time.
+    retry_failed, keep_versions : bool
+        See `robocov_app.sweep.sweeping.sweep`.
+
+    Returns
+    -------
+    SweepEstimate
+    """
+    survey = Ledger(folder).survey(
+        generate_tasks(study), retry_failed=retry_failed, keep_versions=keep_versions
+    )
+    left = sum(survey.is_left)
+    # If no run is left, the first one of all shows the time and space.
+    task = next(compress(generate_tasks(study), survey.is_left), None) or next(generate_tasks(study))
+    # The cost is prepared once for all runs on a map.
+    prepare_cost(task)
+    started = time.perf_counter()
+    outcome = perform(task)
+    seconds = time.perf_counter() - started
+    size = sum(len(content) for content in outcome.files.values())
+    parallel_runs = max(1, min(workers, left))
+    return SweepEstimate(
+        runs=len(study),
+        left=left,
+        axes=count_axes(study),
+        run=task.name,
+        error=outcome.error,
+        seconds_a_run=seconds,
+        bytes_a_run=size,
+        seconds=seconds * left / parallel_runs,
+        bytes=size * len(study),
+        notes=survey.describe(keep_versions=keep_versions),
+    )
+
+
+def count_axes(study: Study) -> dict[str, int]:
+    """Return the number of values of each parameter of a study, by its name."""
+    counts = {name: len(getattr(study, name)) for name in ("maps", "robots", "teams")}
+    counts["starts"] = sum(len(study.list_starts(study_map)) for study_map in study.maps)
+    counts["seeds"] = len(study.seeds)
+    counts["controllers"] = len(study.controllers)
+    for controller in study.controllers:
+        counts[f"gains of {controller}"] = len(study.get_gains(controller).choices)
+    return counts

@@ -1,0 +1,176 @@
+"""The interface of executors of tasks, and what they do when a worker ends in the middle of a task."""
+
+from __future__ import annotations
+
+import queue
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from concurrent.futures import Future
+from contextlib import suppress
+from typing import Any, NamedTuple, Self, TypeAlias
+
+from robocov.errors import OutputError
+from robocov_app.sweep.tasks import Task
+from robocov_app.sweep.worker import Outcome, build_failure
+
+_MAX_ENDS_PER_TASK = 2
+"""Number of workers that a task may end before it counts as failed."""
+_MAX_CONSECUTIVE_ENDS = 20
+"""Number of workers that may end one after the other without a finished task in between."""
+_MAX_CONSECUTIVE_ENDS_PER_TASK = 4
+"""The same for each task that is executed at the same time."""
+
+
+class LostWorker(NamedTuple):
+    """The end of a worker in the middle of a task."""
+
+    cause: str
+    """Reason in words."""
+    details: str
+    """Last output of the worker."""
+    is_caused_by_task: bool
+    """Whether the task itself certainly ended the worker."""
+
+
+Result: TypeAlias = tuple[Task, Outcome | LostWorker]
+"""A task, and its outcome or the end of its worker."""
+
+
+class Executor(ABC):
+    """Executes tasks; a context manager, whose end stops all of them.
+
+    A task whose worker has ended is repeated, without other tasks at the same time if one of them may have
+    caused the end. If workers have ended twice because of it, the task has failed. If workers end again and
+    again, an OutputError is raised.
+
+    Attributes
+    ----------
+    lost_workers : int
+        Number of workers that have ended.
+    """
+
+    def __init__(self) -> None:
+        self.lost_workers = 0
+        self._consecutive_ends = 0
+        self._ends_by_task: Counter[str] = Counter()
+        self._waiting: deque[Task] = deque()
+        self._waiting_for_isolation: deque[Task] = deque()
+        self._running = 0
+        self._is_isolated = False  # whether the running task must be the only one
+        self._finished: queue.SimpleQueue[tuple[Task, Future[Any]]] = queue.SimpleQueue()
+
+    def __enter__(self) -> Self:
+        return self
+
+    @abstractmethod
+    def __exit__(self, *exception: object) -> None: ...
+
+    @property
+    @abstractmethod
+    def capacity(self) -> int:
+        """Number of tasks to start at the same time so that no worker is idle."""
+
+    @property
+    def waiting_reason(self) -> str:
+        """Reason why no worker is running; empty if one is."""
+        return ""
+
+    @property
+    def unfinished_tasks(self) -> int:
+        """Number of tasks that have been submitted and not returned."""
+        return self._running + len(self._waiting) + len(self._waiting_for_isolation)
+
+    def submit(self, task: Task) -> None:
+        """Add a task.
+
+        Parameters
+        ----------
+        task : Task
+        """
+        self._waiting.append(task)
+        self._start_tasks()
+
+    def wait_for_next(self, timeout: float) -> tuple[Task, Outcome] | None:
+        """Return a finished task and its outcome, in any order.
+
+        Parameters
+        ----------
+        timeout : float, s
+
+        Returns
+        -------
+        (Task, Outcome) or None
+            None if no task finishes in this time.
+
+        Raises
+        ------
+        OutputError
+            If workers end again and again.
+        """
+        self._start_tasks()
+        result = self._wait_for_result(timeout)
+        if result is None:
+            return None
+        task, outcome = result
+        had_others = self._running > 1
+        self._is_isolated = False
+        self._running -= 1
+        if isinstance(outcome, LostWorker):
+            failure = self._handle_lost_worker(task, outcome, had_others=had_others)
+            self._start_tasks()
+            return None if failure is None else (task, failure)
+        self._consecutive_ends = 0
+        self._start_tasks()
+        return task, outcome
+
+    @abstractmethod
+    def _start(self, task: Task) -> None:
+        """Start a task."""
+
+    def _add_future(self, task: Task, future: Future[Any]) -> None:
+        """Report a task as finished once its future is done."""
+        future.add_done_callback(lambda done: self._finished.put((task, done)))
+
+    def _wait_for_result(self, timeout: float) -> Result | None:
+        """Return the result of a finished task; None if no task finishes within `timeout` seconds."""
+        with suppress(queue.Empty):
+            task, future = self._finished.get(timeout=timeout)
+            return task, self._get_result(future)
+        return None
+
+    def _get_result(self, future: Future[Any]) -> Outcome | LostWorker:
+        """Return the result of a future that is done."""
+        return future.result()  # type: ignore[no-any-return]
+
+    def _start_tasks(self) -> None:
+        """Start waiting tasks as far as there is capacity; an isolated one only when no other is running."""
+        must_isolate = self._is_isolated or bool(self._waiting_for_isolation)
+        while self._waiting and not must_isolate and self._running < self.capacity:
+            self._start(self._waiting.popleft())
+            self._running += 1
+        if self._waiting_for_isolation and not self._running:
+            self._is_isolated = True
+            self._running = 1
+            self._start(self._waiting_for_isolation.popleft())
+
+    def _handle_lost_worker(self, task: Task, lost: LostWorker, *, had_others: bool) -> Outcome | None:
+        """Let the task be repeated, and return None; or return its failure."""
+        self.lost_workers += 1
+        self._consecutive_ends += 1
+        max_ends = max(_MAX_CONSECUTIVE_ENDS, _MAX_CONSECUTIVE_ENDS_PER_TASK * self.capacity)
+        if self._consecutive_ends > max_ends:
+            raise OutputError(
+                f"{self._consecutive_ends} workers have ended one after the other, the last one because "
+                f"{lost.cause}; finished runs are kept, and the same command resumes"
+            )
+        if had_others and not lost.is_caused_by_task:
+            self._waiting_for_isolation.append(task)
+            return None
+        self._ends_by_task[task.name] += 1
+        if self._ends_by_task[task.name] >= _MAX_ENDS_PER_TASK:
+            return build_failure(lost.cause, lost.details)
+        if lost.is_caused_by_task:
+            self._waiting.appendleft(task)
+        else:
+            self._waiting_for_isolation.appendleft(task)
+        return None

@@ -1,0 +1,196 @@
+"""Progress of a sweep: a bar in a terminal, and a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from robocov.errors import format_count
+from robocov.text import escape_controls
+from robocov_app.terminal.output import echo
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+LINE_INTERVAL_S = 10.0
+"""Time between two lines where there is no terminal."""
+_MIN_WHOLE_RATE_PER_S = 10.0
+"""Rate from which on it is printed as a whole number."""
+_UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
+"""Length of a unit in seconds and its name, and those of the next smaller unit."""
+
+
+@dataclass
+class SweepProgress:
+    """Number of runs of a sweep, and how many of them are finished.
+
+    Attributes
+    ----------
+    total : int
+        Number of all runs.
+    done : int
+        Number of runs that were done now.
+    failed : int
+        Number of runs that have failed now.
+    reused : int
+        Number of runs that were done or had failed before.
+    lost_workers : int
+        Number of workers that have ended during a run.
+    waiting_reason : str
+        Reason why no worker is running; empty where one is.
+    start_time : float
+        Time at which the first run was started, on the clock of `time.perf_counter`, s.
+    """
+
+    total: int
+    done: int = 0
+    failed: int = 0
+    reused: int = 0
+    lost_workers: int = 0
+    waiting_reason: str = ""
+    start_time: float = field(default_factory=time.perf_counter)
+
+    @property
+    def finished(self) -> int:
+        """Number of finished runs."""
+        return self.done + self.failed + self.reused
+
+    @property
+    def rate(self) -> float:
+        """Runs per second; 0 before the first one."""
+        seconds = time.perf_counter() - self.start_time
+        return (self.done + self.failed) / seconds if seconds > 0 else 0.0
+
+    @property
+    def remaining_time(self) -> float | None:
+        """Estimate of the time to the end, s; None before the first run."""
+        return (self.total - self.finished) / self.rate if self.rate else None
+
+    def describe_outlook(self) -> str:
+        """Return the remaining time in words, or the reason why all runs wait; empty if neither is known."""
+        if self.waiting_reason:
+            return self.waiting_reason
+        return f"{format_duration(self.remaining_time)} left" if self.remaining_time else ""
+
+    def describe(self) -> str:
+        """Return the numbers of runs in words."""
+        parts = [f"{self.finished} of {self.total} runs"]
+        if self.failed:
+            parts.append(f"{self.failed} failed")
+        if self.reused:
+            parts.append(f"{self.reused} reused")
+        if self.lost_workers:
+            parts.append(f"{format_count(self.lost_workers, 'worker')} lost")
+        if self.rate >= _MIN_WHOLE_RATE_PER_S:
+            parts.append(f"{self.rate:.0f} a second")
+        elif self.rate > 0:
+            parts.append(f"{self.rate:.2g} a second")
+        return ", ".join(parts)
+
+    def describe_all(self) -> str:
+        """Return the numbers of runs and the outlook in one line."""
+        return ", ".join(filter(None, (self.describe(), self.describe_outlook())))
+
+
+class ProgressReporter:
+    """Prints the progress of a sweep.
+
+    Parameters
+    ----------
+    title : str
+        Beginning of each line.
+    is_quiet : bool
+        Whether nothing is printed.
+    bar : rich.progress.Progress or None
+        The bar to update; without it, lines are printed.
+    """
+
+    def __init__(self, title: str, *, is_quiet: bool = False, bar: Progress | None = None) -> None:
+        self._title = title
+        self._is_quiet = is_quiet
+        self._bar = bar
+        self._reported_at = time.perf_counter()
+        self._reported_reason = ""
+
+    def update(self, progress: SweepProgress) -> None:
+        """Show the progress: in the bar at once, in a line if it is time for one."""
+        if self._bar is not None:
+            task = self._bar.task_ids[0]
+            self._bar.update(
+                task,
+                completed=progress.finished,
+                numbers=progress.describe(),
+                outlook=progress.describe_outlook(),
+            )
+            return
+        now = time.perf_counter()
+        # The reason for waiting is printed once, when it changes.
+        is_due = now - self._reported_at >= LINE_INTERVAL_S and not progress.waiting_reason
+        if is_due or progress.waiting_reason != self._reported_reason:
+            self._reported_at = now
+            self._reported_reason = progress.waiting_reason
+            self.print_line(progress.describe_all())
+
+    def print_line(self, line: str) -> None:
+        """Print a line, above the bar if there is one."""
+        if self._bar is not None:
+            self._bar.console.print(escape_controls(line), markup=False, highlight=False)
+        elif not self._is_quiet:
+            echo(f"{self._title}: {line}", to_stderr=True)
+
+
+@contextmanager
+def report_progress(title: str, progress: SweepProgress, *, quiet: bool) -> Iterator[ProgressReporter]:
+    """Report the progress of a sweep on stderr.
+
+    Parameters
+    ----------
+    title : str
+        Title of the bar, or beginning of each line.
+    progress : SweepProgress
+        The progress, whose last state is printed at the end where there is no terminal.
+    quiet : bool
+        Whether nothing is printed.
+
+    Yields
+    ------
+    ProgressReporter
+    """
+    if quiet or not sys.stderr.isatty():
+        reporter = ProgressReporter(title, is_quiet=quiet)
+        yield reporter
+        reporter.print_line(progress.describe_all())
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as ProgressBar
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[numbers]}", markup=False),
+        TextColumn("{task.fields[outlook]}", markup=False),
+    )
+    with ProgressBar(*columns, console=Console(stderr=True)) as bar:
+        bar.add_task(title, total=progress.total, numbers="", outlook="")
+        yield ProgressReporter(title, bar=bar)
+
+
+def format_duration(seconds: float) -> str:
+    """Return a duration in its two largest units.
+
+    Examples
+    --------
+    >>> [format_duration(seconds) for seconds in (8.2, 95, 4000, 200000)]
+    ['8 s', '1 min 35 s', '1 h 6 min', '2 d 7 h']
+    """
+    rounded = round(seconds)
+    for unit, name, smaller_unit, smaller_name in _UNITS:
+        if rounded >= unit:
+            rest = rounded % unit // smaller_unit
+            return f"{rounded // unit} {name} {rest} {smaller_name}"
+    return f"{rounded} s"
