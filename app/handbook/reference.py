@@ -19,8 +19,8 @@ from robocov.controllers.gains import Option, format_value
 from robocov.mapfile import build_map_schema
 from robocov.metrics.run_metrics import COLUMNS
 from robocov_app.cli import COMMANDS, main
-from robocov_app.sweep import table
-from robocov_app.sweep.study_file import _STUDY, _Table
+from robocov_app.sweep.study_file import list_study_keys
+from robocov_app.sweep.table import RESULT_COLUMNS
 from robocov_app.viewer.session.file_models import build_session_schema
 
 if TYPE_CHECKING:
@@ -104,16 +104,7 @@ def formats() -> str:
                 said = _cell(of.get("description", ""))
                 text += f"| `{field}` | {said} | {_cell(_type(of))} | {default} |\n"
     text += "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys.\n\n| key | value |\n|---|---|\n"
-    return text + "".join(f"| `{key}` | {_cell(wanted)} |\n" for key, wanted in _keys(_STUDY))
-
-
-def _keys(within: Any, above: str = "") -> list[tuple[str, str]]:
-    found = []
-    for key, of in within.keys.items():
-        name = f"{above}{key.replace('*', 'NAME')}"
-        found += [(name, of.wanted.rstrip(",") + ", required" * (key in within.required))]
-        found += _keys(of, f"{name}.") if isinstance(of, _Table) else []
-    return found
+    return text + "".join(f"| `{key}` | {_cell(value)} |\n" for key, value in list_study_keys().items())
 
 
 def _type(of: dict[str, Any]) -> str:
@@ -139,8 +130,9 @@ def metrics() -> str:
         text += f"| `{column}` | {_cell(' '.join(told['RunMetrics', name]))} | `{name}` |\n"
     text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after what was run; most stand "
     text += "in `summary` of each `run.json`, too.\n\n| column | unit | meaning |\n|---|---|---|\n"
-    columns = (*table._FIGURES, table._TIME, *table._METRICS)
-    return text + "".join(f"| `{each.name}` | {each.unit} | {_cell(each.meaning)} |\n" for each in columns)
+    for column in RESULT_COLUMNS:
+        text += f"| `{column.name}` | {column.unit} | {_cell(column.meaning)} |\n"
+    return text
 
 
 def names() -> str:

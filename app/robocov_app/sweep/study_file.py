@@ -1,9 +1,13 @@
-"""Study files, TOML: what may stand in them, and what is wrong with them in one line."""
+"""Study files in TOML, and their errors in one line.
+
+The schema below says which values a key accepts. It is not a pydantic model, because a key accepts a value, a
+list of values or a table, and an error must describe the alternative that was meant.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, get_args
 
@@ -17,158 +21,289 @@ from robocov_app.sweep.sampling import Range, Sampling, SamplingMethod, Scale
 from robocov_app.sweep.study import Study, StudyMap
 
 ALL_MAPS = "*"
-"""Stands for all bundled maps."""
-Check: TypeAlias = Callable[[Any], Any]  # returns a value as it is meant; ValueError for one of another kind
+"""Name that stands for all bundled maps."""
+_ANY_KEY = "*"
+"""Key of a table schema that stands for all keys."""
+_LIST_KEYS = ("maps", "controllers", "robots", "starts")
+"""Keys that `Study` expects to be lists; a file may have a single value."""
+
+_Converter: TypeAlias = Callable[[Any], Any]
+"""Returns a value in the type that is needed; raises ValueError if it has another one."""
 
 
-class _Value(NamedTuple):
-    """Accepted values of a key in words: one value, lists of an `item`, or a table."""
+class _ValueSchema(NamedTuple):
+    """A key that accepts a single value, a list of items or a table, as far as they are given."""
 
-    wanted: str
-    one: Check | None = None
-    item: _Value | None = None
-    table: _Table | None = None
+    expected: str
+    """Description of the accepted values."""
+    convert: _Converter | None = None
+    """Conversion of a single value."""
+    item: _ValueSchema | None = None
+    table: _TableSchema | None = None
 
 
-class _Table(NamedTuple):
-    """A table: its keys, of which * is any, and those that must be there."""
+class _TableSchema(NamedTuple):
+    """A table."""
 
-    wanted: str
-    keys: Mapping[str, _Value | _Table]
+    expected: str
+    """Description of the table."""
+    keys: Mapping[str, _ValueSchema | _TableSchema]
     required: tuple[str, ...] = ()
 
 
-def _of(*kinds: type, words: tuple[str, ...] = ()) -> Check:
-    """Return what checks the type of a value, or that it is one of some words; numbers become floats."""
+def _accept(*types: type, words: tuple[str, ...] = ()) -> _Converter:
+    """Return a converter that accepts values of some types, and some words.
 
-    def check(value: Any) -> Any:
-        if isinstance(value, bool) is not (bool in kinds) or not (isinstance(value, kinds) or value in words):
+    A bool does not count as an int. If float is accepted, numbers become floats.
+    """
+
+    def convert(value: Any) -> Any:
+        if isinstance(value, bool) != (bool in types):
             raise ValueError(value)
-        return float(value) if float in kinds and not isinstance(value, str) else value
+        if not isinstance(value, types) and value not in words:
+            raise ValueError(value)
+        if float in types and not isinstance(value, str):
+            return float(value)
+        return value
 
-    return check
-
-
-_TEXT, _WHOLE = _Value("a string", _of(str)), _Value("a whole number", _of(int))
-_NUMBER, _WORD = _Value("a number", _of(int, float)), _Value("a number or a string", _of(int, float, str))
-_LIMIT = _Value(f'a number, or "{NO_LIMIT}" for no limit', _of(int, float, words=(NO_LIMIT,)))
-_SCALE = _Value('"linear" or "log"', _of(words=get_args(Scale)))
-_METHOD = _Value('"sobol", "latin-hypercube" or "halton"', _of(words=get_args(SamplingMethod)))
+    return convert
 
 
-def _several(wanted: str, item: _Value) -> _Value:
-    return _Value(wanted, item.one, item)
+def _accept_list(expected: str, item: _ValueSchema) -> _ValueSchema:
+    """Return the schema of a value or a list of such values."""
+    return _ValueSchema(expected, item.convert, item)
 
 
-_TEXTS = _several("a string, or a list of strings", _TEXT)
-_TEAM = _several("a number, or a list of numbers", _LIMIT)
-_CONDITION = _several("a number or a string, or a list of them", _WORD)
-_GAIN = _Value(
-    "a number or a word, a list of them, or a range {low, high}",
-    _WORD.one,
-    _WORD._replace(wanted=f'a number, "{NO_LIMIT}" for no limit, or a word'),
-    _Table("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, ("low", "high")),
+_TEXT = _ValueSchema("a string", _accept(str))
+_WHOLE_NUMBER = _ValueSchema("a whole number", _accept(int))
+_NUMBER = _ValueSchema("a number", _accept(int, float))
+_NUMBER_OR_TEXT = _ValueSchema("a number or a string", _accept(int, float, str))
+_NUMBER_OR_NO_LIMIT = _ValueSchema(
+    f'a number, or "{NO_LIMIT}" for no limit', _accept(int, float, words=(NO_LIMIT,))
 )
-_GROUPS = _Value("tables [[team.group]]", item=_Value("a table", _of(dict)))
-_OF_TEAM = dict.fromkeys((*TEAM_PARAMETERS, *KINEMATIC_DEFAULTS), _TEAM) | {
+_SCALE = _ValueSchema('"linear" or "log"', _accept(words=get_args(Scale)))
+_METHOD = _ValueSchema('"sobol", "latin-hypercube" or "halton"', _accept(words=get_args(SamplingMethod)))
+
+_TEXTS = _accept_list("a string, or a list of strings", _TEXT)
+_TEAM_PARAMETER = _accept_list("a number, or a list of numbers", _NUMBER_OR_NO_LIMIT)
+_CONDITION = _accept_list("a number or a string, or a list of them", _NUMBER_OR_TEXT)
+_GAIN = _ValueSchema(
+    "a number or a word, a list of them, or a range {low, high}",
+    convert=_NUMBER_OR_TEXT.convert,
+    item=_NUMBER_OR_TEXT._replace(expected=f'a number, "{NO_LIMIT}" for no limit, or a word'),
+    table=_TableSchema("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, required=("low", "high")),
+)
+_GROUPS = _ValueSchema("tables [[team.group]]", item=_ValueSchema("a table", _accept(dict)))
+_TEAM_KEYS = {
+    **dict.fromkeys((*TEAM_PARAMETERS, *KINEMATIC_DEFAULTS), _TEAM_PARAMETER),
     "kinematics": _TEXTS,
     "group": _GROUPS,
 }
-_SAMPLING = {"method": _METHOD, "samples": _WHOLE, "seed": _WHOLE}
-_STUDY = _Table(
+_SAMPLING_KEYS = {"method": _METHOD, "samples": _WHOLE_NUMBER, "seed": _WHOLE_NUMBER}
+_STUDY = _TableSchema(
     "a table",
     {
-        "maps": _several("a list of names of maps, or of paths beside this file", _TEXT),
-        "controllers": _several("a list of controllers", _TEXT),
-        "robots": _several("a whole number, or a list of whole numbers", _WHOLE),
+        "maps": _accept_list("a list of names of maps, or of paths beside this file", _TEXT),
+        "controllers": _accept_list("a list of controllers", _TEXT),
+        "robots": _accept_list("a whole number, or a list of whole numbers", _WHOLE_NUMBER),
         "starts": _TEXTS,
-        "seeds": _several("how many seeds, or a list of seeds", _WHOLE),
-        **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _NUMBER),
-        "lattice": _WHOLE,
-        "metrics": _Value("true or false", _of(bool)),
-        "max_runs": _WHOLE,
-        "team": _Table("a table [team]", _OF_TEAM),
-        "conditions": _Table("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
-        "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
-        "sampling": _Table("a table [sampling]", _SAMPLING, ("method", "samples")),
+        "seeds": _accept_list("how many seeds, or a list of seeds", _WHOLE_NUMBER),
+        "duration": _NUMBER,
+        "dt": _NUMBER,
+        "cost_hz": _NUMBER,
+        "record_hz": _NUMBER,
+        "lattice": _WHOLE_NUMBER,
+        "metrics": _ValueSchema("true or false", _accept(bool)),
+        "max_runs": _WHOLE_NUMBER,
+        "team": _TableSchema("a table [team]", _TEAM_KEYS),
+        "conditions": _TableSchema("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
+        "gains": _TableSchema(
+            "tables [gains.NAME]", {_ANY_KEY: _TableSchema("a table of gains", {_ANY_KEY: _GAIN})}
+        ),
+        "sampling": _TableSchema("a table [sampling]", _SAMPLING_KEYS, required=("method", "samples")),
     },
-    ("maps", "controllers"),
+    required=("maps", "controllers"),
 )
-"""Schema of a study file. What is not given is as `Study` has it."""
+"""Schema of a study file. Missing keys have the defaults of `Study`."""
 
 
-def _read(
-    given: Any, wanted: _Value | _Table, path: JsonPath, unknown: list[str], mistakes: list[str]
-) -> Any:
-    """Return what is given as it is meant; `unknown` keys are told first: a misspelt one is also missing."""
-    one, item, table = wanted[1:] if isinstance(wanted, _Value) else (None, None, wanted)
-    if table is not None and isinstance(given, dict):
-        keys = table.keys if "*" not in table.keys else dict.fromkeys(given, table.keys["*"])
-        above = f"{format_path(path)}: " if path else ""
-        unknown += [above + describe_unknown_name("key", key, keys) for key in given if key not in keys]
-        missing = {format_path((*path, key)): keys[key].wanted for key in table.required if key not in given}
-        mistakes += [f"{at}: missing, expected {what}" for at, what in missing.items()]
-        there = [key for key in keys if key in given]
-        return {key: _read(given[key], keys[key], (*path, key), unknown, mistakes) for key in there}
-    if item is not None and isinstance(given, list):
-        return [_read(value, item, (*path, k), unknown, mistakes) for k, value in enumerate(given)]
-    with suppress(ValueError, OverflowError):
-        if one is not None:
-            return one(given)
-    mistakes.append(f"{format_path(path)}: expected {wanted.wanted}, got {quote(given)}")
-    return None
+@dataclass
+class _SchemaReader:
+    """Converts the values of a document, and collects its mistakes.
+
+    Attributes
+    ----------
+    unknown_keys : list of str
+        Messages about unknown keys. A misspelt key is also a missing one; naming it helps more.
+    other_mistakes : list of str
+        All other messages.
+    """
+
+    unknown_keys: list[str] = field(default_factory=list)
+    other_mistakes: list[str] = field(default_factory=list)
+
+    @property
+    def mistakes(self) -> list[str]:
+        """All messages, the most helpful ones first."""
+        return self.unknown_keys + self.other_mistakes
+
+    def read(self, value: Any, schema: _ValueSchema | _TableSchema, path: JsonPath) -> Any:
+        """Return the converted value; None if it has a mistake."""
+        table = schema if isinstance(schema, _TableSchema) else schema.table
+        if table is not None and isinstance(value, dict):
+            return self._read_table(value, table, path)
+        if isinstance(schema, _ValueSchema):
+            if schema.item is not None and isinstance(value, list):
+                return [self.read(item, schema.item, (*path, k)) for k, item in enumerate(value)]
+            if schema.convert is not None:
+                try:
+                    return schema.convert(value)
+                except (ValueError, OverflowError):
+                    pass
+        self.other_mistakes.append(f"{format_path(path)}: expected {schema.expected}, got {quote(value)}")
+        return None
+
+    def _read_table(self, table: dict[str, Any], schema: _TableSchema, path: JsonPath) -> dict[str, Any]:
+        keys = schema.keys
+        if _ANY_KEY in keys:
+            keys = dict.fromkeys(table, keys[_ANY_KEY])
+        prefix = f"{format_path(path)}: " if path else ""
+        for key in table:
+            if key not in keys:
+                self.unknown_keys.append(prefix + describe_unknown_name("key", key, keys))
+        for key in schema.required:
+            if key not in table:
+                position = format_path((*path, key))
+                self.other_mistakes.append(f"{position}: missing, expected {keys[key].expected}")
+        return {key: self.read(table[key], keys[key], (*path, key)) for key in keys if key in table}
+
+
+def list_study_keys() -> dict[str, str]:
+    """Return the keys of study files and descriptions of their values; tables in tables have dotted keys."""
+    return dict(_list_keys(_STUDY, prefix=""))
+
+
+def _list_keys(table: _TableSchema, prefix: str) -> Iterator[tuple[str, str]]:
+    for key, schema in table.keys.items():
+        name = prefix + key.replace(_ANY_KEY, "NAME")
+        suffix = ", required" if key in table.required else ""
+        yield name, schema.expected + suffix
+        if isinstance(schema, _TableSchema):
+            yield from _list_keys(schema, f"{name}.")
 
 
 def read_study(path: Path | str) -> Study:
-    """Return the study in a TOML file; raises InputError with file, key, expected and given value."""
+    """Read a study from a TOML file.
+
+    Parameters
+    ----------
+    path : Path or str
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is invalid; the message has the file, the key, and the expected and
+        actual value.
+    """
     path = Path(path)
     where = to_one_line(path)
-    return study_of(parse_toml(read_bytes(path), where), path.parent, where)
+    return build_study(parse_toml(read_bytes(path), where), path.parent, where)
 
 
-def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
-    """Return the study that a parsed file describes; relative paths begin at `folder`."""
-    unknown: list[str] = []
-    mistakes: list[str] = []
-    given = _read(document, _STUDY, (), unknown, mistakes)
-    if mistakes := unknown + mistakes:
-        more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""
-        raise InputError(f"{where}: {mistakes[0]}{more}")
+def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
+    """Build a study from the content of a file.
+
+    Parameters
+    ----------
+    document : dict
+    folder : Path
+        Folder of relative paths.
+    where : str
+        Name of the file in messages.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        If the content is invalid.
+    """
+    reader = _SchemaReader()
+    values = reader.read(document, _STUDY, ())
+    if reader.mistakes:
+        others = len(reader.mistakes) - 1
+        suffix = f" (and {others} more)" if others else ""
+        raise InputError(f"{where}: {reader.mistakes[0]}{suffix}")
     try:
-        if isinstance(given.get("seeds"), int):
-            count = given["seeds"]
-            if count < 1:
-                raise InputError(f"seeds: expected a whole number from 1, got {quote(count)}")
-            given["seeds"] = range(count)
-        for name in ("maps", "controllers", "robots", "starts"):
-            if name in given and not isinstance(given[name], list):
-                given[name] = [given[name]]
-        given["maps"] = _maps(given["maps"], folder)
-        if "sampling" in given:
-            given["sampling"] = Sampling(**given["sampling"])
-        for law in given.get("gains", {}).values():
-            law |= {name: Range(**value) for name, value in law.items() if isinstance(value, dict)}
-        return Study(**given.pop("team", {}), **given, folder=folder)
+        return Study(**_convert_to_arguments(values, folder), folder=folder)
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
 
 
-def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
-    known = list_bundled_maps()
+def _convert_to_arguments(values: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Convert the values of a study file to arguments of `Study`."""
+    arguments = dict(values)
+    seeds = arguments.get("seeds")
+    if isinstance(seeds, int):
+        if seeds < 1:
+            raise InputError(f"seeds: expected a whole number from 1, got {quote(seeds)}")
+        arguments["seeds"] = range(seeds)
+    for key in _LIST_KEYS:
+        if key in arguments and not isinstance(arguments[key], list):
+            arguments[key] = [arguments[key]]
+    arguments["maps"] = _load_maps(arguments["maps"], folder)
+    if "sampling" in arguments:
+        arguments["sampling"] = Sampling(**arguments["sampling"])
+    if "gains" in arguments:
+        arguments["gains"] = {
+            controller: _convert_ranges(gains) for controller, gains in arguments["gains"].items()
+        }
+    return {**arguments.pop("team", {}), **arguments}
+
+
+def _convert_ranges(gains: dict[str, Any]) -> dict[str, Any]:
+    """Convert the tables among the gains of a controller to ranges."""
+    converted = {}
+    for name, value in gains.items():
+        converted[name] = Range(**value) if isinstance(value, dict) else value
+    return converted
+
+
+def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
+    """Load the maps of a study.
+
+    Parameters
+    ----------
+    entries : list of str
+        Names of bundled maps, and paths of map files relative to the folder; or `ALL_MAPS` alone.
+    folder : Path
+    """
+    bundled = list_bundled_maps()
     if entries == [ALL_MAPS]:
-        entries = list(known)
+        entries = list(bundled)
     require_distinct(entries, ("maps",))
     maps: dict[str, StudyMap] = {}
     for k, entry in enumerate(entries):
         try:
-            if entry not in known and not entry.endswith(".json"):
-                raise InputError(describe_unknown_name("map", entry, known))
-            name = entry if entry in known else (folder / entry).stem
-            environment = load_map(known.get(entry, folder / entry))
+            if entry in bundled:
+                name = entry
+                path = bundled[entry]
+            elif entry.endswith(".json"):
+                path = folder / entry
+                name = path.stem
+            else:
+                raise InputError(describe_unknown_name("map", entry, bundled))
+            environment = load_map(path)
         except InputError as error:
             raise InputError(f"maps[{k}]: {error}") from error
         if name in maps:
-            wanted = f"maps whose names differ, and there is a {name!r} already"
-            raise InputError(f"maps[{k}]: expected {wanted}, got {quote(entry)}")
+            expected = f"maps whose names differ, and there is a {name!r} already"
+            raise InputError(f"maps[{k}]: expected {expected}, got {quote(entry)}")
         maps[name] = StudyMap(name, environment)
     return list(maps.values())

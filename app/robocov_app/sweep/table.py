@@ -69,6 +69,9 @@ _METRIC_COLUMNS = (
     Column("near_final_s", "double", "s", "from when on the mean distance was within 5 % of that of the end"),
 )
 
+RESULT_COLUMNS = (*_FIGURE_COLUMNS, _MEAN_TIME_COLUMN, *_METRIC_COLUMNS)
+"""Columns of the results of a run; not every table has all of them."""
+
 
 def build_columns(study: Study) -> tuple[Column, ...]:
     """Return the columns of a study's table.
@@ -112,14 +115,7 @@ def _build_gain_columns(study: Study) -> list[Column]:
 
 def get_gain_column(name: str) -> str:
     """Return the name of the column of a gain: its own, unless another column has it."""
-    other_columns = (
-        *_RUN_COLUMNS,
-        _DURATION_COLUMN,
-        *_FIGURE_COLUMNS,
-        _MEAN_TIME_COLUMN,
-        *_METRIC_COLUMNS,
-        *_FINAL_COLUMNS,
-    )
+    other_columns = (*_RUN_COLUMNS, _DURATION_COLUMN, *RESULT_COLUMNS, *_FINAL_COLUMNS)
     other_names = {column.name for column in other_columns}
     other_names |= {name_parameter_column(parameter) for parameter in UNITS}
     return f"gain_{name}" if name in other_names else name

@@ -9,7 +9,7 @@ from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.parameters import CONDITIONS, build_conditions, parse_condition_axes
-from robocov_app.sweep.study_file import study_of
+from robocov_app.sweep.study_file import build_study
 from robocov_app.sweep.table import build_columns, build_row
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
@@ -75,7 +75,7 @@ def test_a_file_says_it_in_a_table() -> None:
         "controllers": "rapf",
         "conditions": {"loss": [0, 0.2], "message_rate": ["null", 2], "join": "2@1 3@2:1,1"},
     }
-    study = study_of(document, Path(), "study.toml")
+    study = build_study(document, Path(), "study.toml")
     assert [team["message_rate"] for team in study.teams] == [None, 2.0, None, 2.0]
     assert study.teams[0]["join"] == "2@1 3@2:1,1"
     for broken, message in (
@@ -87,7 +87,7 @@ def test_a_file_says_it_in_a_table() -> None:
         (3, r"study.toml: conditions: expected a table \[conditions\], got 3"),
     ):
         with pytest.raises(InputError, match=message):
-            study_of({**document, "conditions": broken}, Path(), "study.toml")
+            build_study({**document, "conditions": broken}, Path(), "study.toml")
 
 
 def test_all_conditions_can_be_swept() -> None:
