@@ -1,3 +1,5 @@
+"""The clock: steps that are due at a speed, within the computing time of a frame."""
+
 from __future__ import annotations
 
 import math
@@ -7,120 +9,151 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.viewer.session import clock as module
-from robocov_app.viewer.session.clock import FRAME_BUDGET_S, MAX_FRAME_S, SPEEDS, Clock, format_speed
+from robocov_app.viewer.session.clock import (
+    FRAME_BUDGET_S,
+    MAX_FRAME_S,
+    SPEEDS,
+    Clock,
+    find_speed_index,
+    format_speed,
+)
 
 DT = 1 / 60
+FINITE_SPEEDS = [speed for speed in SPEEDS if math.isfinite(speed)]
 
 
-class Steps:
-    """Counts steps; on the clock on the wall each takes a while."""
+class StepCounter:
+    """Counts steps.
 
-    def __init__(self, takes: float = 0.0, last: int | None = None) -> None:
-        self.made, self.takes, self.last, self.now = 0, takes, last, 0.0
+    Parameters
+    ----------
+    duration : float, s
+        Computing time of a step.
+    last : int or None
+        Number of the step after which no further ones are wanted.
+    """
+
+    def __init__(self, duration: float = 0.0, last: int | None = None) -> None:
+        self.count = 0
+        self.duration = duration
+        self.last = last
+        self.elapsed = 0.0
 
     def __call__(self) -> bool:
-        self.made += 1
-        self.now += self.takes
-        return self.made != self.last
+        self.count += 1
+        self.elapsed += self.duration
+        return self.count != self.last
 
 
 @pytest.fixture
-def wall(monkeypatch):
-    """Put a clock on the wall that only goes while steps are made."""
+def measure_time(monkeypatch):
+    """Let time only pass while steps are taken."""
 
-    def put(steps: Steps) -> Steps:
-        monkeypatch.setattr(module, "perf_counter", lambda: steps.now)
-        return steps
+    def use_counter(counter: StepCounter) -> StepCounter:
+        monkeypatch.setattr(module, "perf_counter", lambda: counter.elapsed)
+        return counter
 
-    return put
+    return use_counter
 
 
-@pytest.mark.parametrize("speed", [speed for speed in SPEEDS if math.isfinite(speed)])
-def test_as_many_steps_as_the_speed_says(speed, wall):
-    steps, clock = wall(Steps()), Clock(DT, speed, budget=FRAME_BUDGET_S)
+@pytest.mark.parametrize("speed", FINITE_SPEEDS)
+def test_the_number_of_steps_is_that_of_the_speed(speed, measure_time):
+    counter = measure_time(StepCounter())
+    clock = Clock(DT, speed, budget=FRAME_BUDGET_S)
     for _ in range(600):
-        clock.advance(1 / 60, steps)
-    assert steps.made == pytest.approx(600 * speed, abs=1)
+        clock.advance(1 / 60, counter)
+    assert counter.count == pytest.approx(600 * speed, abs=1)
     assert not clock.is_behind
 
 
-@given(st.lists(st.floats(0.0, MAX_FRAME_S), max_size=50), st.sampled_from(SPEEDS[:-1]))
-def test_no_time_is_lost_or_made_up(frames, speed):
-    steps, clock = Steps(), Clock(DT, speed)
-    made = sum(clock.advance(seconds, steps) for seconds in frames)
-    assert made == steps.made
+@given(st.lists(st.floats(0.0, MAX_FRAME_S), max_size=50), st.sampled_from(FINITE_SPEEDS))
+def test_fractions_of_steps_are_neither_lost_nor_added(frames, speed):
+    counter = StepCounter()
+    clock = Clock(DT, speed)
+    taken = sum(clock.advance(seconds, counter) for seconds in frames)
+    assert taken == counter.count
     due = sum(frames) * speed / DT
-    assert due - 1 - 1e-3 <= made <= due + 1e-3
+    assert due - 1 - 1e-3 <= taken <= due + 1e-3
 
 
-def test_a_long_frame_is_not_made_up_for(wall):
-    steps, clock = wall(Steps()), Clock(DT, budget=FRAME_BUDGET_S)
-    assert clock.advance(100.0, steps) == round(MAX_FRAME_S / DT)
-    assert clock.advance(0.0, steps) == 0
+def test_a_long_frame_is_not_made_up_for(measure_time):
+    counter = measure_time(StepCounter())
+    clock = Clock(DT, budget=FRAME_BUDGET_S)
+    assert clock.advance(100.0, counter) == round(MAX_FRAME_S / DT)
+    assert clock.advance(0.0, counter) == 0
 
 
-def test_what_does_not_fit_is_dropped(wall):
-    steps, clock = wall(Steps(takes=0.003)), Clock(DT, 16.0, budget=FRAME_BUDGET_S)
-    # 16 are due, of which three fit into 8 ms
-    assert clock.advance(DT, steps) == 3
+def test_steps_beyond_the_computing_time_are_dropped(measure_time):
+    counter = measure_time(StepCounter(duration=0.003))
+    clock = Clock(DT, 16.0, budget=FRAME_BUDGET_S)
+    # Sixteen steps are due, of which three fit into 8 ms.
+    assert clock.advance(DT, counter) == 3
     assert clock.is_behind
-    assert clock.advance(0.0, steps) == 0
+    assert clock.advance(0.0, counter) == 0
     assert not clock.is_behind
-    assert clock.advance(DT, steps) == 3
+    assert clock.advance(DT, counter) == 3
 
 
-def test_a_step_that_takes_long_is_made_nonetheless(wall):
-    steps, clock = wall(Steps(takes=1.0)), Clock(DT, budget=FRAME_BUDGET_S)
-    assert clock.advance(DT, steps) == 1
-    assert not clock.is_behind
-
-
-def test_as_fast_as_it_goes_is_until_the_budget_is_used_up(wall):
-    steps, clock = wall(Steps(takes=0.001)), Clock(DT, math.inf, budget=FRAME_BUDGET_S)
-    assert clock.advance(DT, steps) == 9
-    # slower than that is not behind
+def test_a_single_slow_step_is_taken(measure_time):
+    counter = measure_time(StepCounter(duration=1.0))
+    clock = Clock(DT, budget=FRAME_BUDGET_S)
+    assert clock.advance(DT, counter) == 1
     assert not clock.is_behind
 
 
-def test_without_a_clock_on_the_wall_the_highest_speed_is_one_like_any_other():
-    steps, clock = Steps(), Clock(DT, math.inf)
-    assert clock.advance(1 / 30, steps) == 32
-    # however long the control period is
-    slow = Clock(0.5, math.inf)
-    assert sum(slow.advance(1 / 30, steps) for _ in range(30)) == 32
-    assert steps.made == 64
+def test_the_highest_speed_uses_up_the_computing_time(measure_time):
+    counter = measure_time(StepCounter(duration=0.001))
+    clock = Clock(DT, math.inf, budget=FRAME_BUDGET_S)
+    assert clock.advance(DT, counter) == 9
+    assert not clock.is_behind
 
 
-def test_a_step_may_be_the_last(wall):
-    steps, clock = wall(Steps(last=3)), Clock(DT, 16.0, budget=FRAME_BUDGET_S)
-    assert clock.advance(DT, steps) == 3
-    # what was still due then is not due any more
-    steps.last = None
-    assert clock.advance(0.0, steps) == 0
-    assert clock.advance(DT, steps) == 16
-    fast = Clock(DT, math.inf, budget=FRAME_BUDGET_S)
-    assert fast.advance(DT, wall(Steps(last=5))) == 5
+def test_without_a_limit_of_computing_time_the_highest_speed_is_finite():
+    counter = StepCounter()
+    clock = Clock(DT, math.inf)
+    assert clock.advance(1 / 30, counter) == 32
+    slow_clock = Clock(0.5, math.inf)
+    assert sum(slow_clock.advance(1 / 30, counter) for _ in range(30)) == 32
+    assert counter.count == 64
 
 
-def test_a_step_that_fails_leaves_nothing_due():
+def test_steps_that_were_due_at_a_pause_are_dropped(measure_time):
+    counter = measure_time(StepCounter(last=3))
+    clock = Clock(DT, 16.0, budget=FRAME_BUDGET_S)
+    assert clock.advance(DT, counter) == 3
+    counter.last = None
+    assert clock.advance(0.0, counter) == 0
+    assert clock.advance(DT, counter) == 16
+    fast_clock = Clock(DT, math.inf, budget=FRAME_BUDGET_S)
+    assert fast_clock.advance(DT, measure_time(StepCounter(last=5))) == 5
+
+
+def test_after_a_step_that_raises_none_is_due():
     clock = Clock(DT, 16.0, budget=FRAME_BUDGET_S)
 
-    def fails():
+    def fail():
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        clock.advance(DT, fails)
-    assert clock.advance(0.0, Steps()) == 0
+        clock.advance(DT, fail)
+    assert clock.advance(0.0, StepCounter()) == 0
 
 
-def test_another_speed_or_period_from_now_on(wall):
-    steps, clock = wall(Steps()), Clock(DT, budget=FRAME_BUDGET_S)
-    clock.advance(0.9 * DT, steps)
-    clock.speed, clock.dt = 0.5, 2 * DT
-    assert clock.advance(0.0, steps) == 0
-    assert clock.advance(4 * DT, steps) == 1
+def test_speed_and_period_can_change(measure_time):
+    counter = measure_time(StepCounter())
+    clock = Clock(DT, budget=FRAME_BUDGET_S)
+    clock.advance(0.9 * DT, counter)
+    clock.speed = 0.5
+    clock.dt = 2 * DT
+    assert clock.advance(0.0, counter) == 0
+    assert clock.advance(4 * DT, counter) == 1
 
 
-def test_speeds_in_words():
-    words = [format_speed(speed) for speed in SPEEDS]
-    assert words == ["0.1×", "0.25×", "0.5×", "1×", "2×", "4×", "8×", "16×", "max"]
+def test_speeds_have_labels():
+    labels = [format_speed(speed) for speed in SPEEDS]
+    assert labels == ["0.1×", "0.25×", "0.5×", "1×", "2×", "4×", "8×", "16×", "max"]
+
+
+@pytest.mark.parametrize(("speed", "nearest"), [(1.0, 1.0), (0.01, 0.1), (3.0, 4.0), (1e9, math.inf)])
+def test_the_nearest_selectable_speed_is_found(speed, nearest):
+    assert SPEEDS[find_speed_index(speed)] == nearest

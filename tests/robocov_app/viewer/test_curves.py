@@ -1,3 +1,5 @@
+"""Cost curves: samples at ascending times, bounded, and interpolated."""
+
 from __future__ import annotations
 
 import math
@@ -8,25 +10,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov_app.viewer.session import curves as module
-from robocov_app.viewer.session.curves import MAX_CURVE_SAMPLES, Curve, GhostCurve, SessionEvent
+from robocov_app.viewer.session.curves import MAX_CURVE_SAMPLES, Curve
 
 
-def drawn(*samples: tuple[float, float]) -> Curve:
+def build_curve(*samples: tuple[float, float]) -> Curve:
     curve = Curve()
     for time, value in samples:
         curve.add(time, value)
     return curve
 
 
-def test_samples_come_back():
-    curve = drawn((0.0, 3.0), (0.5, 2.0), (1.0, 1.5))
+def test_samples_are_returned_in_order():
+    curve = build_curve((0.0, 3.0), (0.5, 2.0), (1.0, 1.5))
     assert len(curve) == 3
     assert curve.times.tolist() == [0.0, 0.5, 1.0]
     assert curve.values.tolist() == [3.0, 2.0, 1.5]
     assert curve.last_time == 1.0
 
 
-def test_an_empty_curve():
+def test_a_curve_may_be_empty():
     curve = Curve()
     assert len(curve) == 0
     assert curve.last_time == -math.inf
@@ -35,36 +37,37 @@ def test_an_empty_curve():
     assert len(curve.extract(0.0, 1.0)) == 0
 
 
-def test_what_comes_late_finds_its_place():
-    """Whoever looks back asks for the cost of a moment that was passed over."""
-    curve = drawn((0.0, 3.0), (1.0, 2.0), (0.5, 2.6))
-    assert curve.times.tolist() == [0.0, 0.5, 1.0] and curve.interpolate(0.5) == 2.6
+def test_a_sample_can_be_inserted():
+    """The cost of an earlier step is computed when users display it."""
+    curve = build_curve((0.0, 3.0), (1.0, 2.0), (0.5, 2.6))
+    assert curve.times.tolist() == [0.0, 0.5, 1.0]
+    assert curve.interpolate(0.5) == 2.6
 
 
-def test_the_newest_of_one_time_counts():
+def test_a_sample_replaces_one_of_the_same_time():
     """While the run is paused, robots that are dragged have another cost at the same time."""
-    curve = drawn((0.0, 3.0), (1.0, 2.0), (1.0, 1.8), (1.0 + 1e-12, 1.7))
+    curve = build_curve((0.0, 3.0), (1.0, 2.0), (1.0, 1.8), (1.0 + 1e-12, 1.7))
     assert curve.times.tolist() == [0.0, 1.0]
     assert curve.interpolate(1.0) == 1.7
 
 
 @pytest.mark.parametrize(("time", "value"), [(1.0, math.nan), (1.0, math.inf), (math.nan, 1.0)])
-def test_what_is_no_number_is_left_out(time, value):
-    curve = drawn((0.0, 3.0), (time, value))
+def test_samples_that_are_not_finite_are_ignored(time, value):
+    curve = build_curve((0.0, 3.0), (time, value))
     assert len(curve) == 1
     assert curve.last_time == 0.0
 
 
-def test_between_samples_it_is_straight():
-    curve = drawn((1.0, 3.0), (2.0, 1.0))
+def test_values_are_interpolated_linearly():
+    curve = build_curve((1.0, 3.0), (2.0, 1.0))
     assert curve.interpolate(1.5) == 2.0
     assert curve.interpolate(1.0) == 3.0
     assert curve.interpolate(99.0) == 1.0
     assert math.isnan(curve.interpolate(0.5))
 
 
-def test_of_the_older_half_every_second_sample_goes():
-    curve = drawn(*((float(k), float(-k)) for k in range(MAX_CURVE_SAMPLES + 1)))
+def test_every_second_sample_of_the_older_half_is_removed():
+    curve = build_curve(*((float(k), float(-k)) for k in range(MAX_CURVE_SAMPLES + 1)))
     assert len(curve) == MAX_CURVE_SAMPLES - MAX_CURVE_SAMPLES // 4 + 1
     assert curve.times[:3].tolist() == [0.0, 2.0, 4.0]
     assert (np.diff(curve.times[MAX_CURVE_SAMPLES // 4 :]) == 1.0).all()
@@ -72,19 +75,24 @@ def test_of_the_older_half_every_second_sample_goes():
 
 @given(st.lists(st.floats(-1.0, 3.0), max_size=200), st.integers(4, 40))
 @settings(max_examples=150)
-def test_whatever_is_added_it_ascends_and_is_bounded(steps, most):
+def test_times_ascend_and_samples_are_bounded(intervals, max_samples):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MAX_CURVE_SAMPLES", most)
-        curve, time = Curve(), 0.0
-        for step in steps:
-            time += step
+        patch.setattr(module, "MAX_CURVE_SAMPLES", max_samples)
+        curve = Curve()
+        time = 0.0
+        for interval in intervals:
+            time += interval
             curve.add(time, time)
-            assert len(curve) <= most
+            assert len(curve) <= max_samples
         assert (np.diff(curve.times) > 0).all()
-        assert curve.values == pytest.approx(curve.times, abs=2e-9)  # as close as samples that are one
+        # Samples that are closer than this replace each other.
+        assert curve.values == pytest.approx(curve.times, abs=2e-9)
 
 
-def test_events_and_ghosts_say_what_they_are():
-    assert SessionEvent(1.0, "law", "Lloyd takes over") == SessionEvent(1.0, "law", "Lloyd takes over")
-    ghost = GhostCurve("rapf", "RAPF", np.zeros(2), np.ones(2))
-    assert (ghost.controller, ghost.description, len(ghost.times)) == ("rapf", "RAPF", 2)
+@given(st.integers(0, 100), st.integers(1, 40))
+def test_samples_for_a_file_are_few_and_end_with_the_newest(count, maximum):
+    curve = build_curve(*((0.1 * k, 1.0 / (k + 1)) for k in range(count)))
+    times, values = curve.sample(maximum)
+    assert len(times) == len(values) <= maximum
+    if count:
+        assert times[-1] == pytest.approx(curve.last_time, abs=1e-3)

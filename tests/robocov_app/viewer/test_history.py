@@ -1,3 +1,5 @@
+"""The recorded past of a run: bounded memory, thinned with age, and what is kept."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -13,46 +15,52 @@ from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.states import PaneSetup, PaneState, RunState
 
 DT = 1 / 60
-FEWEST = 24
-ONE = 700 + 2 * 16
-"""Bytes of a moment of one robot."""
+MIN_STATES = 24
+PANE_BYTES = 700
+ROBOT_BYTES = 2 * 16
+STATE_BYTES = PANE_BYTES + ROBOT_BYTES
+"""Size of a state with one pane and one robot."""
 
 
 @pytest.fixture(autouse=True)
-def few(monkeypatch):
-    monkeypatch.setattr(module, "MIN_STATES", FEWEST)
+def keep_few_states(monkeypatch):
+    monkeypatch.setattr(module, "MIN_STATES", MIN_STATES)
 
 
-def setup(failed=None) -> PaneSetup:
+def build_setup(failed=None) -> PaneSetup:
     return PaneSetup(HALL, RAPF, RobotProperties(), (1,), failed or {})
 
 
-THEN = setup()
+SETUP = build_setup()
 
 
-def moment(step, there=THEN, n=1, memory=None, pane=0) -> RunState:
-    return RunState(
-        step, {pane: PaneState(there, np.full((n, 2), float(step)), np.zeros((n, 2)), memory)}, None
-    )
+def build_state(step, setup=SETUP, robots=1, memory=None) -> RunState:
+    positions = np.full((robots, 2), float(step))
+    pane_state = PaneState(setup, positions, np.zeros((robots, 2)), memory)
+    return RunState(step, {0: pane_state}, None)
 
 
-def filled(steps, most=60 * ONE, there=lambda step: THEN) -> RunHistory:
-    history = RunHistory(DT, most)
+def build_history(steps, max_bytes=60 * STATE_BYTES, get_setup=lambda step: SETUP) -> RunHistory:
+    history = RunHistory(DT, max_bytes)
     for step in range(steps):
-        history.append(moment(step, there(step)))
+        history.append(build_state(step, get_setup(step)))
     return history
 
 
-def taken(history) -> int:
-    return sum(700 * len(each.states) + 32 * len(each.states[0].positions) for each in history.states)
+def compute_bytes(history) -> int:
+    total = 0
+    for state in history.states:
+        total += PANE_BYTES * len(state.states)
+        total += ROBOT_BYTES * len(state.states[0].positions)
+    return total
 
 
-def powers_of_two(numbers) -> bool:
+def are_powers_of_two(numbers) -> bool:
     return all(number & (number - 1) == 0 for number in numbers)
 
 
-def test_moments_come_back_in_their_order():
-    history = filled(5)
+def test_states_are_returned_in_order():
+    history = build_history(5)
     assert len(history) == 5
     assert history.steps == [0, 1, 2, 3, 4]
     assert history[3].step == 3
@@ -63,93 +71,98 @@ def test_moments_come_back_in_their_order():
 
 @given(st.integers(0, 900), st.integers(30, 120))
 @settings(max_examples=200)
-def test_whatever_is_added_the_past_stays_bounded_and_even(steps, most):
-    history = filled(steps + 1, most * ONE)
-    assert len(history) <= most
-    assert taken(history) <= most * ONE
+def test_the_past_is_bounded_and_becomes_coarser_with_age(steps, max_states):
+    history = build_history(steps + 1, max_states * STATE_BYTES)
+    assert len(history) <= max_states
+    assert compute_bytes(history) <= max_states * STATE_BYTES
     assert len(history) + history.thinned == steps + 1
     gaps = np.diff(history.steps)
     assert (gaps > 0).all()
-    assert powers_of_two(gaps.tolist())
-    # never finer than what is newer
+    assert are_powers_of_two(gaps.tolist())
     assert (np.diff(gaps) <= gaps[:-1]).all()
     assert history.steps[0] == 0
     assert history.last.step == steps
-    newest = min(steps, most // 16)
+    newest = min(steps, max_states // 16)
     assert history.steps[-1 - newest :] == list(range(steps - newest, steps + 1))
 
 
 @st.composite
-def runs(draw):
-    """Runs that were touched here and there, at which robots came and went."""
-    kinds = st.sampled_from(["step"] * 6 + ["touch", "amend", "robots"])
+def edited_runs(draw):
+    """Draw runs with edits, at some of which the number of robots changes."""
+    kinds = st.sampled_from(["step"] * 6 + ["edit", "robots"])
     return draw(st.lists(st.tuples(kinds, st.integers(1, 40)), max_size=40))
 
 
-@given(runs())
+@given(edited_runs())
 @settings(max_examples=200)
-def test_whatever_happens_nothing_gets_out_of_order(run):
-    most = 80 * ONE
-    history, step, there, n, touched = RunHistory(DT, most), 0, THEN, 1, set()
-    history.append(moment(0))
+def test_the_past_of_an_edited_run_stays_in_order(run):
+    max_bytes = 80 * STATE_BYTES
+    history = RunHistory(DT, max_bytes)
+    step = 0
+    setup = SETUP
+    robots = 1
+    edited_steps = set()
+    history.append(build_state(0))
     for kind, number in run:
         if kind == "robots":
-            n = number
-        if kind in ("touch", "amend", "robots"):
-            there = setup()
-            history.amend(moment(step, there, n))
-            touched |= {step}
+            robots = number
+        if kind in ("edit", "robots"):
+            setup = build_setup()
+            history.amend(build_state(step, setup, robots))
+            edited_steps.add(step)
         for _ in range(number if kind == "step" else 1):
             step += 1
-            history.append(moment(step, there, n))
+            history.append(build_state(step, setup, robots))
         assert history.last.step == step
-        assert len(history.last.states[0].positions) == n
+        assert len(history.last.states[0].positions) == robots
         assert (np.diff(history.steps) > 0).all()
-        assert taken(history) <= most or len(history) <= FEWEST
+        assert compute_bytes(history) <= max_bytes or len(history) <= MIN_STATES
         assert history.steps[0] == 0
         for time in (-1.0, 0.0, 0.37 * step * DT, step * DT, 1e9):
-            k = history.find_index(time)
-            assert k == 0 or history.get_time(k) <= time + 1e-6
-            assert k == len(history) - 1 or history.get_time(k + 1) > time
-    if len(touched) < 8:
-        assert touched <= set(history.steps)
+            index = history.find_index(time)
+            assert index == 0 or history.get_time(index) <= time + 1e-6
+            assert index == len(history) - 1 or history.get_time(index + 1) > time
+    if len(edited_steps) < 8:
+        assert edited_steps <= set(history.steps)
 
 
-def test_what_was_touched_is_kept():
-    events = {101: setup(), 203: setup(), 747: setup()}
+def test_states_right_after_edits_are_kept():
+    setups = {101: build_setup(), 203: build_setup(), 747: build_setup()}
 
-    def there(step):
-        return events[max((begin for begin in events if begin <= step), default=101)]
+    def get_setup(step):
+        first_step = max((first for first in setups if first <= step), default=101)
+        return setups[first_step]
 
-    history = filled(2000, 100 * ONE, there)
+    history = build_history(2000, 100 * STATE_BYTES, get_setup)
     assert {203, 747} <= set(history.steps)
     assert len(history) <= 100
 
 
-def test_a_run_that_is_touched_all_the_time_is_thinned_too():
-    history = filled(1500, 100 * ONE, lambda step: setup())
+def test_a_run_that_is_edited_at_each_step_is_thinned_as_well():
+    history = build_history(1500, 100 * STATE_BYTES, lambda step: build_setup())
     assert len(history) <= 100
-    assert taken(history) <= 100 * ONE
+    assert compute_bytes(history) <= 100 * STATE_BYTES
     assert history.steps[0] == 0
     assert history.last.step == 1499
 
 
-def test_few_moments_are_kept_however_large_they_are():
+def test_a_minimum_of_states_is_kept_regardless_of_their_size():
     history = RunHistory(DT, 1000)
     for step in range(100):
-        history.append(moment(step, n=50))
-        assert len(history) <= FEWEST
-    assert len(history) >= FEWEST // 2
+        history.append(build_state(step, robots=50))
+        assert len(history) <= MIN_STATES
+    assert len(history) >= MIN_STATES // 2
     assert history.steps[0] == 0
 
 
-def test_a_larger_team_takes_more():
-    small, large = RunHistory(DT, 60 * ONE), RunHistory(DT, 60 * ONE)
+def test_a_larger_team_needs_more_memory():
+    small_team = RunHistory(DT, 60 * STATE_BYTES)
+    large_team = RunHistory(DT, 60 * STATE_BYTES)
     for step in range(50):
-        small.append(moment(step))
-        large.append(moment(step, n=100))
-    assert len(small) == 50
-    assert len(large) < 30
+        small_team.append(build_state(step))
+        large_team.append(build_state(step, robots=100))
+    assert len(small_team) == 50
+    assert len(large_team) < 30
 
 
 @pytest.mark.parametrize(
@@ -161,76 +174,77 @@ def test_a_larger_team_takes_more():
         RobotProperties(np.zeros(5000)),
     ],
 )
-def test_what_controllers_remember_counts(memory):
-    history = RunHistory(DT, 60 * ONE)
+def test_the_memory_of_controllers_counts(memory):
+    history = RunHistory(DT, 60 * STATE_BYTES)
     for step in range(50):
-        history.append(moment(step, memory=memory))
+        history.append(build_state(step, memory=memory))
     assert len(history) < 30
 
 
-def test_what_refers_to_itself_is_counted_once_or_so():
+def test_a_memory_that_refers_to_itself_is_measured():
     memory = {"word": "x" * 100, "number": 3, "nothing": None}
     memory["itself"] = memory
     history = RunHistory(DT)
-    history.append(moment(0, memory=memory))
+    history.append(build_state(0, memory=memory))
     assert len(history) == 1
 
 
-def test_the_last_moment_not_after_a_time():
-    history = filled(2000, 100 * ONE)
+def test_the_last_state_at_or_before_a_time_is_found():
+    history = build_history(2000, 100 * STATE_BYTES)
     steps = np.array(history.steps)
     for step in (0, 1, 2, 3, 500, 777, 1555, 1990, 1999):
         assert history.steps[history.find_index(step * DT)] == steps[steps <= step].max()
-        # times come from other sums, too
+        # Times may be sums that are rounded differently.
         assert history.find_index(step * DT - 1e-12) == history.find_index(step * DT)
     assert history.find_index(-3.0) == 0
     assert history.find_index(1e9) == len(history) - 1
 
 
-def test_the_newest_is_replaced_when_something_was_touched():
-    history = filled(4)
-    touched = setup()
-    history.amend(moment(3, touched))
+def test_the_newest_state_is_replaced_after_an_edit():
+    history = build_history(4)
+    edited = build_setup()
+    history.amend(build_state(3, edited))
     assert history.steps == [0, 1, 2, 3]
-    assert history.last.states[0].setup is touched
-    history.amend(moment(4, touched))
+    assert history.last.states[0].setup is edited
+    history.amend(build_state(4, edited))
     assert history.steps == [0, 1, 2, 3, 4]
-    only = filled(1)
-    only.amend(moment(0, touched))
-    assert only.steps == [0]
-    assert only.last.states[0].setup is touched
+    single = build_history(1)
+    single.amend(build_state(0, edited))
+    assert single.steps == [0]
+    assert single.last.states[0].setup is edited
 
 
 @given(st.integers(1, 400), st.integers(0, 400))
 @settings(max_examples=100)
-def test_what_is_left_out_takes_no_room(steps, k):
-    history = filled(steps, 60 * ONE)
-    k = min(k, len(history) - 1)
-    twin, before = history.copy_until(k), history.steps[:]
-    assert history.steps == before
-    assert twin.steps == before[: k + 1]
-    assert twin._bytes == taken(twin)
-    for step in range(twin.last.step + 1, twin.last.step + 200):
-        twin.append(moment(step))
-    assert taken(twin) <= 60 * ONE
+def test_a_copy_has_the_size_of_its_own_states(steps, index):
+    history = build_history(steps, 60 * STATE_BYTES)
+    index = min(index, len(history) - 1)
+    steps_before = history.steps[:]
+    duplicate = history.copy_until(index)
+    assert history.steps == steps_before
+    assert duplicate.steps == steps_before[: index + 1]
+    assert duplicate._bytes == compute_bytes(duplicate)
+    for step in range(duplicate.last.step + 1, duplicate.last.step + 200):
+        duplicate.append(build_state(step))
+    assert compute_bytes(duplicate) <= 60 * STATE_BYTES
 
 
-def test_a_history_of_its_own_leaves_the_other_as_it_is():
-    history = filled(10)
-    twin = history.copy_until(4)
-    twin.append(moment(5, setup()))
+def test_a_copy_leaves_the_original_as_it_is():
+    history = build_history(10)
+    duplicate = history.copy_until(4)
+    duplicate.append(build_state(5, build_setup()))
     assert len(history) == 10
-    assert history[5] is not twin[5]
-    assert twin.dt == history.dt
+    assert history[5] is not duplicate[5]
+    assert duplicate.dt == history.dt
 
 
-def test_failed_robots_are_solid():
-    there = setup({2: (1.0, 1.0), 5: (2.0, 3.0)})
-    assert setup().sensed_environment is HALL
-    assert there.sensed_environment.obstacles[: len(HALL.obstacles)] == HALL.obstacles
-    assert there.sensed_environment.obstacles[len(HALL.obstacles) :] == (
+def test_failed_robots_are_sensed_as_obstacles():
+    setup = build_setup({2: (1.0, 1.0), 5: (2.0, 3.0)})
+    assert build_setup().sensed_environment is HALL
+    obstacles = setup.sensed_environment.obstacles
+    assert obstacles[: len(HALL.obstacles)] == HALL.obstacles
+    assert obstacles[len(HALL.obstacles) :] == (
         CircleObstacle((1.0, 1.0), 0.1),
         CircleObstacle((2.0, 3.0), 0.1),
     )
-    # what is derived from it is so once
-    assert there.sensed_environment is there.sensed_environment
+    assert setup.sensed_environment is setup.sensed_environment, "the map is built once"

@@ -1,3 +1,5 @@
+"""Trails of the robots: bounded, with at most thirty rows a second, and rebuilt from recorded states."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -9,18 +11,20 @@ from sample_sessions import LLOYD, RAPF, advance_session, start_session
 from robocov_app.viewer.session import trails as module
 from robocov_app.viewer.session.trails import MAX_TRAIL_RATE_HZ, MAX_TRAIL_ROWS, Trail, rebuild_trail
 
-STEP = 1 / 60
+DT = 1 / 60
+ROW_INTERVAL_S = 1 / MAX_TRAIL_RATE_HZ
 
 
-def walked(rows: int, step: float = 1 / MAX_TRAIL_RATE_HZ, n: int = 1) -> Trail:
-    trail = Trail(n)
-    for k in range(rows):
-        trail.add(k * step, np.full((n, 2), float(k)))
+def build_trail(rows: int, interval: float = ROW_INTERVAL_S, robots: int = 1) -> Trail:
+    """Build a trail in which the coordinates are the number of the row."""
+    trail = Trail(robots)
+    for row in range(rows):
+        trail.add(row * interval, np.full((robots, 2), float(row)))
     return trail
 
 
-def test_rows_come_back_in_their_order():
-    trail = walked(3, n=2)
+def test_rows_are_returned_in_order():
+    trail = build_trail(3, robots=2)
     assert len(trail) == 3
     assert trail.positions.shape == (3, 2, 2)
     assert trail.positions[:, 1, 0].tolist() == [0.0, 1.0, 2.0]
@@ -29,112 +33,109 @@ def test_rows_come_back_in_their_order():
     assert Trail(4).positions.shape == (0, 4, 2)
 
 
-def test_at_most_thirty_rows_a_second():
-    trail = walked(121, STEP)
+def test_there_are_at_most_thirty_rows_a_second():
+    trail = build_trail(121, DT)
     assert len(trail) == 61
-    assert np.diff(trail.times) == pytest.approx(1 / MAX_TRAIL_RATE_HZ)
-    slow = walked(10, 0.25)
-    assert len(slow) == 10
+    assert np.diff(trail.times) == pytest.approx(ROW_INTERVAL_S)
+    assert trail.positions[:4, 0, 0].tolist() == [0.0, 2.0, 4.0, 6.0]
+    assert len(build_trail(10, 0.25)) == 10
 
 
-def test_what_must_not_be_missed_is_always_taken():
-    trail = walked(2)
-    trail.add(1 / MAX_TRAIL_RATE_HZ + STEP, np.array([[7.0, 7.0]]), always=True)
+def test_a_row_can_be_added_in_any_case():
+    trail = build_trail(2)
+    trail.add(ROW_INTERVAL_S + DT, np.array([[7.0, 7.0]]), always=True)
     assert trail.positions[:, 0, 0].tolist() == [0.0, 1.0, 7.0]
 
 
-def test_one_row_for_one_time():
-    """A robot that is dragged while the run is paused leaves no row for each move of the mouse."""
-    trail = walked(2)
-    for k in range(100):
-        trail.add(1 / MAX_TRAIL_RATE_HZ, np.full((1, 2), 100.0 + k), always=True)
+def test_a_row_replaces_one_of_the_same_time():
+    """A robot that is dragged while the run is paused leaves no row for each move of the pointer."""
+    trail = build_trail(2)
+    for move in range(100):
+        trail.add(ROW_INTERVAL_S, np.full((1, 2), 100.0 + move), always=True)
     assert trail.positions[:, 0, 0].tolist() == [0.0, 199.0]
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 0.2), st.booleans()), max_size=300), st.integers(8, 64))
 @settings(max_examples=150)
-def test_whatever_is_added_it_ascends_and_is_bounded(steps, most):
+def test_times_ascend_and_rows_are_bounded(additions, max_rows):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MAX_TRAIL_ROWS", most // 2 * 2)
-        trail, time = Trail(1), 0.0
-        for step, always in steps:
-            time += step
+        patch.setattr(module, "MAX_TRAIL_ROWS", max_rows // 2 * 2)
+        trail = Trail(1)
+        time = 0.0
+        for elapsed, always in additions:
+            time += elapsed
             trail.add(time, np.full((1, 2), time), always=always)
-            assert trail.times[-1] == pytest.approx(time, abs=1 / MAX_TRAIL_RATE_HZ)
-        assert len(trail) <= most
+            assert trail.times[-1] == pytest.approx(time, abs=ROW_INTERVAL_S)
+        assert len(trail) <= max_rows
         assert (np.diff(trail.times) > 0).all()
-        # a row stays with its time
+        # Positions stay with their times.
         assert trail.positions[:, 0, 0].tolist() == trail.times.tolist()
 
 
-def test_of_the_older_half_every_second_row_goes():
-    trail = walked(MAX_TRAIL_ROWS + 1)
-    kept = trail.positions[:, 0, 0]
+def test_every_second_row_of_the_older_half_is_removed():
+    rows = build_trail(MAX_TRAIL_ROWS + 1).positions[:, 0, 0]
     half = MAX_TRAIL_ROWS // 2
-    assert len(kept) == half // 2 + half + 1
-    assert kept[:3].tolist() == [0.0, 2.0, 4.0]
-    assert kept[-half - 1 :].tolist() == list(range(half, MAX_TRAIL_ROWS + 1))
-    long = walked(6 * MAX_TRAIL_ROWS)
-    assert len(long) <= MAX_TRAIL_ROWS
-    assert long.positions[0, 0, 0] == 0.0
-    assert long.positions[-1, 0, 0] == 6 * MAX_TRAIL_ROWS - 1
+    assert len(rows) == half // 2 + half + 1
+    assert rows[:3].tolist() == [0.0, 2.0, 4.0]
+    assert rows[-half - 1 :].tolist() == list(range(half, MAX_TRAIL_ROWS + 1))
+    long_trail = build_trail(6 * MAX_TRAIL_ROWS)
+    assert len(long_trail) <= MAX_TRAIL_ROWS
+    assert long_trail.positions[0, 0, 0] == 0.0
+    assert long_trail.positions[-1, 0, 0] == 6 * MAX_TRAIL_ROWS - 1
 
 
-def test_until_a_time():
-    trail = walked(10)
-    for time, count in (
-        (-1.0, 0),
-        (0.0, 1),
-        (3 / MAX_TRAIL_RATE_HZ, 4),
-        (3 / MAX_TRAIL_RATE_HZ + 0.01, 4),
-        (99.0, 10),
-    ):
-        positions, times = trail.get_until(time)
-        assert len(positions) == len(times) == count
+@pytest.mark.parametrize(
+    ("time", "count"),
+    [(-1.0, 0), (0.0, 1), (3 * ROW_INTERVAL_S, 4), (3 * ROW_INTERVAL_S + 0.01, 4), (99.0, 10)],
+)
+def test_a_trail_is_returned_up_to_a_time(time, count):
+    positions, times = build_trail(10).get_until(time)
+    assert len(positions) == len(times) == count
 
 
-def test_a_trail_of_moments():
-    trail = Trail(1)
-    for k in range(7):
-        trail.add(k * STEP, np.full((1, 2), float(k)))
-    assert trail.positions[:, 0, 0].tolist() == [0.0, 2.0, 4.0, 6.0]
-
-
-def test_the_trail_of_a_past_is_that_which_was_left():
+def test_the_rebuilt_trail_is_that_of_the_run():
     session = advance_session(start_session(RAPF, LLOYD), 60)
     for pane in session.timeline.panes:
-        told, starts = rebuild_trail(session.timeline.history, pane.number, 60)
-        np.testing.assert_array_equal(told.positions, pane.trail.positions)
-        assert told.times == pytest.approx(pane.trail.times)
+        trail, starts = rebuild_trail(session.timeline.history, pane.number, 60)
+        np.testing.assert_array_equal(trail.positions, pane.trail.positions)
+        assert trail.times == pytest.approx(pane.trail.times)
         np.testing.assert_array_equal(starts, pane.starts)
 
 
-def test_robots_that_came_later_were_nowhere_before():
+def test_robots_have_no_positions_before_they_join():
     session = advance_session(start_session(robots=2), 10)
-    place = session.add_robot((3.5, 3.0))
+    number = session.add_robot((3.5, 3.0))
     advance_session(session, 10)
     session.fail_robot(1)
     advance_session(session, 10)
-    assert session.displayed.numbers == (2, place)
-    told, starts = rebuild_trail(session.timeline.history, 0, 30)
-    assert told.positions.shape[1] == 2
-    assert np.isfinite(told.positions[:, 0]).all()
-    assert np.isnan(told.positions[told.times < 9.5 / 60, 1]).all()
-    assert np.isfinite(told.positions[told.times > 9.5 / 60, 1]).all()
+    assert session.displayed.numbers == (2, number)
+    trail, starts = rebuild_trail(session.timeline.history, 0, 30)
+    assert trail.positions.shape[1] == 2
+    assert np.isfinite(trail.positions[:, 0]).all()
+    assert np.isnan(trail.positions[trail.times < 9.5 / 60, 1]).all()
+    assert np.isfinite(trail.positions[trail.times > 9.5 / 60, 1]).all()
     assert starts[1].tolist() == [3.5, 3.0]
-    # of those that worked then
-    earlier, starts = rebuild_trail(session.timeline.history, 0, 5)
-    assert np.isfinite(earlier.positions).all()
+
+
+def test_an_earlier_trail_is_of_the_robots_that_worked_then():
+    session = advance_session(start_session(robots=2), 10)
+    session.add_robot((3.5, 3.0))
+    advance_session(session, 10)
+    trail, starts = rebuild_trail(session.timeline.history, 0, 5)
+    assert trail.positions.shape[1] == 2
+    assert np.isfinite(trail.positions).all()
     np.testing.assert_array_equal(starts, session.timeline.history[0].states[0].positions)
 
 
 @pytest.mark.parametrize("steps", range(1, 7))
-def test_who_came_in_between_two_rows_is_in_the_last_one(steps):
+def test_a_robot_that_joined_between_two_rows_is_in_the_last_one(steps):
     session = advance_session(start_session(robots=1), 3)
     session.add_robot((3.5, 3.0))
     advance_session(session, steps)
     for last in range(3, 3 + steps + 1):
-        told, _ = rebuild_trail(session.timeline.history, 0, last)
-        np.testing.assert_array_equal(told.positions[-1], session.timeline.history[last].states[0].positions)
-        assert told.times[-1] == pytest.approx(last * STEP)
-        assert told.positions[np.isfinite(told.positions[:, 1, 0]), 1][0].tolist() == [3.5, 3.0]
+        trail, _ = rebuild_trail(session.timeline.history, 0, last)
+        expected = session.timeline.history[last].states[0].positions
+        np.testing.assert_array_equal(trail.positions[-1], expected)
+        assert trail.times[-1] == pytest.approx(last * DT)
+        has_joined = np.isfinite(trail.positions[:, 1, 0])
+        assert trail.positions[has_joined, 1][0].tolist() == [3.5, 3.0]

@@ -86,7 +86,7 @@ class Curve:
         list of list of float
             Times, s, and values. The newest sample is always among them.
         """
-        stride = -(-len(self) // maximum)
+        stride = max(-(-len(self) // maximum), 1)
         times = self._times[::-stride][::-1]
         values = self._values[::-stride][::-1]
         return [
