@@ -1,3 +1,5 @@
+"""Edits of robots: placed, added, removed, failed and revived, now and in the past."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -28,126 +30,131 @@ from robocov_app.viewer.session.edits import AddRobot
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
 RADIUS = 0.1
+NO_ROBOTS = np.empty((0, 2))
+CELL = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
+points = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
 
 
-def joined(session, point, number) -> None:
+def add_numbered_robot(session, point, number) -> None:
     session.apply(AddRobot(number, point), "robot", f"robot {number} joined")
 
 
-places = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
+def get_position(session, number, pane=0) -> list[float]:
+    """Return the present position of a working robot, m."""
+    shown = session.timeline.panes[pane]
+    return shown.simulation.positions[shown.get_row(number)].tolist()
 
 
-def place_of(session, number, pane=0) -> list[float]:
-    its = session.timeline.panes[pane]
-    return its.simulation.positions[its.get_row(number)].tolist()
-
-
-def failed_at(session, number, pane=0) -> tuple[float, float]:
+def get_failed_position(session, number, pane=0) -> tuple[float, float]:
     return session.timeline.panes[pane].setup.failed[number]
 
 
-# where there is room
+def compute_distance(point, other) -> float:
+    return float(np.hypot(*np.subtract(point, other)))
 
 
-@given(places, st.lists(places, max_size=12), st.sampled_from([0.05, 0.1, 0.3]))
-def test_the_nearest_place_where_a_robot_fits(point, others, radius):
+# Free positions
+
+
+@given(points, st.lists(points, max_size=12), st.sampled_from([0.05, 0.1, 0.3]))
+def test_the_nearest_free_position_is_found(point, others, radius):
     others = np.array(others).reshape(-1, 2)
-    place = find_free_position(HALL, radius, others, point)
-    room = HALL.free.buffer(-radius)
+    position = find_free_position(HALL, radius, others, point)
+    free_centers = HALL.free.buffer(-radius)
     if len(others):
-        room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), 2 * radius)))
-        assert np.hypot(*(others - place).T).min() >= 2 * radius
-    assert shapely.distance(HALL.free.boundary, shapely.Point(place)) >= radius - 1e-9
-    assert HALL.free.contains(shapely.Point(place))
-    # no other is nearer, but for a millimeter's room
-    nearest = shapely.distance(room, shapely.Point(point))
-    assert np.hypot(place[0] - point[0], place[1] - point[1]) <= nearest + 0.02
+        discs = shapely.buffer(shapely.points(others), 2 * radius)
+        free_centers = free_centers.difference(shapely.union_all(discs))
+        assert np.hypot(*(others - position).T).min() >= 2 * radius
+    assert shapely.distance(HALL.free.boundary, shapely.Point(position)) >= radius - 1e-9
+    assert HALL.free.contains(shapely.Point(position))
+    nearest = shapely.distance(free_centers, shapely.Point(point))
+    assert compute_distance(position, point) <= nearest + 0.02
 
 
-def test_where_it_fits_it_stays():
-    assert find_free_position(HALL, RADIUS, np.empty((0, 2)), (3.0, 2.0)) == (3.0, 2.0)
+def test_a_free_position_is_kept():
+    assert find_free_position(HALL, RADIUS, NO_ROBOTS, (3.0, 2.0)) == (3.0, 2.0)
     assert find_free_position(HALL, RADIUS, np.array([[3.0, 2.2]]), (3.0, 2.0)) == (3.0, 2.0)
 
 
-def test_a_room_that_is_full():
-    cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
-    assert find_free_position(cell, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
-    for radius, others in ((RADIUS, np.array([[0.225, 0.225]])), (0.3, np.empty((0, 2)))):
+def test_a_full_map_has_no_free_position():
+    assert find_free_position(CELL, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
+    for radius, others in ((RADIUS, np.array([[0.225, 0.225]])), (0.3, NO_ROBOTS)):
         with pytest.raises(StartError, match="no room for a robot there"):
-            find_free_position(cell, radius, others, (0.25, 0.25))
+            find_free_position(CELL, radius, others, (0.25, 0.25))
 
 
-# placing
+# Placing
 
 
 def test_a_robot_is_placed_in_all_panes():
     session = advance_session(start_session(RAPF, LLOYD), 20)
     others = [pane.simulation.positions[1:].copy() for pane in session.timeline.panes]
     session.place_robot(1, (5.0, 3.0))
-    for k, pane in enumerate(session.timeline.panes):
-        assert place_of(session, 1, k) == [5.0, 3.0]
+    for index, pane in enumerate(session.timeline.panes):
+        assert get_position(session, 1, index) == [5.0, 3.0]
         assert pane.simulation.velocities[0].tolist() == [0.0, 0.0]
-        np.testing.assert_array_equal(pane.simulation.positions[1:], others[k])
+        np.testing.assert_array_equal(pane.simulation.positions[1:], others[index])
     assert session.timeline.history.last.states[0].positions[0].tolist() == [5.0, 3.0]
     assert len(session.timeline.history) == 21
 
 
-@given(st.lists(st.tuples(st.integers(1, 6), places), min_size=1, max_size=6))
+@given(st.lists(st.tuples(st.integers(1, 6), points), min_size=1, max_size=6))
 @settings(max_examples=40)
-def test_wherever_robots_are_placed_they_fit(drags):
+def test_placed_robots_overlap_nothing(placements):
     session = start_session(robots=6)
-    for number, point in drags:
-        others = [k for k in range(6) if k != number - 1]
-        before = session.timeline.panes[0].simulation.positions[others]
+    for number, point in placements:
+        other_rows = [row for row in range(6) if row != number - 1]
+        before = session.timeline.panes[0].simulation.positions[other_rows]
         session.place_robot(number, point)
-        np.testing.assert_array_equal(session.timeline.panes[0].simulation.positions[others], before)
+        simulation = session.timeline.panes[0].simulation
+        np.testing.assert_array_equal(simulation.positions[other_rows], before)
         assert compute_penetration(session) <= 1e-9
     session.playback.step()
     assert compute_penetration(session) < 2e-3
 
 
-def test_a_robot_that_failed_is_placed_too():
+def test_a_failed_robot_can_be_placed():
     session = advance_session(start_session(RAPF, RPF), 10)
     session.fail_robot(2)
     session.fail_robot(3)
     session.place_robot(2, (5.0, 3.0))
-    assert [failed_at(session, 2, pane) for pane in (0, 1)] == [(5.0, 3.0)] * 2
-    session.place_robot(2, failed_at(session, 3))
-    assert np.hypot(*np.subtract(failed_at(session, 2), failed_at(session, 3))) >= 2 * RADIUS
+    assert [get_failed_position(session, 2, pane) for pane in (0, 1)] == [(5.0, 3.0)] * 2
+    session.place_robot(2, get_failed_position(session, 3))
+    distance = compute_distance(get_failed_position(session, 2), get_failed_position(session, 3))
+    assert distance >= 2 * RADIUS
     session.place_robot(2, (9.0, 9.0))
-    assert failed_at(session, 2) == pytest.approx((5.899, 3.899))
+    assert get_failed_position(session, 2) == pytest.approx((5.899, 3.899))
     assert get_robot_numbers(session) == ((1,), (2, 3))
 
 
-def test_grabbing_places_while_it_is_paused():
+def test_a_robot_that_is_dragged_while_paused_is_placed():
     session = advance_session(start_session(), 5)
     session.drag_robot(2, (3.0, 3.0))
     assert session.timeline.drag is None
-    assert place_of(session, 2) == [3.0, 3.0]
+    assert get_position(session, 2) == [3.0, 3.0]
     session.playback.is_playing = True
     session.drag_robot(2, (3.2, 3.0))
-    assert place_of(session, 2) == [3.0, 3.0]
+    assert get_position(session, 2) == [3.0, 3.0]
     assert session.timeline.drag == (2, (3.2, 3.0))
-    # paused while it was held
     session.playback.is_playing = False
     session.drag_robot(2, (3.4, 3.0))
     assert session.timeline.drag is None
-    assert place_of(session, 2) == [3.4, 3.0]
+    assert get_position(session, 2) == [3.4, 3.0]
 
 
-def test_what_has_failed_is_not_pulled():
+def test_a_failed_robot_that_is_dragged_is_placed():
     session = start_session()
     session.fail_robot(2)
     session.playback.is_playing = True
     session.drag_robot(2, (3.0, 3.0))
     assert session.timeline.drag is None
-    assert failed_at(session, 2) == (3.0, 3.0)
+    assert get_failed_position(session, 2) == (3.0, 3.0)
 
 
-# joining and leaving
+# Adding and removing
 
 
-def test_robots_join_at_rest():
+def test_added_robots_are_at_rest():
     session = advance_session(start_session(RAPF, LLOYD), 10)
     velocities = session.timeline.panes[0].simulation.velocities
     assert session.add_robot((5.0, 3.0)) == 4
@@ -155,42 +162,42 @@ def test_robots_join_at_rest():
     for pane in session.timeline.panes:
         assert pane.numbers == (1, 2, 3, 4, 5)
         assert pane.simulation.positions[3].tolist() == [5.0, 3.0]
-        assert 2 * RADIUS <= np.hypot(*(pane.simulation.positions[4] - (5.0, 3.0))) < 2 * RADIUS + 0.01
+        distance = compute_distance(pane.simulation.positions[4], (5.0, 3.0))
+        assert 2 * RADIUS <= distance < 2 * RADIUS + 0.01
         assert pane.simulation.velocities[3:].tolist() == [[0.0, 0.0]] * 2
     np.testing.assert_array_equal(session.timeline.panes[0].simulation.velocities[:3], velocities)
     assert [event.text for event in session.timeline.events] == ["robot 4 joined", "robot 5 joined"]
-    joined(session, (1.0, 3.0), 9)
+    add_numbered_robot(session, (1.0, 3.0), 9)
     assert session.add_robot((1.0, 3.0)) == 10
 
 
-def test_robots_leave_and_come_back_to_their_rows():
+def test_undo_returns_removed_robots_to_their_positions():
     session = advance_session(start_session(RAPF, LLOYD, robots=4), 15)
-    where = [place_of(session, 2, pane) for pane in (0, 1)]
-    assert where[0] != where[1]
+    before = [get_position(session, 2, pane) for pane in (0, 1)]
+    assert before[0] != before[1]
     session.remove_robot(2)
     assert get_robot_numbers(session) == ((1, 3, 4), ())
     session.undo()
     assert get_robot_numbers(session) == ((1, 2, 3, 4), ())
-    # in each pane to its own place
-    assert [place_of(session, 2, pane) for pane in (0, 1)] == where
+    assert [get_position(session, 2, pane) for pane in (0, 1)] == before
     session.redo()
     assert get_robot_numbers(session) == ((1, 3, 4), ())
 
 
-def test_a_robot_that_failed_leaves_and_comes_back_failed():
+def test_undo_returns_a_removed_failed_robot():
     session = advance_session(start_session(RAPF, LLOYD, robots=3), 15)
     session.fail_robot(1)
-    where = [failed_at(session, 1, pane) for pane in (0, 1)]
+    before = [get_failed_position(session, 1, pane) for pane in (0, 1)]
     session.remove_robot(1)
     assert get_robot_numbers(session) == ((2, 3), ())
     session.undo()
     assert get_robot_numbers(session) == ((2, 3), (1,))
-    assert [failed_at(session, 1, pane) for pane in (0, 1)] == where
+    assert [get_failed_position(session, 1, pane) for pane in (0, 1)] == before
     assert session.undo() == "robot 1 failed"
     assert get_robot_numbers(session) == ((1, 2, 3), ())
 
 
-def test_numbers_are_not_given_twice():
+def test_numbers_are_unique():
     session = start_session()
     session.fail_robot(3)
     assert session.add_robot((3.0, 3.0)) == 4
@@ -198,14 +205,15 @@ def test_numbers_are_not_given_twice():
     assert session.add_robot((3.0, 3.0)) == 4
     for number in (1, 3):
         with pytest.raises(ParameterError, match=f"there is a robot {number} already"):
-            joined(session, (3.0, 3.0), number)
+            add_numbered_robot(session, (3.0, 3.0), number)
 
 
-# failing
+# Failing
 
 
-def test_who_fails_is_not_heard_but_sensed():
-    session = start_session(RPF, robots=3, given_starts=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
+def test_a_failed_robot_sends_no_messages_and_is_sensed():
+    starts = np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]])
+    session = start_session(RPF, robots=3, given_starts=starts)
     pane = session.timeline.panes[0]
     before = pane.simulation.observe_and_decide()
     assert before.seen.neighbors.list_neighbors(0).tolist() == [1, 2]
@@ -214,7 +222,7 @@ def test_who_fails_is_not_heard_but_sensed():
     assert pane.numbers == (1, 3)
     assert seen.neighbors.count == 2
     assert seen.neighbors.list_neighbors(0).tolist() == [1]
-    # its rim, where there was nothing nearer than a wall
+    # The rim of the failed robot is the nearest point of an obstacle now.
     assert seen.obstacle_points[0] == pytest.approx([3.3, 3.0], abs=2e-3)
     assert pane.simulation.observe_and_decide().decision.terms["repulsion_obstacle"][0, 0] < 0.0
     session.revive_robot(2)
@@ -224,93 +232,94 @@ def test_who_fails_is_not_heard_but_sensed():
     np.testing.assert_array_equal(after.decision.forces, before.decision.forces)
 
 
-def test_who_failed_stands_still_and_in_the_way():
+def test_a_failed_robot_blocks_the_others():
     session = advance_session(start_session(LLOYD, robots=2), 10)
     session.playback.is_playing = True
     session.fail_robot(2)
-    there = failed_at(session, 2)
-    session.drag_robot(1, there)
+    failed_position = get_failed_position(session, 2)
+    session.drag_robot(1, failed_position)
     for _ in range(10):
         session.playback.advance(0.1)
-    assert failed_at(session, 2) == there
-    assert np.hypot(*np.subtract(place_of(session, 1), there)) > 2 * RADIUS - 3e-3
+    assert get_failed_position(session, 2) == failed_position
+    assert compute_distance(get_position(session, 1), failed_position) > 2 * RADIUS - 3e-3
     session.release()
     session.revive_robot(2)
-    # who leans on it makes it step aside a little at most
-    assert np.hypot(*np.subtract(place_of(session, 2), there)) < 5e-3
+    # The robot that leans on it may push it aside a little.
+    assert compute_distance(get_position(session, 2), failed_position) < 5e-3
 
 
-def test_who_fails_is_let_go():
+def test_a_robot_that_fails_or_is_removed_is_released():
     session = advance_session(start_session(), 3)
     session.playback.is_playing = True
-    for touch in (session.fail_robot, session.remove_robot):
+    for edit, other_robot in ((session.fail_robot, 1), (session.remove_robot, 3)):
         session.drag_robot(2, (3.0, 3.0))
-        touch(1 if touch == session.fail_robot else 3)
+        edit(other_robot)
         assert session.timeline.drag is not None
-        touch(2)
+        edit(2)
         assert session.timeline.drag is None
         session.undo()
         session.undo()
         assert get_robot_numbers(session) == ((1, 2, 3), ())
 
 
-def test_revival_beside_an_obstacle_that_was_drawn_meanwhile():
+def test_a_robot_is_revived_next_to_an_obstacle_that_was_drawn_over_it():
     session = advance_session(start_session(), 3)
     session.fail_robot(1)
-    there = failed_at(session, 1)
-    session.edit_map(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle(there, 0.3))), "circle drawn")
+    failed_position = get_failed_position(session, 1)
+    circle = CircleObstacle(failed_position, 0.3)
+    session.edit_map(replace(HALL, obstacles=(*HALL.obstacles, circle)), "circle drawn")
     session.revive_robot(1)
-    away = np.hypot(*np.subtract(place_of(session, 1), there))
-    assert 0.39 < away < 0.8
+    assert 0.39 < compute_distance(get_position(session, 1), failed_position) < 0.8
     assert compute_penetration(session) < 2e-3
 
 
-# refusals
+# Edits that are not possible
 
 
-def test_what_cannot_be_changes_nothing():
+@pytest.mark.parametrize("is_playing", [False, True])
+def test_an_edit_that_is_not_possible_changes_nothing(is_playing):
     session = advance_session(start_session(RAPF, RPF), 12)
     session.fail_robot(3)
     session.undo()
     session.redo()
-    for paused in (True, False):
-        session.playback.is_playing = not paused
-        before = describe_state(session)
-        for touch, match in (
-            (lambda: session.fail_robot(3), "robot 3 has failed already"),
-            (lambda: session.fail_robot(9), "there is no robot 9"),
-            (lambda: session.revive_robot(1), "robot 1 has not failed"),
-            (lambda: session.revive_robot(9), "there is no robot 9"),
-            (lambda: session.remove_robot(9), "there is no robot 9"),
-            (lambda: session.place_robot(9, (1.0, 1.0)), "there is no robot 9"),
-            (lambda: session.drag_robot(9, (1.0, 1.0)), "there is no robot 9"),
-            (lambda: joined(session, (1.0, 1.0), 3), "there is a robot 3 already"),
-        ):
-            with pytest.raises(ParameterError, match=match):
-                touch()
-            assert describe_state(session) == before
+    session.playback.is_playing = is_playing
+    before = describe_state(session)
+    for edit, message in (
+        (lambda: session.fail_robot(3), "robot 3 has failed already"),
+        (lambda: session.fail_robot(9), "there is no robot 9"),
+        (lambda: session.revive_robot(1), "robot 1 has not failed"),
+        (lambda: session.revive_robot(9), "there is no robot 9"),
+        (lambda: session.remove_robot(9), "there is no robot 9"),
+        (lambda: session.place_robot(9, (1.0, 1.0)), "there is no robot 9"),
+        (lambda: session.drag_robot(9, (1.0, 1.0)), "there is no robot 9"),
+        (lambda: add_numbered_robot(session, (1.0, 1.0), 3), "there is a robot 3 already"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            edit()
+        assert describe_state(session) == before
 
 
-def test_the_last_that_works_stays():
+def test_the_last_working_robot_cannot_be_removed():
     session = start_session(robots=2)
     session.fail_robot(1)
     before = describe_state(session)
-    for touch in (session.fail_robot, session.remove_robot):
+    for edit in (session.fail_robot, session.remove_robot):
         with pytest.raises(ParameterError, match="cannot remove the last working robot"):
-            touch(2)
+            edit(2)
         assert describe_state(session) == before
-    # who does not work may go
     session.remove_robot(1)
     assert get_robot_numbers(session) == ((2,), ())
 
 
-def test_a_full_map_and_a_full_team(monkeypatch):
-    cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
-    session = start_session(robots=1, environment=cell, given_starts=np.array([[0.225, 0.225]]))
+def test_a_robot_is_not_added_to_a_full_map():
+    session = start_session(robots=1, environment=CELL, given_starts=np.array([[0.225, 0.225]]))
     before = describe_state(session)
     with pytest.raises(StartError, match="no room"):
         session.add_robot((0.1, 0.1))
     assert describe_state(session) == before
+
+
+def test_a_robot_is_not_added_to_a_full_team(monkeypatch):
     session = start_session(robots=3)
     monkeypatch.setattr(module, "MAX_ROBOTS", 3)
     before = describe_state(session)
@@ -319,44 +328,50 @@ def test_a_full_map_and_a_full_team(monkeypatch):
     assert describe_state(session) == before
 
 
-# from the past
+# Edits in the past
 
 
-def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
+def test_an_edit_in_the_past_starts_a_branch_there():
     session = advance_session(start_session(RAPF, LLOYD), 20)
     session.remove_robot(2)
     advance_session(session, 20)
     session.show_time(10 / 60)
-    then = session.displayed.get_positions(session.timeline.panes[1]).copy()
-    # it is not there any more, but was then
+    pane = session.timeline.panes[1]
+    before = session.displayed.get_positions(pane).copy()
+    # The robot is removed from the present already, but it was part of the team then.
     session.remove_robot(2)
     assert session.timeline.is_live
     assert session.timeline.end_time == pytest.approx(10 / 60)
     assert get_robot_numbers(session) == ((1, 3), ())
-    np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[1]), then[[0, 2]])
+    pane = session.timeline.panes[1]
+    np.testing.assert_array_equal(session.displayed.get_positions(pane), before[[0, 2]])
     session.undo()
-    np.testing.assert_array_equal(session.displayed.get_positions(session.timeline.panes[1]), then)
+    pane = session.timeline.panes[1]
+    np.testing.assert_array_equal(session.displayed.get_positions(pane), before)
+
+
+def fill_map(session) -> None:
+    environment = replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),))
+    session.edit_map(environment, "filled")
 
 
 @pytest.mark.parametrize(
-    "touch",
+    "edit",
     [
         lambda session: session.fail_robot(9),
         lambda session: session.revive_robot(1),
         lambda session: session.remove_robot(4),
         lambda session: session.place_robot(4, (1.0, 1.0)),
-        lambda session: joined(session, (1.0, 1.0), 2),
-        lambda session: session.edit_map(
-            replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),)), "filled"
-        ),
+        lambda session: add_numbered_robot(session, (1.0, 1.0), 2),
+        fill_map,
         lambda session: session.set_properties(RobotProperties(radius=2.5)),
     ],
 )
-def test_what_could_not_be_then_keeps_what_came_after(touch):
+def test_an_edit_in_the_past_that_is_not_possible_changes_nothing(edit):
     session = advance_session(start_session(RAPF, LLOYD), 20)
     for pane in session.timeline.panes:
-        for k in range(20):
-            pane.distance_curve.add(k / 60, 2.0)
+        for step in range(20):
+            pane.distance_curve.add(step / 60, 2.0)
     session.add_robot((3.0, 3.0))
     session.undo()
     session.redo()
@@ -365,7 +380,7 @@ def test_what_could_not_be_then_keeps_what_came_after(touch):
     session.playback.is_playing = True
     before = describe_state(session)
     with pytest.raises((ParameterError, StartError, MapError)):
-        touch(session)
+        edit(session)
     assert describe_state(session) == before
     assert not session.timeline.is_live
     session.show_time(99.0)
@@ -373,7 +388,7 @@ def test_what_could_not_be_then_keeps_what_came_after(touch):
     assert get_robot_numbers(session) == ((1, 2, 3, 4), ())
 
 
-def test_undo_is_of_the_present():
+def test_undo_returns_from_the_past_to_before_the_newest_edit():
     session = advance_session(start_session(), 20)
     session.remove_robot(2)
     advance_session(session, 20)
@@ -389,27 +404,35 @@ def test_undo_is_of_the_present():
     assert session.timeline.is_live
 
 
-def test_robots_that_differ_keep_what_is_theirs():
-    """Under their numbers, whether they work, fail, or work again; new ones are as the first."""
-    radius, speeds = np.array([0.1, 0.3, 0.2]), np.array([1.0, 0.3, 0.3])
-    limits = RobotProperties.from_team(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
-    session = start_session(RAPF, robots=3, properties=limits)
-    team = session.timeline.panes[0].simulation.team
-    assert team.radius.tolist() == radius.tolist()
-    positions = session.timeline.panes[0].simulation.positions
-    apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))[np.triu_indices(3, 1)]
-    assert apart.min() >= 0.6, "room for the largest"
+# Robots that differ
+
+
+def test_different_robots_keep_their_properties():
+    radii = np.array([0.1, 0.3, 0.2])
+    speeds = np.array([1.0, 0.3, 0.3])
+    team = replace(Team.homogeneous(3), radius=radii, max_speed=speeds)
+    session = start_session(RAPF, robots=3, properties=RobotProperties.from_team(team))
+    pane = session.timeline.panes[0]
+    assert pane.simulation.team.radius.tolist() == radii.tolist()
     session.fail_robot(2)
-    assert session.timeline.panes[0].simulation.team.radius.tolist() == [0.1, 0.2]
-    (wreck,) = session.timeline.panes[0].setup.sensed_environment.obstacles[len(HALL.obstacles) :]
-    assert wreck.radius == 0.3
+    assert pane.simulation.team.radius.tolist() == [0.1, 0.2]
+    (failed_robot,) = pane.setup.sensed_environment.obstacles[len(HALL.obstacles) :]
+    assert failed_robot.radius == 0.3
     session.revive_robot(2)
-    assert session.timeline.panes[0].simulation.team.radius.tolist() == radius.tolist()
-    session.place_robot(3, place_of(session, 2))
-    gap = np.hypot(*np.subtract(place_of(session, 3), place_of(session, 2)))
-    assert gap >= 0.5 - 1e-6
+    assert pane.simulation.team.radius.tolist() == radii.tolist()
     session.add_robot((3.0, 2.0))
-    assert session.timeline.panes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
+    # A new robot has the properties of the first one.
+    assert pane.simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
     advance_session(session, 3)
     session.set_properties(RobotProperties())
-    assert set(session.timeline.panes[0].simulation.team.radius.tolist()) == {0.1}
+    assert set(pane.simulation.team.radius.tolist()) == {0.1}
+
+
+def test_different_robots_have_space_according_to_their_size():
+    team = replace(Team.homogeneous(3), radius=np.array([0.1, 0.3, 0.2]))
+    session = start_session(RAPF, robots=3, properties=RobotProperties.from_team(team))
+    positions = session.timeline.panes[0].simulation.positions
+    distances = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))
+    assert distances[np.triu_indices(3, 1)].min() >= 0.6, "starts have space for the largest robot"
+    session.place_robot(3, get_position(session, 2))
+    assert compute_distance(get_position(session, 3), get_position(session, 2)) >= 0.5 - 1e-6
