@@ -1,4 +1,4 @@
-"""The timeline: what is tried from a moment of the past, and what it remembers having happened."""
+"""Branches: the displayed state becomes the present, and what came after it stays as a ghost curve."""
 
 from __future__ import annotations
 
@@ -23,63 +23,57 @@ from robocov.errors import StartError
 from robocov_app.viewer.session import lockstep as module
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
-# branches
 
-
-@pytest.mark.parametrize("laws", [(RAPF,), (RPF, LLOYD)])
-def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
-    session = advance_session(start_session(*laws, robots=4), 100)
-    end = get_positions(session)
+@pytest.mark.parametrize("controllers", [(RAPF,), (RPF, LLOYD)])
+def test_a_branch_without_edits_is_the_same_bit_for_bit(controllers):
+    session = advance_session(start_session(*controllers, robots=4), 100)
+    expected = get_positions(session)
     session.show_time(0.5)
     assert session.branch()
     assert session.timeline.is_live
     assert session.timeline.end_time == pytest.approx(0.5)
     assert session.timeline.history.steps[-1] == 30
     advance_session(session, 70)
-    for now, before in zip(get_positions(session), end, strict=True):
-        # bit for bit
-        np.testing.assert_array_equal(now, before)
+    for positions, before in zip(get_positions(session), expected, strict=True):
+        np.testing.assert_array_equal(positions, before)
 
 
-def test_so_it_does_from_a_thinned_past_after_touches(short):
+def test_a_branch_from_a_thinned_past_is_the_same_bit_for_bit(short):
     session = advance_session(start_session(RAPF, LLOYD, robots=4), 100)
-    session.edit_map(
-        replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn"
-    )
+    circle = CircleObstacle((3.2, 2.2), 0.3)
+    session.edit_map(replace(HALL, obstacles=(*HALL.obstacles, circle)), "circle drawn")
     session.fail_robot(3)
     advance_session(session, 400)
-    end = get_positions(session)
+    expected = get_positions(session)
     assert session.timeline.history.thinned > 0
     session.show_time(2.5)
     assert session.branch()
-    while session.timeline.end_time < 500 / 60 - 1e-9:
-        session.playback.step()
-    for now, before in zip(get_positions(session), end, strict=True):
-        np.testing.assert_array_equal(now, before)
+    advance_session(session, 500 - session.timeline.step)
+    for positions, before in zip(get_positions(session), expected, strict=True):
+        np.testing.assert_array_equal(positions, before)
 
 
-def test_a_branch_leaves_a_ghost():
+def test_a_branch_leaves_ghost_curves():
     session = start_session(RAPF, LLOYD)
     advance_with_costs(session, 60)
-    serial = session.timeline.past_version
+    timeline = session.timeline
+    past_version = timeline.past_version
     session.show_time(0.5)
     assert session.branch()
-    assert session.timeline.past_version == serial + 1
-    assert [ghost.controller for ghost in session.timeline.ghosts] == ["rapf", "lloyd"]
-    assert [ghost.description for ghost in session.timeline.ghosts] == ["RAPF", "Lloyd"]
-    for ghost in session.timeline.ghosts:
+    assert timeline.past_version == past_version + 1
+    assert [ghost.controller for ghost in timeline.ghosts] == ["rapf", "lloyd"]
+    assert [ghost.description for ghost in timeline.ghosts] == ["RAPF", "Lloyd"]
+    for ghost in timeline.ghosts:
         assert ghost.times[0] == pytest.approx(0.5)
         assert ghost.times[-1] == pytest.approx(59 / 60)
-    for pane in session.timeline.panes:
+    for pane in timeline.panes:
         assert pane.distance_curve.last_time == pytest.approx(0.5)
+        assert pane.distance_curve.interpolate(session.displayed.time) == pytest.approx(2.5)
         assert pane.time == pytest.approx(0.5)
         assert pane.trail.times[-1] == pytest.approx(0.5)
-    assert [
-        pane.distance_curve.interpolate(session.displayed.time) for pane in session.timeline.panes
-    ] == pytest.approx([2.5, 2.5])
 
 
-def test_the_present_is_no_branch():
+def test_there_is_no_branch_at_the_present():
     session = advance_session(start_session(), 10)
     before = describe_state(session)
     assert not session.branch()
@@ -88,9 +82,10 @@ def test_the_present_is_no_branch():
     assert describe_state(session) == before
 
 
-def test_a_branch_takes_back_what_was_chosen_later():
+def test_a_branch_starts_with_the_settings_of_its_time():
     session = advance_session(start_session(RAPF, RPF), 20)
-    session.set_controller(session.timeline.panes[0], LLOYD)
+    timeline = session.timeline
+    session.set_controller(timeline.panes[0], LLOYD)
     session.set_properties(RobotProperties(max_speed=0.5))
     session.edit_map(replace(HALL, obstacles=()), "emptied")
     session.add_robot((1.0, 3.0))
@@ -99,17 +94,17 @@ def test_a_branch_takes_back_what_was_chosen_later():
     assert session.displayed.environment is HALL
     assert session.displayed.numbers == (1, 2, 3)
     session.branch()
-    assert [pane.controller for pane in session.timeline.panes] == [RAPF, RPF]
-    assert session.timeline.scenario.controllers == (RAPF, RPF)
-    assert session.timeline.scenario.properties == RobotProperties()
-    assert session.timeline.scenario.environment is HALL
-    assert session.timeline.panes[0].starts.shape == (3, 2)
-    assert list(session.timeline.events) == []
-    assert session.timeline.head.parent is None
+    assert [pane.controller for pane in timeline.panes] == [RAPF, RPF]
+    assert timeline.scenario.controllers == (RAPF, RPF)
+    assert timeline.scenario.properties == RobotProperties()
+    assert timeline.scenario.environment is HALL
+    assert timeline.panes[0].starts.shape == (3, 2)
+    assert timeline.events == []
+    assert timeline.head.parent is None
     advance_session(session, 5)
 
 
-def test_events_up_to_the_branch_stay():
+def test_a_branch_has_the_events_before_it():
     session = advance_session(start_session(), 10)
     session.fail_robot(2)
     advance_session(session, 10)
@@ -121,53 +116,46 @@ def test_events_up_to_the_branch_stay():
     assert session.displayed.numbers == (1, 3)
 
 
-def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
+def test_a_branch_that_is_not_possible_changes_nothing(monkeypatch):
     session = start_session(RAPF, RPF)
     advance_with_costs(session, 40)
     session.show_time(0.3)
     before = describe_state(session)
 
-    def no_room(moment):
+    def raise_start_error(state):
         raise StartError("no room")
 
-    monkeypatch.setattr(module.Lockstep, "resume", no_room)
-    for touch in (
+    monkeypatch.setattr(module.Lockstep, "resume", raise_start_error)
+    for edit in (
         session.branch,
         lambda: session.set_controller(session.timeline.panes[0], LLOYD),
         lambda: session.fail_robot(1),
     ):
         with pytest.raises(StartError, match="no room"):
-            touch()
+            edit()
         assert describe_state(session) == before
 
 
-# events
-
-
-def test_a_slider_that_is_dragged_is_one_event():
+def test_changes_of_a_slider_are_one_event():
     session = advance_session(start_session(RAPF, RPF), 3)
-    for k in range(1, 20):
-        session.set_controller(session.timeline.panes[0], RAPF.with_gain("k_rep", k / 10))
+    pane = session.timeline.panes[0]
+    for gain in ("k_rep", "k_att"):
+        for value in range(1, 20):
+            session.set_controller(pane, pane.controller.with_gain(gain, value / 10))
+            session.playback.step()
+    for value in range(1, 20):
+        session.set_properties(RobotProperties(max_speed=value / 10))
         session.playback.step()
-    for k in range(1, 20):
-        session.set_controller(
-            session.timeline.panes[0], session.timeline.panes[0].controller.with_gain("k_att", k / 10)
-        )
-        session.playback.step()
-    for k in range(1, 20):
-        session.set_properties(RobotProperties(max_speed=k / 10))
-        session.playback.step()
-    assert [event.text for event in session.timeline.events] == [
-        "RAPF: k_rep = 1.9",
-        "RAPF: k_att = 1.9",
-        "limits changed",
-    ]
-    # later it is another one
+    texts = [event.text for event in session.timeline.events]
+    assert texts == ["RAPF: k_rep = 1.9", "RAPF: k_att = 1.9", "limits changed"]
+
+
+def test_later_changes_of_a_slider_are_another_event():
+    session = start_session(RAPF, RPF)
+    session.set_properties(RobotProperties(max_speed=2.0))
     advance_session(session, 70)
     session.set_properties(RobotProperties(max_speed=3.0))
-    session.set_controller(session.timeline.panes[0], LLOYD)
-    session.set_controller(session.timeline.panes[1], LLOYD)
-    assert [event.text for event in session.timeline.events][3:] == [
-        "limits changed",
-        *["Lloyd takes over"] * 2,
-    ]
+    for pane in session.timeline.panes:
+        session.set_controller(pane, LLOYD)
+    texts = [event.text for event in session.timeline.events]
+    assert texts == ["limits changed", "limits changed", "Lloyd takes over", "Lloyd takes over"]
