@@ -28,10 +28,11 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.text import escape_controls
 from robocov_app.figures.files import figure_png
+from robocov_app.look.robot_colors import ColorScheme
+from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
 from robocov_app.render.distance_field import Field, FieldLattice
-from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.report.pictures import Frame, map_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.report.theme_css import theme_rules
@@ -112,7 +113,7 @@ def plot_record(
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
-    colors: str = "paper",
+    colors: ColorScheme = "paper",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
     mean_time: float | None = None,
@@ -263,7 +264,7 @@ def plot_comparison(
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
-    colors: str = "paper",
+    colors: ColorScheme = "paper",
     size: tuple[int, int] | None = None,
 ) -> Axes:
     """Plot the runs of a comparison side by side.

@@ -3,8 +3,8 @@
 import numpy as np
 import shapely
 
+from robocov_app.look.theme import LIGHT
 from robocov_app.render.picture import Painter, standard_layers
-from robocov_app.render.theme import LIGHT
 
 SIZE = (480, 360)
 ONE = np.array([[4.0, 4.0]])

@@ -15,7 +15,7 @@ from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.figures.results import Dependence, plot_gain_grid, plot_gains
-from robocov_app.figures.styles import curve_styles
+from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.report.groups import dependences, gain_text
 from robocov_app.report.plots import dependence_plots
 from robocov_app.report.results import gathered
@@ -155,7 +155,7 @@ def test_values_of_words_are_told_where_they_are_many() -> None:
 def test_words_have_even_places_and_no_line_between_them() -> None:
     places, values = np.repeat([0.0, 1.0, 2.0], 4), np.arange(12.0)
     words = ("centroid", "sensing", "median")
-    row = Dependence("RAPF", curve_styles(["rapf"])["rapf"], places, values)
+    row = Dependence("RAPF", choose_controller_styles(["rapf"])["rapf"], places, values)
     axes = plot_gains([row], "target", (420, 290), "cost", words).axes[0]
     assert [tick.get_text() for tick in axes.get_xticklabels()] == list(words)
     _, medians = axes.lines

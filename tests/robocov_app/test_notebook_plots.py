@@ -23,7 +23,7 @@ from robocov.metrics import compute_cost_history
 from robocov_app import notebook as drawing_backend
 from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.report.theme_css import hex_code
 
 
@@ -152,7 +152,9 @@ class TestDistances:
         assert 0.5 * limit < distances.max() <= limit
         columns, heights = axes.transData.transform(fine.points[reached]).T
         colors = pixels[len(pixels) - 1 - heights.astype(int), columns.astype(int)]
-        scale = LIGHT.heat_table(1000)[np.minimum(distances / limit * 1000, 999).astype(int)].astype(int)
+        scale = LIGHT.build_heat_table(1000)[np.minimum(distances / limit * 1000, 999).astype(int)].astype(
+            int
+        )
         right = np.abs(colors - scale).max(axis=1) <= 8
         # borders, walls' edges, robots and their numbers cover the others
         assert right.mean() > 0.85

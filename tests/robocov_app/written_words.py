@@ -3,10 +3,10 @@
 import numpy as np
 import pygame
 
+from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label
 from robocov_app.render.picture import Painter
-from robocov_app.render.theme import robot_hues
 
 
 def places(frame, words, size, theme, color):
@@ -33,7 +33,7 @@ def glyphs(layer, scene, theme, scale=2.0):
     for entry in layer.legend(scene):
         surface = pygame.Surface((120, 80), 0, 32)
         surface.fill(theme.background)
-        canvas = Canvas(surface, painter.camera, theme, scale, robot_hues(1))
+        canvas = Canvas(surface, painter.camera, theme, scale, choose_robot_hues(1))
         entry.draw(canvas, 60.0, 40.0)
         pictures.append(pygame.surfarray.array3d(surface).swapaxes(0, 1).astype(int))
     return pictures

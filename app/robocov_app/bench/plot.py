@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
-from robocov_app.render.theme import LIGHT, Theme
+from robocov_app.look.theme import LIGHT, Theme
 
 NOTE = "medians of calls in turn on one thread; below 1 robocov is quicker; a bar marks what is wanted"
 HEADINGS = {
@@ -90,7 +90,7 @@ def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> Non
 
 def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
     ratio = cast("float", row.ratio)
-    color = tone(theme.controller("rpf" if row.met is False else "rapf"))
+    color = tone(theme.get_controller_color("rpf" if row.met is False else "rapf"))
     axes.plot([1.0, ratio], [y, y], color=color, linewidth=1.6, alpha=0.5)
     axes.plot(ratio, y, "o", color=color, markersize=6.5)
     if row.goal is not None:

@@ -16,8 +16,8 @@ from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.ratings import Rating, format_number
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import quiet_axes, tone
-from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
-from robocov_app.render.theme import LIGHT
+from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
+from robocov_app.look.theme import LIGHT
 from robocov_app.report import replay
 from robocov_app.report.document import template
 from robocov_app.report.plots import Plot
@@ -112,7 +112,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         If the results have no run in common.
     """
     labels = ratings.label_results(results)
-    styles = styles_of([result["entry"]["controller"] for result in results])
+    styles = choose_curve_styles([result["entry"]["controller"] for result in results])
     information = [result["entry"]["information"] for result in results]
     entries = _Entries(
         styles=dict(zip(labels, styles, strict=True)),
@@ -129,7 +129,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         suite=suite.VERSION,
         version=__version__,
         style=theme_rules(":root") + replay.asset("report.css"),
-        marks=MARKS,
+        marks=MARKER_PATHS,
         looks=entries.styles,
         overview=_build_overview(labels, tracks),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
@@ -235,7 +235,7 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
     axes.plot(*front.T, color=tone(LIGHT.faint), linewidth=1.0, zorder=1)
     for point in points:
-        color = tone(point.style.color(LIGHT))
+        color = tone(point.style.get_color(LIGHT))
         axes.plot(
             [point.x],
             [point.gap],

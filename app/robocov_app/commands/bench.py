@@ -88,9 +88,9 @@ def command(options: Arguments) -> None:
     interruption = _measure(cases, rows, quiet=options.json)
     if options.plot is not None and rows:
         from robocov_app.bench.plot import save_ratios
-        from robocov_app.render.theme import theme_named
+        from robocov_app.look.theme import get_theme
 
-        save_ratios(rows, options.plot, theme_named(options.theme))
+        save_ratios(rows, options.plot, get_theme(options.theme))
     machine = _describe_machine()
     print_answer(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
     if not options.json:

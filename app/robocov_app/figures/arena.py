@@ -18,10 +18,12 @@ from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov_app.figures.page import figure_of, tone
+from robocov_app.look.colors import Color, choose_text_color, mix
+from robocov_app.look.robot_colors import ColorScheme, choose_robot_hues, choose_trail_colors
+from robocov_app.look.theme import Theme
 from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
-from robocov_app.render.theme import Color, Theme, mix, readable_on, robot_hues
 
 # radius of a robot where it has room and in the densest crowd, and least size of its number, in points
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
@@ -84,13 +86,13 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
     axes.annotate("", xy=end, xytext=begin, arrowprops=arrow, zorder=2.3)
 
 
-def draw_run(axes: Axes, record: Record, theme: Theme, colors: str) -> None:
+def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> None:
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
     cells = record.cells()
     outlines, owners = cells.outlines
-    hues = robot_hues(n, working[cells.adjacency])
+    hues = choose_robot_hues(n, working[cells.adjacency])
     paper = colors == "paper"
     tint = theme.paper_tint if paper else theme.tint
     areas = [k for k, outline in enumerate(outlines) if len(outline) > 2]
@@ -100,14 +102,14 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colors: str) -> None:
     axes.add_collection(PolyCollection([outlines[k] for k in areas], **style), autolim=False)
     ways = [record.positions[record.present[:, robot], robot] for robot in range(n)]
     style = {"capstyle": "round", "joinstyle": "round", "zorder": 4, "linewidths": 1.6 * line_crowding(n)}
-    style["colors"] = [tone(color) for color in theme.trails(hues.tolist(), paper)]
+    style["colors"] = [tone(color) for color in choose_trail_colors(theme, hues.tolist(), colors)]
     axes.add_collection(LineCollection(ways, **style), autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
     axes.plot(*begin.T, zorder=5, **_start_style(theme, mark_size(_in_points(axes, begin), 3.2, _START)))
     own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     failed = record.present[-1] & ~record.working[-1]
-    robots = [wreck_color(theme) if failed[robot] else own[robot] for robot in there.tolist()]
+    robots = [theme.failed_robot if failed[robot] else own[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if record.steering is not None:
         # where robots face, triangles at their discs
@@ -151,7 +153,7 @@ def draw_robots(
     for robot, (x, y), r, fill in zip(numbers, places.tolist(), drawn, fills, strict=True):
         size = r * (1.25, 1.1, 0.85, 0.65)[min(len(str(robot)), 4) - 1]
         if size >= _SMALLEST_NUMBER:
-            axes.text(x, y, str(robot), fontsize=size, color=tone(readable_on(fill)), **style)
+            axes.text(x, y, str(robot), fontsize=size, color=tone(choose_text_color(fill)), **style)
     return drawn
 
 
@@ -201,14 +203,10 @@ def robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
     return Line2D([], [], label=label, linestyle="none", marker="o", markersize=8.0, **style)
 
 
-def wreck_color(theme: Theme) -> Color:
-    return mix(theme.background, theme.ink, 0.3)
-
-
-def run_handles(record: Record, theme: Theme, colors: str) -> list[Artist]:
+def run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list[Artist]:
     paper, n = colors == "paper", record.positions.shape[1]
     failed = record.present[-1] & ~record.working[-1]
-    line = theme.trails(list(range(n)), paper)[0]
+    line = choose_trail_colors(theme, list(range(n)), colors)[0]
     aims: list[Artist] = []
     if has_goals(record):
         plus = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
@@ -217,7 +215,7 @@ def run_handles(record: Record, theme: Theme, colors: str) -> list[Artist]:
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         robot_handle("final position", theme.final if paper else theme.robots[0], theme),
-        *([robot_handle("failed robot", wreck_color(theme), theme)] if failed.any() else []),
+        *([robot_handle("failed robot", theme.failed_robot, theme)] if failed.any() else []),
         *aims,
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],

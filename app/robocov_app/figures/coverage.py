@@ -20,10 +20,10 @@ from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curv
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Box, Page, check_some, tone
 from robocov_app.figures.runs import plot_cost
+from robocov_app.look.legend import merge_legends
+from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
-from robocov_app.render.layout import united
-from robocov_app.render.theme import LIGHT, Theme, border_color, theme_named
 
 _FINE = 2  # dots of a map's picture for each pixel of the page
 _LEAST = 720, 400  # smallest page for curves and maps
@@ -78,7 +78,7 @@ def plot_coverage(
     check_some("moments", moments)
     if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     bounds = np.array([moment.environment.region.bounds for moment in moments])
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
     high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
@@ -126,7 +126,7 @@ def plot_coverage(
 @plain_style()
 def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
     """Plot distances on axes of somebody else, which get ticks in meters and a scale of colors."""
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     limit = _limit([moment])
     arena.ticks_in_meters(axes, moment.environment, theme)
     axes.apply_aspect()
@@ -137,7 +137,9 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     _draw_moment(axes, moment, limit, theme, box, fine * scale)
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
-    bar.imshow(theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit))
+    bar.imshow(
+        theme.build_heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit)
+    )
     bar.set(xticks=[], yticks=ticks(limit), ylabel=f"{_BAR_LABEL} (m)")
     bar.yaxis.tick_right()
     bar.yaxis.set_label_position("right")
@@ -149,10 +151,10 @@ def _limit(moments: Sequence[Moment]) -> float:
 
 
 def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
-    line = Line2D([], [], color=tone(border_color(theme)), linewidth=1.6, label="geodesic cell border")
+    line = Line2D([], [], color=tone(theme.geodesic_border), linewidth=1.6, label="geodesic cell border")
     handles: list[Artist] = [arena.robot_handle("robot", theme.final, theme), line]
     every = [arena.map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
-    for handle in united(every, arena.label_of):
+    for handle in merge_legends(every, arena.label_of):
         handle.set_label(arena.label_of(handle).removesuffix(" (unknown to robots)"))
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
@@ -206,7 +208,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     borders = moment.field.borders(x, y, width / zoom)
     part = strength(borders, zoom, width)[:, None]
     place = borders.row, borders.column
-    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(border_color(theme)))
+    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(theme.geodesic_border))
     extent = low_x, high_x, low_y, high_y
     image = axes.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased", zorder=0)
     image.set_clip_path(Polygon(moment.environment.region.vertices, transform=axes.transData))
@@ -223,7 +225,7 @@ def _draw_bar(page: Page, limit: float, maps: Box, middle: float, least: float) 
     theme, s = page.theme, page.scale
     right, width = maps[0] + maps[2] - 14 * s, 190 * s
     axes = page.axes((right - width, middle - 9 * s, width, 10 * s))
-    axes.imshow(theme.heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
+    axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for side in axes.spines.values():
         side.set(edgecolor=tone(theme.faint), linewidth=0.6)
     marks = ticks(limit)

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 
 from robocov.arrays import Array
 from robocov_app.figures.page import TEXT, Tone, even_ticks, figure_of, quiet_axes, tone, value_axis
-from robocov_app.figures.styles import CurveStyle, styles_of
-from robocov_app.render.theme import Theme
+from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
+from robocov_app.look.theme import Theme
 
 # label, controller's name, times (T,) s and mean distances (T,) m
 Curve: TypeAlias = tuple[str, str, Array, Array]
@@ -43,7 +43,7 @@ def draw_curves(
     weight: float = 1.0,
 ) -> None:
     """Draw curves, the first lowest and widest, and quartile `bands`; labels at the ends are pushed apart."""
-    chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
+    chosen = choose_curve_styles([controller for _, controller, _, _ in curves]) if styles is None else styles
     around = list(bands or [None] * len(curves))
     lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
@@ -53,11 +53,11 @@ def draw_curves(
     quiet_axes(axes, theme, "time (s)", label, grid="y")
     for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:
-            axes.fill_between(time, *band, color=tone(style.color(theme)), alpha=0.16, linewidth=0.0)
+            axes.fill_between(time, *band, color=tone(style.get_color(theme)), alpha=0.16, linewidth=0.0)
     ends = []
     for below, (curve, style) in enumerate(zip(curves, chosen, strict=True)):
         _, _, time, values = curve
-        color, dashes, above = tone(style.color(theme)), style.dashes, min(len(curves) - 1 - below, 3)
+        color, dashes, above = tone(style.get_color(theme)), style.dashes, min(len(curves) - 1 - below, 3)
         width = weight * (2.2 + 0.9 * above)
         if not isinstance(dashes, str):
             dashes = 0, tuple(2.2 * weight / width * part for part in dashes[1])

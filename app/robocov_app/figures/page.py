@@ -14,8 +14,9 @@ from matplotlib.ticker import MaxNLocator
 from robocov.arrays import Array
 from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
+from robocov_app.look.colors import Color
+from robocov_app.look.theme import Theme
 from robocov_app.render.camera import length_label, round_length
-from robocov_app.render.theme import Color, Theme
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels

@@ -20,8 +20,8 @@ from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Page, cut_to, figure_of, quiet_axes, tone, value_axis
 from robocov_app.figures.statistics import Interval
-from robocov_app.figures.styles import CurveStyle
-from robocov_app.render.theme import LIGHT, Theme
+from robocov_app.look.curve_styles import CurveStyle
+from robocov_app.look.theme import LIGHT, Theme
 
 _REACH = 1.5  # so much farther than its pairs an axis of ratios goes for their intervals
 _USUAL = 700.0  # width of a page in pixels from which on lines have their full width
@@ -183,7 +183,7 @@ def _row_frame(
     aside = -0.5 * (_BESIDE + 3.0) * figure_of(axes).dpi / 72 / axes.get_window_extent().width
     style: Any = {"markersize": 5.5, "transform": axes.get_yaxis_transform(), "clip_on": False}
     for place, look in zip(places, looks, strict=False):
-        axes.plot(aside, place, look.mark, color=tone(look.color(theme)), **style)
+        axes.plot(aside, place, look.mark, color=tone(look.get_color(theme)), **style)
 
 
 def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:
@@ -209,7 +209,7 @@ def _thinned(marks: Sequence[float], apart: float) -> list[float]:
 
 def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: Theme) -> None:
     """Draw one row of sorted values: points and median, and from `FEW` values on their box and whiskers."""
-    color = tone(style.color(theme))
+    color = tone(style.get_color(theme))
     _draw_points(axes, values, place, style, theme)
     low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= FEW:
@@ -234,7 +234,7 @@ def _draw_points(axes: Axes, values: Array, place: float, style: CurveStyle, the
     aside = np.zeros(len(values)) if alone else (scattered - 0.5) * 1.5 * _HALF
     look: Any = {"markersize": 6.0, "alpha": 1.0} if alone else {"markersize": 3.6, "alpha": 0.65}
     rim: Any = {"markeredgecolor": tone(theme.background), "markeredgewidth": 0.4}
-    axes.plot(values, place + aside, "o", color=tone(style.color(theme)), zorder=3.5, **look, **rim)
+    axes.plot(values, place + aside, "o", color=tone(style.get_color(theme)), zorder=3.5, **look, **rim)
 
 
 def _draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:
@@ -343,7 +343,7 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
 
 def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined: bool) -> None:
     style, label = each.style, cut_to(each.label, len, MOST_LETTERS)
-    color = tone(style.color(LIGHT))
+    color = tone(style.get_color(LIGHT))
     where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
     step = -(-len(where) // MOST_RUNS)
     dots: Any = {"color": color, "markeredgewidth": 0.0, "linestyle": "none"}

@@ -19,9 +19,11 @@ from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles,
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import HEADING, TEXT, TITLE, Page, check_some, figure_of
+from robocov_app.look.legend import merge_legends
+from robocov_app.look.robot_colors import ColorScheme
+from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density import cost_label, mean_label
-from robocov_app.render.layout import columns_for, united
-from robocov_app.render.theme import LIGHT, Theme, theme_named
+from robocov_app.render.layout import columns_for
 
 _SCALE = 1.3  # of texts and lines on a page of the usual width: its legend stands beside the scale bar
 MOST_MAPS = 60  # maps on a sheet: more would be too small to be seen
@@ -36,7 +38,7 @@ def plot_environment(
     size: tuple[int, int] | None = None,
 ) -> Figure:
     """Plot a map on `axes`, or on a page of `size` px: free space, obstacles, the region that robots know."""
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
         axes = _map_page(environment, theme, size, environment.name, facts, map_handles(environment, theme))
@@ -51,7 +53,7 @@ def plot_trajectories(
     record: Record,
     axes: Axes | None = None,
     theme: Theme | str = LIGHT,
-    colors: str = "paper",
+    colors: ColorScheme = "paper",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
     mean_time: float | None = None,
@@ -63,7 +65,7 @@ def plot_trajectories(
     """
     if colors not in ("paper", "robots"):
         raise ParameterError(f"colors: expected 'paper' or 'robots', got {quote(colors)}")
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     if axes is None:
         facts = _line(*_facts(record, mean_distance, mean_time))
         title, handles = _line(record.label, record.environment.name), run_handles(record, theme, colors)
@@ -78,19 +80,19 @@ def plot_trajectories(
 def plot_comparison(
     records: Sequence[Record],
     theme: Theme | str = LIGHT,
-    colors: str = "paper",
+    colors: ColorScheme = "paper",
     size: tuple[int, int] | None = None,
     mean_distances: Sequence[float | None] | None = None,
     mean_times: Sequence[float | None] | None = None,
 ) -> Figure:
     """Plot runs side by side at one scale, with final mean distances, m, and times, s, in the titles."""
     costs, times = (known or [None] * len(records) for known in (mean_distances, mean_times))
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     bounds = np.array([record.environment.region.bounds for record in records])
     limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
     aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
     shared, captions = _captions(records, costs, times)
-    entries = united((run_handles(record, theme, colors) for record in records), label_of)
+    entries = merge_legends((run_handles(record, theme, colors) for record in records), label_of)
     scale = 1.5 if size is None else None
     page = Page(size or (1600, 1000), theme, scale)
     s = page.scale
@@ -149,7 +151,7 @@ def plot_cost(
                 f"curve {quote(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
                 f"expected a value for each time and a finite one"
             )
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     if axes is None:
         wide, high = size or (1000, 560)
         # few things are on it: they may be large
@@ -222,7 +224,7 @@ def _facts(record: Record, mean_distance: float | None, mean_time: float | None)
 @plain_style()
 def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -> Figure:
     """Plot the first `MOST_MAPS` maps side by side at one scale, each under its name."""
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     drawn = environments[:MOST_MAPS]
     title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
     bounds = np.array([environment.region.bounds for environment in drawn])
@@ -270,7 +272,7 @@ PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
 
 @plain_style()
 def plot_metrics(runs: Sequence[Measured], theme: Theme | str, title: str) -> Figure:
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     page = Page((1200, 800), theme)
     s = page.scale
     page.title(title, 26)

@@ -24,8 +24,9 @@ from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
 from robocov_app.formats.reports import ImportReport
+from robocov_app.look.colors import Color
+from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.layout import columns_for
-from robocov_app.render.theme import LIGHT, Color, Theme, theme_named
 
 # of the page, of the arenas on it, and the least for what is written, in pixels
 _WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
@@ -50,7 +51,7 @@ def plot_import(
     Marked are free space that is not in the map any more, places that were solid and are free, and the
     narrowest passage.
     """
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     compared = compare_maps(foreign, environment, report)
     captions = (
         ("as read", f"{_number(report.vertices_read)} vertices, {_number(compared.before.area)} m² free"),

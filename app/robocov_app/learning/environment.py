@@ -182,11 +182,11 @@ class EpisodeEnv:
             self._clock = None
 
     def _get_painter(self, episode: Episode) -> Painter:
+        from robocov_app.look.theme import get_theme
         from robocov_app.render.picture import Painter
-        from robocov_app.render.theme import theme_named
 
         if self._painter is None or self._painter.environment is not episode.environment:
-            self._painter = Painter(episode.environment, self._size, theme_named(self._theme))
+            self._painter = Painter(episode.environment, self._size, get_theme(self._theme))
         return self._painter
 
     def _build_scene(self, episode: Episode) -> Scene:

@@ -7,12 +7,13 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera, length_label, round_length
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.fonts import shortened, text_width
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Theme, robot_hues
 
 MARGIN = 14.0
 EDGE = MARGIN + 2.0
@@ -126,7 +127,7 @@ def legend_picture(
 ) -> NDArray[np.uint8]:
     """Return entries as an RGB picture of a width, (height, width, 3), for pictures of the layers `shown`."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
-    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), frozenset(shown))
+    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, choose_robot_hues(1), frozenset(shown))
     strip = legend_strip(entries, canvas)
     pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
     return pixels.reshape(strip.get_height(), width, 3)

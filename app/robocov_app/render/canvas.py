@@ -11,11 +11,12 @@ import pygame
 import shapely
 
 from robocov.arrays import Array, IntArray
+from robocov_app.look.colors import Color
+from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, text_width
 from robocov_app.render.sprites import Pixel
-from robocov_app.render.theme import Color, Theme
 
 FAR = 20000.0  # pixels. Products of twice this still fit 32 bits.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from robocov.arrays import Array
 from robocov.density import Density, Gaussians
 from robocov.environment import Environment
-from robocov_app.render.theme import Theme
+from robocov_app.look.theme import Theme
 
 _SAMPLES = 96  # places along the longer side of a map at which the density is looked at for its range
 Bounds: TypeAlias = tuple[float, float, float, float]  # smallest x and y, largest x and y in meters

@@ -9,7 +9,7 @@ from scipy.ndimage import distance_transform_edt
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
-from robocov_app.render.theme import Theme
+from robocov_app.look.theme import Theme
 
 _SHALLOW = 0.05  # least angle, rad, at which two distances are taken to grow apart: borders stay thin
 # the squares beside a square: rows up and columns right, and the corners that the two share
@@ -275,7 +275,7 @@ def ticks(limit: float) -> list[float]:
 def palette(theme: Theme) -> NDArray[np.uint8]:
     """Return the colors of `levels`, (256, 3): from near to far, then of where no robot can come."""
     closed = np.array([theme.unreached, theme.obstacle_edge], dtype=np.uint8)
-    return np.concatenate([theme.heat_table(FARTHEST + 1), closed])
+    return np.concatenate([theme.build_heat_table(FARTHEST + 1), closed])
 
 
 def levels(field: Field, x: Array, y: Array, limit: float, hatch: int) -> NDArray[np.uint8]:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pygame
 
 from robocov.text import escape_controls
+from robocov_app.look.colors import Color
 from robocov_app.render.surface_cache import kept
-from robocov_app.render.theme import Color
 
 
 @lru_cache(maxsize=2)

@@ -6,13 +6,14 @@ from functools import partial
 import numpy as np
 
 from robocov.arrays import Array
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers import Layer, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Pixel
-from robocov_app.render.theme import Color, Theme, mix
 
 FORCE_LENGTH = 46.0  # longest arrow of a force in pixels at scale 1
 VELOCITY_LENGTH = 34.0  # length of the arrow of a robot at its largest speed in pixels at scale 1

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 from robocov.density import Density
+from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import length_label
 from robocov_app.render.canvas import Canvas, LegendEntry
@@ -17,7 +18,6 @@ from robocov_app.render.distance_field import Field, levels, middles, palette, s
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Theme, border_color
 
 _DOTS = 60_000  # about so many places of a surface at most where the density is looked at, not interpolated
 
@@ -147,7 +147,7 @@ unreached_legend = says(
 
 
 def distances_legend(scene: Scene) -> list[LegendEntry]:
-    return [_strip_entry("distance to the nearest robot", Theme.heat_table), *unreached_legend(scene)]
+    return [_strip_entry("distance to the nearest robot", Theme.build_heat_table), *unreached_legend(scene)]
 
 
 def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
@@ -157,21 +157,21 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
     if "distances" in canvas.shown:
         borders = field.borders(x, y, within)
         lines = pygame.Surface((len(x), len(y)), pygame.SRCALPHA, 32)
-        lines.fill((*border_color(theme), 0))
+        lines.fill((*theme.geodesic_border, 0))
         alpha = np.rint(255.0 * strength(borders, zoom, width))
         pygame.surfarray.pixels_alpha(lines)[borders.column, borders.row] = alpha
         # what is empty is passed over
         lines.set_alpha(255, pygame.RLEACCEL)
         return lines
     # nobody, number -1, is the last
-    tints = [*(theme.cell(hue) for hue in range(len(theme.robots))), theme.unreached]
+    tints = [*(theme.get_cell_color(hue) for hue in range(len(theme.robots))), theme.unreached]
     numbers = np.append(canvas.hues, len(tints) - 1).astype(np.uint8)
     owners, borders = field.cells(x, y, within)
     fills = np.array(tints, dtype=np.uint8)
     cells = _paletted(numbers.take(owners, mode="wrap"), fills).convert(canvas.surface)
     pixels = pygame.surfarray.pixels3d(cells)
     at, part = (borders.column, borders.row), strength(borders, zoom, width)[:, None]
-    pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(border_color(theme)))
+    pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(theme.geodesic_border))
     del pixels  # which keeps the surface locked
     return cells
 
@@ -179,7 +179,7 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
 geodesic_legend = says(
     "geodesic cell border",
     lambda canvas, x, y: canvas.line(
-        *canvas.level(x, y, 8), border_color(canvas.theme), canvas.width(_BORDER)
+        *canvas.level(x, y, 8), canvas.theme.geodesic_border, canvas.width(_BORDER)
     ),
 )
 
@@ -194,7 +194,7 @@ def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
     wide = round(_BAR * scale)
     left = round(canvas.surface.get_width() - bar_room(canvas, scene) + _BESIDE * scale)
     upper = round(top + (min(height, room) - high) / 2)
-    colors = np.broadcast_to(theme.heat_table(high)[::-1, None], (high, wide, 3))
+    colors = np.broadcast_to(theme.build_heat_table(high)[::-1, None], (high, wide, 3))
     canvas.surface.blit(_colored(colors), (left, upper))
     pygame.draw.rect(canvas.surface, theme.faint, (left, upper, wide, high), width)
     for mark, text in _marks(scene):

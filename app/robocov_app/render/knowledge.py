@@ -9,12 +9,12 @@ import pygame
 
 from robocov.arrays import Array
 from robocov.planning.discovered_map import PRESUMED_WALL, UNKNOWN, WALL, DiscoveredMap
+from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
 from robocov_app.render.layers import draw_blocked, draw_boundary, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import Color, mix
 
 _OPACITY = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}  # of the colors of cells; free ones are clear
 

@@ -9,10 +9,10 @@ import numpy as np
 import pygame
 import shapely
 
+from robocov_app.look.colors import Color
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.scene import MovingObstacle, Scene
-from robocov_app.render.theme import Color
 
 GRID_GAP = 34.0  # least distance between the lines of the grid in pixels at scale 1
 NARROW = 20.0  # width of cells in pixels at scale 1 below which their edges are not smooth: they hardly show
@@ -57,7 +57,7 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
     ends = np.cumsum(sizes)
     fills: list[Color | None] = [None] * len(sizes)
     if not _colors_mean_distance(canvas, scene):
-        tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
+        tints = [canvas.theme.get_cell_color(hue) for hue in range(len(canvas.theme.robots))]
         hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
         fills = [tints[hue] for hue in hues.tolist()]
     edge = canvas.theme.cell_edge
@@ -81,7 +81,7 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
 
 def cells_legend(scene: Scene) -> list[LegendEntry]:
     def glyph(canvas: Canvas, x: float, y: float) -> None:
-        fill = None if _colors_mean_distance(canvas, scene) else canvas.theme.cell(0)
+        fill = None if _colors_mean_distance(canvas, scene) else canvas.theme.get_cell_color(0)
         canvas.swatch(x, y, fill, canvas.theme.cell_edge)
 
     return [LegendEntry("Voronoi cell", glyph)]

@@ -1,7 +1,4 @@
-"""Sizes of marks in a crowd, panels on a page, and one legend for several pictures."""
-
-from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import TypeVar
+"""Sizes of marks in a crowd, and panels on a page."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -53,23 +50,3 @@ def columns_for(
         return width * count / (rows * columns)  # a gap in the last row looks like something missing
 
     return max(range(1, count + 1), key=lambda columns: (round(worth(columns), 6), columns))
-
-
-T = TypeVar("T")
-
-
-def united(legends: Iterable[Sequence[T]], key: Callable[[T], Hashable]) -> list[T]:
-    """Return the entries of all legends once, in the first one's order; others follow what precedes them."""
-    found: list[T] = []
-    for legend in legends:
-        keys = [key(entry) for entry in found]
-        place = 0
-        for entry in legend:
-            name = key(entry)
-            if name in keys:
-                place = keys.index(name)
-            else:
-                found.insert(place, entry)
-                keys.insert(place, name)
-            place += 1
-    return found

@@ -8,6 +8,7 @@ import pygame
 
 from robocov.arrays import Array
 from robocov.voronoi import VoronoiPartition
+from robocov_app.look.colors import mix
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, Placed, Sprite
@@ -15,7 +16,6 @@ from robocov_app.render.layers import says
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, Scene, are_centroids
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import mix
 
 READABLE = 9.0  # radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it
 SMALLEST_NUMBER = 6.6  # least size of a robot's number in pixels at scale 1

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, describe_unknown_name
+from robocov_app.look.robot_colors import MAX_OWN_HUES, ColorScheme, choose_robot_hues
+from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render import annotations, forces, heatmaps, knowledge, layers, marks
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP
 from robocov_app.render.camera import Camera
@@ -18,7 +20,6 @@ from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.layers import Layer
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.render.trajectories import Trajectories
 
 _extra = partial(Layer, default=False)
@@ -26,7 +27,7 @@ _fixed = partial(Layer, static=True)
 _strip = partial(Layer, in_world=False)
 
 
-def standard_layers(trails: str = "robots") -> list[Layer]:
+def standard_layers(trails: ColorScheme = "robots") -> list[Layer]:
     """Return one of each layer, from the lowest to the topmost; `trails` are colors of `Trajectories`."""
     distances = heatmaps.field_drawing(heatmaps.draw_distances)
     geodesic = heatmaps.field_drawing(heatmaps.draw_geodesic_cells)
@@ -80,7 +81,7 @@ def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
     return frozenset(wanted)
 
 
-def pane_layers(trails: str = "robots") -> list[Layer]:
+def pane_layers(trails: ColorScheme = "robots") -> list[Layer]:
     """Return the layers of one picture among several: a caption in place of the legend, which they share."""
 
     def status(canvas: Canvas, scene: Scene) -> None:
@@ -116,7 +117,7 @@ class Painter:
         self.scale = scale_for(size) if scale is None else scale
         self.visible = {layer.name for layer in self.layers if layer.default}
         self._camera: Camera | None = None  # None shows the whole region, whatever the size
-        self._hues = robot_hues(0)
+        self._hues = choose_robot_hues(0)
         self._static = Latest[pygame.Surface]()
         self._own: pygame.Surface | None = None
         self._room: tuple[object, int, float] = (None, 0, 0.0)  # the most that was needed for these layers
@@ -168,10 +169,10 @@ class Painter:
         """Draw a scene on all of a surface; what was zoomed or panned stays so in another size."""
         self.size = surface.get_size()
         numbers = scene.numbers
-        if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:  # a color stays with its robot
+        if numbers is not None and max(numbers, default=1) <= MAX_OWN_HUES:  # a color stays with its robot
             self._hues = np.array(numbers, dtype=np.intp) - 1
         else:
-            self._hues = robot_hues(len(scene.team), scene.adjacency, self._hues)
+            self._hues = choose_robot_hues(len(scene.team), scene.adjacency, self._hues)
         entries, shown = self.legend_entries(scene), frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)
         names = {layer.name for layer in self._shown()}

@@ -12,9 +12,9 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array
+from robocov_app.look.colors import Color, choose_text_color
 from robocov_app.render.fonts import label
 from robocov_app.render.surface_cache import kept
-from robocov_app.render.theme import Color, readable_on
 
 FINE = 4  # each sprite is drawn so many times larger; also the number of shifts within a pixel
 LARGE = 60.0  # radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes
@@ -106,7 +106,7 @@ def _disc(
     pygame.draw.circle(large, fill, center, (radius - ring_width) * fine)
     if text:
         size = number_size(radius - ring_width, min(len(text), 4))
-        number = label(text, round(size * fine), readable_on(fill), True)
+        number = label(text, round(size * fine), choose_text_color(fill), True)
         # the ink of digits, without the room for ascenders and descenders, goes to the middle
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))

@@ -7,12 +7,13 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array, IntArray
+from robocov_app.look.colors import Color
+from robocov_app.look.robot_colors import ColorScheme, choose_trail_colors
 from robocov_app.render.canvas import Canvas, LegendEntry, bounded, premultiplied
 from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Sketch, visible_box
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Color
 
 PIECE = 2.0  # pixels between the corners of a drawn trajectory
 SECTION = 16.0  # pixels of path that are added to the page at once; what is newer is drawn anew each time
@@ -27,7 +28,7 @@ Pen: TypeAlias = tuple[list[Color], float]  # colors of robots, width in pixels
 class Trajectories:
     """Trajectories, nan where there is none; each in its robot's color, or all red (`colors` "paper")."""
 
-    def __init__(self, colors: str = "robots") -> None:
+    def __init__(self, colors: ColorScheme = "robots") -> None:
         self.colors = colors
         self._page = pygame.Surface((0, 0))
         self._key: object = None
@@ -134,9 +135,9 @@ class Trajectories:
         return len(rows) > 0
 
     def _of_robots(self, canvas: Canvas) -> list[Color]:
-        hues, paper = canvas.hues.tolist(), self.colors == "paper"
-        look = canvas.theme.name, hues, paper
-        return self._trail_colors.of(None, look, lambda: canvas.theme.trails(hues, paper))
+        hues = canvas.hues.tolist()
+        look = canvas.theme.name, hues
+        return self._trail_colors.of(None, look, lambda: choose_trail_colors(canvas.theme, hues, self.colors))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:

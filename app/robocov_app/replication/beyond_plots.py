@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from robocov_app.figures.results import Sample
-from robocov_app.render.theme import Theme, theme_named
+from robocov_app.look.theme import Theme, get_theme
 from robocov_app.replication.comparison_plots import (
     Draw,
     PairsRow,
@@ -30,7 +30,7 @@ _HEIGHTS_SCALE = 0.68 * PAGE_SCALE
 
 def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     """Return how the plots beyond the paper are drawn, by their names."""
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     samples = build_gap_samples(results)
     heights_size = (WIDE_PX, round(_HEIGHTS_ASPECT * WIDE_PX))
     return select_plots(

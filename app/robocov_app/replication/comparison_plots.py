@@ -12,8 +12,8 @@ from robocov.arrays import Array
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import TITLE, Page
 from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_paired
-from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
-from robocov_app.render.theme import Theme
+from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
+from robocov_app.look.theme import Theme
 from robocov_app.replication.contenders import OURS
 from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
 from robocov_app.replication.paper_figures import PAGE_SCALE, WIDE_PX
@@ -54,7 +54,7 @@ def select_plots(plots: Mapping[str, Draw | None]) -> Plots:
 
 def get_style(controller: str) -> CurveStyle:
     """Return the style of a controller among many: ours stands out, baselines look the same."""
-    style = curve_styles([controller])[controller]
+    style = choose_controller_styles([controller])[controller]
     if not style.name.startswith("other"):
         return style
     return style._replace(name="other-0" if controller in OURS else "other-2")
@@ -101,7 +101,7 @@ def build_cost_samples(rows: Iterable[CostRow]) -> list[Sample]:
             texts.append(row.text)
             controllers.append(row.contender.partition("-")[0])
             costs.append(values)
-    styles = styles_of(controllers)
+    styles = choose_curve_styles(controllers)
     return [Sample(text, style, values) for text, style, values in zip(texts, styles, costs, strict=True)]
 
 

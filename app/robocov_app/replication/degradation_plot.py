@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from robocov.errors import format_count
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Page, quiet_axes, tone
-from robocov_app.figures.styles import CurveStyle, curve_styles
-from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+from robocov_app.look.colors import mix
+from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
+from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.replication.paper_figures import CAPTIONS
 from robocov_app.replication.results import Degradation
 from robocov_app.sweep.parameters import UNITS
@@ -35,7 +36,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     -------
     Figure
     """
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     width, height = _SIZE_PX
     quiet = mix(theme.background, theme.ink, 0.7)
     names = list(dict.fromkeys(degradation.axis for degradation in degradations))
@@ -85,7 +86,7 @@ def _find_limits(degradations: Sequence[Degradation]) -> tuple[float, float]:
 
 def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], theme: Theme) -> None:
     values = list(dict.fromkeys(degradation.value for degradation in degradations))
-    styles = curve_styles(degradation.controller for degradation in degradations)
+    styles = choose_controller_styles(degradation.controller for degradation in degradations)
     axes.axhline(1.0, color=tone(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
     for k, (controller, style) in enumerate(styles.items()):
         own = [degradation for degradation in degradations if degradation.controller == controller]
@@ -105,7 +106,7 @@ def _draw_curve(
     axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
 ) -> None:
     """Draw the median ratios of a controller, with their intervals."""
-    color = tone(style.color(theme))
+    color = tone(style.get_color(theme))
     y = np.array([degradation.ratio.estimate for degradation in degradations])
     ends = np.array([[degradation.ratio.low, degradation.ratio.high] for degradation in degradations])
     errors = np.nan_to_num(np.abs(ends - y[:, None]).T)

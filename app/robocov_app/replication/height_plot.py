@@ -19,7 +19,8 @@ from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, Box, Page, quiet_axes, tone
-from robocov_app.render.theme import Theme, mix
+from robocov_app.look.colors import mix
+from robocov_app.look.theme import Theme
 
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
 """A cell without any symmetry, m."""

@@ -22,9 +22,10 @@ from robocov_app.figures import arena
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, Page, tone
-from robocov_app.render.layout import united
+from robocov_app.look.colors import mix
+from robocov_app.look.legend import merge_legends
+from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.scene import CENTROID, GOAL
-from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.replication.contenders import ASSETS
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.outcome_tables import FIRST_MINUTE_S
@@ -74,7 +75,7 @@ def draw_figure(
     -------
     Figure
     """
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     if number == 1:
         return draw_partition(partition_run, theme)
     pair = _get_pair(runs, number)
@@ -241,7 +242,7 @@ def draw_side_by_side(
     -------
     Figure
     """
-    handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
+    handles = merge_legends((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
     handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
     page, panels = build_panels(records[0].environment, len(records), WIDE_PX, handles, theme, above=30.0)
     for letter, record, (title, cost), axes in zip("abcdef", records, headings, panels, strict=False):

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from robocov_app.render.theme import Theme, theme_named
+from robocov_app.look.theme import Theme, get_theme
 from robocov_app.replication.claims.thresholds import CLUSTERED
 from robocov_app.replication.comparison_plots import (
     CostRow,
@@ -21,7 +21,7 @@ from robocov_app.replication.results import PaperResults
 
 def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     """Return how the plots of the paper's claims are drawn, by their names."""
-    theme = theme_named(theme)
+    theme = get_theme(theme)
     claims = results.claims
     by_start = []
     for key in ("rapf-shared", "rpf-shared"):

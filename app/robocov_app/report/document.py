@@ -13,7 +13,7 @@ from markupsafe import Markup, escape
 from robocov import __version__
 from robocov.text import escape_controls
 from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS
-from robocov_app.figures.styles import MARKS
+from robocov_app.look.curve_styles import MARKER_PATHS
 from robocov_app.report import facts, plots, replay, tables
 from robocov_app.report import groups as grouped
 from robocov_app.report.pictures import has_path, lives, map_picture, run_picture
@@ -46,7 +46,7 @@ def report(results: Sequence[Result], *, title: str | None = None, theme: str = 
         style=theme_rules(":root", theme) + replay.replay_css() + replay.asset("report.css"),
         script=code,
         digest=base64.b64encode(hashlib.sha256(code.encode()).digest()).decode(),
-        marks=MARKS,
+        marks=MARKER_PATHS,
     )
     return Report(escape_controls(html), tuple(section["shown"] for section in sections))
 

@@ -19,7 +19,7 @@ from robocov_app.figures.statistics import (
     group_by,
     mean_with_t_interval,
 )
-from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
+from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.report.results import Entry, Gains, Result, Setting
 from robocov_app.sweep.parameters import format_parameter
 
@@ -80,7 +80,7 @@ def styles(result: Result) -> dict[str, CurveStyle]:
     there = {group.controller for group in shown}
     lost = dict.fromkeys(each.controller for each in result.entries if each.controller not in there)
     names = [*(group.controller for group in shown), *lost]
-    own, apart = curve_styles(names), styles_of(names)
+    own, apart = choose_controller_styles(names), choose_curve_styles(names)
     found = {entry.label + more: own[entry.controller] for entry in result.entries for more in ("", TUNED)}
     found |= {group.label: own[group.controller] for group in variants(result)}
     return found | {group.label: style for group, style in zip(shown, apart, strict=False)}

@@ -14,10 +14,12 @@ from robocov.environment import Environment
 from robocov.errors import format_count
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov_app.look.colors import mix
+from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.density import density_label, dots, shading
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import moving_obstacles
-from robocov_app.render.theme import DARK, LIGHT, ONE_HUE_EACH, mix, robot_hues
 from robocov_app.runs.saved_runs import build_roster
 
 _MARGIN = 3.0  # pixels round the region
@@ -101,7 +103,7 @@ def run_picture(
     parts: list[str] = []
     if n <= MOST_ROBOTS:
         cells, working = record.cells(), np.flatnonzero(record.working[-1])
-        hues = robot_hues(n, working[cells.adjacency] if n > ONE_HUE_EACH else None).tolist()
+        hues = choose_robot_hues(n, working[cells.adjacency] if n > MAX_OWN_HUES else None).tolist()
         for cell, owner in zip(*cells.outlines, strict=True):
             hue = hues[working[int(owner)]]
             if len(cell) > 2:

@@ -16,7 +16,7 @@ from robocov_app.figures import results as drawing
 from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
 from robocov_app.figures.runs import share
-from robocov_app.figures.styles import CurveStyle, curve_styles
+from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.report import groups as grouped
 from robocov_app.report.groups import Comparison, Group, Scales, ratio_text, setting_label
 from robocov_app.report.pictures import has_path
@@ -166,7 +166,7 @@ class _Parameter(NamedTuple):
 def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     """Yield the final cost against every gain and limit that varies, then grids of gains."""
     groups, varying = grouped.by_controller(result), grouped.dependences(result)
-    styles = curve_styles(group.controller for group in groups)
+    styles = choose_controller_styles(group.controller for group in groups)
 
     def scale(label: str, part_of: Callable[[Entry], object]) -> tuple[str, Scales]:
         # by the medians of parts; of one part in meters

@@ -23,7 +23,7 @@ from robocov.environment import Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.text import escape_controls
-from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
+from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
 from robocov_app.report.pictures import density_picture, has_path, lives, rings_of, run_picture
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.saved_runs import build_roster
@@ -116,7 +116,7 @@ def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goa
         "label": run.label or record.label,
         "style": style.name,
         "dashes": [] if isinstance(style.dashes, str) else list(style.dashes[1]),
-        "mark": MARKS[style.mark],
+        "mark": MARKER_PATHS[style.mark],
         "map": on,
         "radius": radius[0] if len(set(radius)) == 1 else radius,
         **({"speeds": record.team.max_speed.tolist()} if record.has_travel_time_cells else {}),
@@ -229,7 +229,7 @@ def replay_part(runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, b
     # runs of one controller with the same gains look the same
     keys = [(run.record.controller, tuple(run.record.gains.items())) for run in runs]
     order = list(dict.fromkeys(keys))
-    own = dict(zip(order, styles_of([controller for controller, _ in order]), strict=True))
+    own = dict(zip(order, choose_curve_styles([controller for controller, _ in order]), strict=True))
     styles = [run.style or own[key] for run, key in zip(runs, keys, strict=True)]
     data = embedded(runs, styles, shown, budget)
     stills = "".join(

@@ -11,7 +11,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from robocov_app.figures.files import plain_style
-from robocov_app.render.theme import LIGHT
+from robocov_app.look.theme import LIGHT
 from robocov_app.report.theme_css import hex_code, named_colors
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}

@@ -3,7 +3,8 @@
 Every color has one name in both themes: what is drawn with names is right in light and dark.
 """
 
-from robocov_app.render.theme import DARK, LIGHT, Color, Theme, mix, readable_on, theme_named
+from robocov_app.look.colors import Color, choose_text_color, mix
+from robocov_app.look.theme import DARK, LIGHT, Theme, get_theme
 
 
 def hex_code(color: Color) -> str:
@@ -17,14 +18,14 @@ def named_colors(theme: Theme) -> dict[str, Color]:
     return {
         **own("background", "panel", "ink", "faint", "grid"),
         "line": mix(theme.grid, theme.background, 0.45),
-        "accent": theme.controller("rapf"),
-        "warning": theme.controller("rpf"),
+        "accent": theme.get_controller_color("rapf"),
+        "warning": theme.get_controller_color("rpf"),
         **own("boundary", "obstacle", "obstacle-edge", "moving-obstacle", "cell-edge", "start", "final"),
-        "on-final": readable_on(theme.final),
-        "on-accent": readable_on(theme.controller("rapf")),
+        "on-final": choose_text_color(theme.final),
+        "on-accent": choose_text_color(theme.get_controller_color("rapf")),
         "trajectory": theme.trajectory,
         "ring": theme.robot_ring,
-        **{name: theme.controller(name) for name in theme.controllers},
+        **{name: theme.get_controller_color(name) for name in theme.controllers},
         **{f"other-{k}": color for k, color in enumerate(theme.others)},
         **{f"cell-{k}": mix(theme.background, hue, theme.paper_tint) for k, hue in enumerate(theme.robots)},
         **{f"heat-{k}": color for k, color in enumerate(theme.quiet_heat)},
@@ -40,7 +41,7 @@ def theme_rules(scope: str, theme: str = "auto") -> str:
     """Return CSS that gives a selector its colors; "auto" follows notebook or browser, paper is white."""
     light, dark = variables(LIGHT), variables(DARK)
     if theme != "auto":
-        return f"{scope}{{{variables(theme_named(theme))}}}@media print{{{scope}{{{light}}}}}\n"
+        return f"{scope}{{{variables(get_theme(theme))}}}@media print{{{scope}{{{light}}}}}\n"
     notebook = f':is([data-jp-theme-light="{{}}"],[data-vscode-theme-kind$="{{}}"]) {scope}'
     return (
         f"{scope}{{{light}}}"

@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.record import Record
+from robocov_app.look.colors import Color
+from robocov_app.look.legend import merge_legends
+from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
 from robocov_app.render.canvas import LegendEntry
 from robocov_app.render.distance_field import Fields
-from robocov_app.render.layout import columns_for, united
+from robocov_app.render.layout import columns_for
 from robocov_app.render.picture import Painter, pane_layers, scale_for
 from robocov_app.render.scene import Scene, record_scene
-from robocov_app.render.theme import Color, Theme
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.frames import build_painter
 from robocov_app.runs.settings import VideoSettings
@@ -176,7 +178,7 @@ def _draw_legend(
     # The order of the longest legend is kept, because it mostly contains all entries.
     entries.sort(key=len)
     entries.reverse()
-    merged = united(entries, LegendEntry.key)
+    merged = merge_legends(entries, LegendEntry.key)
     return legend_picture(merged, width, settings.color_theme, scale, settings.shown_layers)
 
 

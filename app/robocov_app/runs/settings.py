@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING
 
 from robocov.defaults import DEFAULT_LATTICE
 
 if TYPE_CHECKING:
-    from robocov_app.render.theme import Theme
+    from robocov_app.look.robot_colors import ColorScheme
+    from robocov_app.look.theme import Theme
 
-TrajectoryColors: TypeAlias = Literal["paper", "robots"]
 DEFAULT_VIDEO_SIZE_PX = (1280, 720)
 
 
@@ -41,7 +41,7 @@ class VideoSettings:
     fps: float = 30
     speed: float = 4.0
     theme: str = "light"
-    colors: TrajectoryColors = "paper"
+    colors: ColorScheme = "paper"
     size: tuple[int, int] | None = None
     shown_layers: frozenset[str] = frozenset()
     hidden_layers: frozenset[str] = frozenset()
@@ -65,9 +65,9 @@ class VideoSettings:
         ParameterError
             If there is none of this name.
         """
-        from robocov_app.render.theme import theme_named
+        from robocov_app.look.theme import get_theme
 
-        return theme_named(self.theme)
+        return get_theme(self.theme)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov.errors import InputError, describe_unknown_name
+from robocov_app.look.colors import mix
+from robocov_app.look.theme import Theme
 from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.theme import Theme, mix
 from robocov_app.toolkit.dialogs import Choice, Dialog, Option
 from robocov_app.toolkit.input import key_of, key_words
 from robocov_app.toolkit.overlay import card, dim

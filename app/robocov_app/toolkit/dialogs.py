@@ -12,8 +12,8 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov.errors import InputError, RobocovError
+from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.fonts import text_width
-from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.input import OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.overlay import card, dim, wrapped
 from robocov_app.toolkit.text_edit import TextEdit

@@ -4,11 +4,12 @@ import numpy as np
 import pygame
 from pygame import Rect, Surface
 
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import kept
-from robocov_app.render.theme import LIGHT, Color, Theme, mix
 from robocov_app.toolkit.layout import Box
 
 _FINE = 4

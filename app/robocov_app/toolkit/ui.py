@@ -23,8 +23,9 @@ from time import perf_counter
 import pygame
 from pygame import Rect, Surface
 
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.theme import LIGHT, Color, Theme, mix
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import field_color, on_accent, rounded, wrapped

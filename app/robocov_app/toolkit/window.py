@@ -10,7 +10,7 @@ import pygame
 from pygame import Surface
 
 from robocov.files.writing import replace_file
-from robocov_app.render.theme import LIGHT
+from robocov_app.look.theme import LIGHT
 from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.display import collect_garbage_rarely, open_window
 from robocov_app.toolkit.faults import FaultLog

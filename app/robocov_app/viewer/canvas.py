@@ -9,17 +9,19 @@ import pygame
 
 from robocov.arrays import Array
 from robocov.environment import Environment, Point
+from robocov_app.look.colors import mix
+from robocov_app.look.legend import merge_legends
+from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.distance_field import round_limit
-from robocov_app.render.layout import united
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
@@ -169,7 +171,7 @@ class ViewerCanvas:
         return f"{words} at {time:.1f} s" if session.displayed.time - time > _OLD else words
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
-        camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))
+        camera, hues = self._painters[pane].camera, choose_robot_hues(len(scene.team))
         return Canvas(surface, camera, self.theme, self.layout.scale, hues)
 
     def _draw_tool(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
@@ -232,14 +234,18 @@ class ViewerCanvas:
             pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
             if pane == self.viewer.active:
                 bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * scale))))
-                screen.fill(theme.controller(self.viewer.session.timeline.panes[pane].controller.name), bar)
+                screen.fill(
+                    theme.get_controller_color(self.viewer.session.timeline.panes[pane].controller.name), bar
+                )
         (x, y, wide, high), entries = self.layout.legend, self._legend_entries()
         key = tuple(entry.key() for entry in entries), wide, theme.name, scale
         if self._strip is None or self._strip[0] != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(theme.background)
             camera, shown = self._painters[0].camera, frozenset(self.viewer.shown)
-            page.blit(legend_strip(entries, Canvas(page, camera, theme, scale, robot_hues(1), shown)), (0, 0))
+            page.blit(
+                legend_strip(entries, Canvas(page, camera, theme, scale, choose_robot_hues(1), shown)), (0, 0)
+            )
             self._strip = key, page
         screen.blit(self._strip[1], (x, y), pygame.Rect(0, 0, wide, high))
 
@@ -248,7 +254,7 @@ class ViewerCanvas:
             return 0
         kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.shown)
         page = pygame.Surface((self.layout.arena[2], 1))
-        canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, robot_hues(1))
+        canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, choose_robot_hues(1))
         needed, before = len(legend_rows(canvas, self._legend_entries())), self._rows
         rows = max(needed, 1, before[1] if before[0] == kept else 1)
         self._rows = kept, rows
@@ -256,4 +262,4 @@ class ViewerCanvas:
 
     def _legend_entries(self) -> list[LegendEntry]:
         each = zip(self._painters, self._scenes, strict=False)  # a pane that was just added has no scene yet
-        return united((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)
+        return merge_legends((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)

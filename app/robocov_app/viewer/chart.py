@@ -9,12 +9,13 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
 from robocov_app.render.fonts import shortened, text_width
-from robocov_app.render.theme import Color, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
@@ -201,7 +202,7 @@ class Chart:
                 free = x + wide + 8 * scale
         self._ghosts = [(ghost.node, place(ghost.times, ghost.values)) for ghost in ghosts]
         for ghost, (_, points) in zip(ghosts, self._ghosts, strict=True):
-            color = mix(theme.panel, theme.controller(ghost.controller), 0.45)
+            color = mix(theme.panel, theme.get_controller_color(ghost.controller), 0.45)
             for k in range(len(points) - 1):
                 if k % 4 < 3 or len(points) < 12:
                     canvas.line(points[k].tolist(), points[k + 1].tolist(), color)

@@ -20,11 +20,11 @@ from robocov.errors import InputError, to_one_line
 from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, summarize
 from robocov.record import Record, Recorder
+from robocov_app.look.theme import Theme
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.fonts import label, shortened
 from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import Theme
 from robocov_app.runs.artifacts import save_comparison, save_figures, start_comparison
 from robocov_app.runs.cost import build_cost
 from robocov_app.runs.encoding import Frame

@@ -5,9 +5,10 @@ from functools import partial
 
 import pygame
 
+from robocov_app.look.colors import mix
+from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.fonts import label, shortened
-from robocov_app.render.theme import Theme, mix
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import card, flat_canvas, wrapped
 from robocov_app.viewer.lessons import LessonPlayer

@@ -10,8 +10,8 @@ import pygame
 
 from robocov.environment import Point
 from robocov.errors import RobocovError
+from robocov_app.look.theme import get_theme
 from robocov_app.render.picture import standard_layers
-from robocov_app.render.theme import theme_named
 from robocov_app.storage.autosave import Draft, remove_draft
 from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
@@ -195,7 +195,7 @@ class Window(BaseWindow):
         self.keeper = RunSaver(viewer.costs.lattice)
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         pygame.display.set_caption("robocov")
-        self.canvas = ViewerCanvas(viewer, theme_named(viewer.theme))
+        self.canvas = ViewerCanvas(viewer, get_theme(viewer.theme))
         self.chart, self.dialogs = Chart(viewer), Dialogs()
         listed = [*viewer_commands(viewer, self.titles), *self._own_commands()]
         self.commands = Commands(listed, viewer.attempt, lambda: parameter_commands(viewer))
@@ -363,7 +363,7 @@ class Window(BaseWindow):
         if key == self._arranged:
             return
         before, self._arranged = self._arranged, key
-        self.theme = theme = theme_named(viewer.theme)
+        self.theme = theme = get_theme(viewer.theme)
         self.layout = layout = laid_out(size, self.scale, panes, aspect, panel=viewer.panel, legend_rows=rows)
         self.canvas.arrange(layout, theme)
         self.chart.arrange(layout, theme)

@@ -35,7 +35,7 @@ from robocov_app.benchmark.results import (
 from robocov_app.benchmark.running import TRACKS_FOLDER, run_benchmark
 from robocov_app.benchmark.verification import verify_result
 from robocov_app.cli import main
-from robocov_app.figures.styles import styles_of
+from robocov_app.look.curve_styles import choose_curve_styles
 from robocov_app.terminal.interruption import Interruption
 
 MAPS = ("blocks-a", "blocks-b")
@@ -130,7 +130,7 @@ PLACE = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abcde", min_
 
 @given(st.lists(PLACE, min_size=2, max_size=4))
 def test_labels_of_few_points_stay_apart(given_points: list[tuple[float, float, str]]) -> None:
-    points = [ParetoPoint(styles_of(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
+    points = [ParetoPoint(choose_curve_styles(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
     middles = place_labels(np.array([(x, y) for x, y, _ in given_points]), [each.label for each in points])
     half = np.array([(3.0 * len(each.label), 6.5) for each in points])
     for k, j in combinations(range(len(points)), 2):

@@ -12,7 +12,7 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.canvas.canvas import describe_map
 from robocov_app.editor.canvas.overlay import STEM_PX
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 
 NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5)), 0.1))
 CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))

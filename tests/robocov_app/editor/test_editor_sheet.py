@@ -21,8 +21,8 @@ from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.camera import Camera
-from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.toolkit.display import open_display
 from robocov_app.viewer.film import pixels
 

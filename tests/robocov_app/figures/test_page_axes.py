@@ -8,7 +8,7 @@ from PIL import Image
 
 from robocov_app.figures.page import Page
 from robocov_app.figures.runs import plot_trajectories
-from robocov_app.render.theme import DARK
+from robocov_app.look.theme import DARK
 
 
 def test_the_page_is_shown_for_its_axes():

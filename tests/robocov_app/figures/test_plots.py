@@ -25,7 +25,7 @@ from robocov_app.figures.curves import end_label, spread
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_cost, plot_environment, plot_trajectories
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 
 SIZES = [(900, 600), (1400, 901), (2560, 1440)]
 MAPS = [ROOMS, HALL, CORRIDOR, SHAFT]
@@ -346,7 +346,7 @@ class TestCost:
 
 _LAZY = """
 import sys
-import robocov_app.figures.files, robocov_app.figures.styles, robocov_app.report.replay
+import robocov_app.figures.files, robocov_app.look.curve_styles, robocov_app.report.replay
 assert "matplotlib" not in sys.modules
 import robocov_app.figures.runs
 sys.path.insert(0, sys.argv[1])

@@ -12,8 +12,8 @@ from robocov.errors import ParameterError
 from robocov_app.figures.coverage import Moment, plot_coverage
 from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.files import save_figure
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, palette, round_limit
-from robocov_app.render.theme import DARK, LIGHT
 
 T = np.linspace(0.0, 60.0, 61)
 COSTS = {map_.name: CoverageCost(map_, 64) for map_ in (ROOMS, HALL, CORRIDOR, SHAFT)}

@@ -11,15 +11,16 @@ from robocov_app.figures.results import (
     plot_gain_grid,
     plot_gains,
 )
-from robocov_app.figures.styles import curve_styles
-from robocov_app.render.theme import DARK, HEAT_LEVELS, LIGHT, contrast
+from robocov_app.look.colors import compute_contrast
+from robocov_app.look.curve_styles import choose_controller_styles
+from robocov_app.look.theme import DARK, HEAT_LEVELS, LIGHT
 
 GAINS = np.repeat([0.1, 0.3, 1.0, 3.0, np.nan], 4)
 VALUES = np.arange(20.0)
 
 
 def drawn(gains: np.ndarray, values: np.ndarray, gain: str) -> Axes:
-    style = curve_styles(["rapf"])["rapf"]
+    style = choose_controller_styles(["rapf"])["rapf"]
     return plot_gains([Dependence("RAPF", style, gains, values)], gain, (420, 290), "cost").axes[0]
 
 
@@ -79,4 +80,4 @@ def test_numbers_of_a_grid_tell_small_differences() -> None:
 def test_ink_can_be_read_on_all_colors_of_a_grid(theme) -> None:
     colors = theme.quiet_heat
     assert len(colors) == len(set(colors)) == HEAT_LEVELS
-    assert min(contrast(theme.ink, color) for color in colors) >= 4.5
+    assert min(compute_contrast(theme.ink, color) for color in colors) >= 4.5

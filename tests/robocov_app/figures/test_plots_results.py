@@ -19,15 +19,15 @@ from robocov_app.figures.results import (
     quartiles,
 )
 from robocov_app.figures.statistics import bootstrap
-from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
+from robocov_app.look.theme import DARK, LIGHT
 
 RNG = np.random.default_rng(3)
 TIME = np.linspace(0.0, 30.0, 31)
 
 
 def style(controller: str) -> CurveStyle:
-    return curve_styles([controller])[controller]
+    return choose_controller_styles([controller])[controller]
 
 
 def band(label: str, controller: str, final: float, runs: int = 9) -> Band:
@@ -107,28 +107,28 @@ def test_names_that_are_too_long_are_cut_and_values_are_not(size) -> None:
 
 
 def test_controllers_keep_their_colors_in_all_plots() -> None:
-    known = curve_styles(["rpf", "mine", "rapf", "other", "mine"])
-    assert known["rapf"].color(LIGHT) == LIGHT.controllers["rapf"]
-    assert known["mine"].color(DARK) == DARK.others[0]
-    assert known["other"].color(LIGHT) == LIGHT.others[1]
+    known = choose_controller_styles(["rpf", "mine", "rapf", "other", "mine"])
+    assert known["rapf"].get_color(LIGHT) == LIGHT.controllers["rapf"]
+    assert known["mine"].get_color(DARK) == DARK.others[0]
+    assert known["other"].get_color(LIGHT) == LIGHT.others[1]
     for axes in (figure_with(BANDS).axes[0], boxes([("", SAMPLES)])):
         assert tone(LIGHT.controllers["rpf"]) in {line.get_color() for line in axes.lines}
 
 
 @pytest.mark.parametrize("controllers", [["rapf"] * 6, ["mine", "rapf", "mine", "rpf", "rapf", "mine"]])
 def test_gains_of_one_controller_differ_in_color_dashes_and_mark(controllers) -> None:
-    styles = styles_of(controllers)
+    styles = choose_curve_styles(controllers)
     for part in zip(*styles, strict=True):
         assert len(set(map(str, part))) == len(controllers)
     for theme in (LIGHT, DARK):
-        assert len({style.color(theme) for style in styles}) == len(controllers)
+        assert len({style.get_color(theme) for style in styles}) == len(controllers)
 
 
 @given(st.lists(st.sampled_from(["rapf", "lloyd", "mine", "other"]), max_size=8))
 def test_no_two_of_eight_curves_have_one_style(controllers) -> None:
-    styles = styles_of(controllers)
+    styles = choose_curve_styles(controllers)
     assert len(set(styles)) == len(controllers)
-    for name, style in curve_styles(controllers).items():
+    for name, style in choose_controller_styles(controllers).items():
         assert styles[controllers.index(name)] == style
 
 
@@ -167,7 +167,7 @@ def test_pairs_have_the_color_of_their_style() -> None:
     mine = style("mine")
     for each, color in (
         (PAIRS[0], LIGHT.controllers["rapf"]),
-        (PAIRS[0]._replace(style=mine), mine.color(LIGHT)),
+        (PAIRS[0]._replace(style=mine), mine.get_color(LIGHT)),
     ):
         (points,) = (line for line in paired([each]).lines if line.get_marker() == "o" and line.get_clip_on())
         assert points.get_color() == tone(color)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import value_limits
 from robocov_app.figures.results import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page
-from robocov_app.figures.styles import curve_styles
-from robocov_app.render.theme import LIGHT
+from robocov_app.look.curve_styles import choose_controller_styles
+from robocov_app.look.theme import LIGHT
 
-STYLE = curve_styles(["rapf"])["rapf"]
+STYLE = choose_controller_styles(["rapf"])["rapf"]
 
 
 def axes_of(rows=1.0):

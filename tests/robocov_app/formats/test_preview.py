@@ -17,7 +17,7 @@ from robocov.errors import OutputError, ParameterError
 from robocov_app.figures.page import tone
 from robocov_app.formats import ForeignMap, Shaping, build_environment
 from robocov_app.formats.preview import plot_import, preview
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 
 HALL = box(0, 0, 12, 8)
 PILLARS = shapely.union_all([box(4, 2, 5, 3), box(4, 3.6, 5, 5), box(9, 6, 9.1, 6.1)])

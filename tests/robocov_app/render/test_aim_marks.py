@@ -9,8 +9,8 @@ from drawn_run import SQUARE, explained
 
 from robocov.observation import Decision, Snapshot
 from robocov.voronoi import partition
+from robocov_app.look.theme import LIGHT
 from robocov_app.render.scene import SAME, Scene, are_centroids
-from robocov_app.render.theme import LIGHT
 
 CENTROIDS = partition(TWO, SQUARE.region).centroid
 UPRIGHT = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])

@@ -6,10 +6,10 @@ from drawn_pixels import SIZE, TWO, changed, drawn
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 from robocov.voronoi import partition
+from robocov_app.look.theme import LIGHT
 from robocov_app.render.annotations import fitting_status
 from robocov_app.render.fonts import label, text_width
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
-from robocov_app.render.theme import LIGHT
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)

@@ -7,10 +7,10 @@ from drawn_run import HALL, ROOMS, run_of, scene_of
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render import heatmaps
 from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, Fields, palette
 from robocov_app.render.picture import Painter, checked_layers
-from robocov_app.render.theme import DARK, LIGHT
 
 SIZE = (560, 364)
 
@@ -83,7 +83,7 @@ def test_geodesic_cells_have_the_tint_of_the_nearest_robot(n):
     clear[reached] = ordered[reached, 1] - ordered[reached, 0] > 0.3
     assert clear.sum() > 80
     for (x, y), robot in zip(pixels[clear], exact[clear].argmin(axis=1), strict=True):
-        assert tuple(frame[y, x]) == LIGHT.cell(int(painter._hues[robot]))
+        assert tuple(frame[y, x]) == LIGHT.get_cell_color(int(painter._hues[robot]))
 
 
 def test_borders_are_drawn_where_owners_change_and_nowhere_else():
@@ -138,7 +138,7 @@ def test_the_scale_of_colors_stands_beside_the_map_and_is_whole(size, limit):
     # nothing touches the edge of the page
     assert not ink[:, -1].any()
     # the farthest color is above the nearest
-    table = LIGHT.heat_table(256).astype(int)
+    table = LIGHT.build_heat_table(256).astype(int)
     far = np.nonzero(np.abs(beside - table[-1]).max(axis=2) < 4)[0]
     assert len(far)
     assert far.mean() < size[1] / 2

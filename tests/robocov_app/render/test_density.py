@@ -6,6 +6,8 @@ from density_cases import GAUSSIANS, POLYGONS
 
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import Environment
+from robocov_app.look.colors import compute_contrast, mix
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.density import (
     colors,
     density_label,
@@ -14,7 +16,6 @@ from robocov_app.render.density import (
     parts,
     value_range,
 )
-from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 BOUNDS = (0.0, 0.0, 8.0, 8.0)
 SQUARE = Environment("square", ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)))
@@ -52,6 +53,6 @@ def test_the_more_the_stronger():
 def test_it_is_seen_and_nothing_drowns_in_it(theme):
     alpha = float(colors(np.array([1.0]), theme)[0, 3]) / 255.0
     full = mix(theme.background, theme.density, alpha)
-    assert contrast(full, theme.background) > 1.4
-    assert contrast(full, theme.ink) > 4.5
-    assert contrast(full, theme.trajectory) > 1.3
+    assert compute_contrast(full, theme.background) > 1.4
+    assert compute_contrast(full, theme.ink) > 4.5
+    assert compute_contrast(full, theme.trajectory) > 1.3

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, WallObstacle
+from robocov_app.look.colors import compute_contrast, compute_luminance
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_field import (
     FARTHEST,
     Borders,
@@ -25,7 +27,6 @@ from robocov_app.render.distance_field import (
     strength,
     ticks,
 )
-from robocov_app.render.theme import DARK, LIGHT, contrast, luminance
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))
 
@@ -162,14 +163,14 @@ THEMES = [LIGHT, DARK]
 
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
 def test_colors_run_one_way_from_the_page_to_its_opposite(theme):
-    brightness = np.array([luminance(tuple(color)) for color in theme.heat_table(254).tolist()])
+    brightness = np.array([compute_luminance(tuple(color)) for color in theme.build_heat_table(254).tolist()])
     steps = np.diff(brightness) * (1 if theme is DARK else -1)
     assert (steps >= -1e-3).all()
     # every tenth of the scale can be told from the next
-    tenths = [tuple(color) for color in theme.heat_table(11).tolist()]
-    assert min(contrast(one, two) for one, two in pairwise(tenths)) > 1.08
-    assert contrast(tenths[0], theme.background) < 1.1
-    assert contrast(tenths[-1], theme.background) > 7.0
+    tenths = [tuple(color) for color in theme.build_heat_table(11).tolist()]
+    assert min(compute_contrast(one, two) for one, two in pairwise(tenths)) > 1.08
+    assert compute_contrast(tenths[0], theme.background) < 1.1
+    assert compute_contrast(tenths[-1], theme.background) > 7.0
 
 
 @given(st.floats(1e-3, 1e5))

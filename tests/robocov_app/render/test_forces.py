@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from written_words import check_glyph, glyphs
 
 from robocov.team import Team
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 
 
 @settings(deadline=None, max_examples=25)

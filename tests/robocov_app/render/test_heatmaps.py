@@ -13,10 +13,10 @@ from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
 from robocov_app.figures.arena import draw_map, map_handles, ticks_in_meters
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import DARK, LIGHT
 
 RING = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (2.0, 8.0))
 PLAIN = Environment("plain", RING, (CircleObstacle((5.0, 5.0), 0.5),))

@@ -9,11 +9,12 @@ from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
+from robocov_app.look.colors import compute_contrast, mix
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render import knowledge
 from robocov_app.render.camera import Camera
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Sensed, moving_obstacles
-from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
@@ -128,7 +129,7 @@ class TestSensedObstacles:
         solid = solid[np.linalg.norm(solid[:, None] - SEEN, axis=2).min(axis=1) > 0.15]
         for pixel in painter.camera.to_pixels(solid):
             assert distance(frame, pixel, pale) == 0
-        assert contrast(theme.forces["repulsion_obstacle"], pale) > 4
+        assert compute_contrast(theme.forces["repulsion_obstacle"], pale) > 4
         for pixel in painter.camera.to_pixels(inside(ROOMS.free.buffer(-0.12), 200)):
             assert distance(frame, pixel, theme.background) == 0  # that of the courtyard too
 

@@ -12,11 +12,13 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath, Polyg
 from robocov.observation import Snapshot
 from robocov.team import Team
 from robocov.voronoi import partition
+from robocov_app.look.colors import choose_text_color
+from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import Scene, moving_obstacles
-from robocov_app.render.theme import DARK, LIGHT, readable_on, robot_hues
 
 
 def test_every_layer_has_a_name_of_its_own_and_words():
@@ -43,7 +45,7 @@ def test_a_cell_has_the_tint_of_the_nearest_robot(n, theme):
     assert clear.sum() > 100
     pixels = painter.camera.to_pixels(points[clear])
     for pixel, robot in zip(pixels, distances[clear].argmin(axis=1), strict=True):
-        assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
+        assert distance(frame, pixel, theme.get_cell_color(painter._hues[robot])) == 0
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
@@ -65,7 +67,7 @@ def test_cells_by_time_have_the_tint_of_who_is_there_first(theme):
     assert set(times[clear].argmin(axis=1)) > {0, 1}
     pixels = painter.camera.to_pixels(points[clear])
     for pixel, robot in zip(pixels, times[clear].argmin(axis=1), strict=True):
-        assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
+        assert distance(frame, pixel, theme.get_cell_color(painter._hues[robot])) == 0
 
 
 def test_robots_of_different_size_are_drawn_to_scale():
@@ -73,7 +75,7 @@ def test_robots_of_different_size_are_drawn_to_scale():
     record = replace(record, team=replace(record.team, radius=np.array([0.3, 0.6, 0.9])))
     scene = scene_of(record)
     _, painter = drawn(scene, "robots")
-    canvas = Canvas(pygame.Surface(SIZE), painter.camera, LIGHT, 1.0, robot_hues(3))
+    canvas = Canvas(pygame.Surface(SIZE), painter.camera, LIGHT, 1.0, choose_robot_hues(3))
     expected = record.team.radius * painter.camera.zoom
     np.testing.assert_allclose(drawn_radii(canvas, scene), expected, atol=0.26)
 
@@ -88,7 +90,7 @@ def test_edges_of_cells_are_drawn_between_robots():
 @pytest.mark.parametrize("n", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_narrow_cells_have_plain_edges(n):
     frame, _ = drawn(scene_of(run_of(SQUARE, n)), "cells")
-    colors = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}
+    colors = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.get_cell_color, range(len(LIGHT.robots)))}
     assert (set(map(tuple, np.unique(frame.reshape(-1, 3), axis=0).tolist())) <= colors) == (n == 1000)
 
 
@@ -162,7 +164,7 @@ class TestCrowds:
         scene = replace(explained(positions), team=Team.homogeneous(len(positions), radius=radius))
         painter = Painter(SQUARE, size)
         painter.frame(scene)
-        canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, robot_hues(0))
+        canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, choose_robot_hues(0))
         return np.array(drawn_radii(canvas, scene)), painter
 
     def test_discs_keep_apart_where_the_smallest_ones_can(self):
@@ -218,7 +220,7 @@ class TestRobots:
         for pixel, hue in zip(painter.camera.to_pixels(scene.snapshot.positions), painter._hues, strict=True):
             x, y = np.rint(pixel).astype(int)
             patch = frame[y - 3 : y + 4, x - 3 : x + 4].reshape(-1, 3)
-            color = np.array(readable_on(LIGHT.robots[hue]))
+            color = np.array(choose_text_color(LIGHT.robots[hue]))
             counts.append(int((np.abs(patch - color).max(axis=1) < 70).sum()))
         return counts
 
@@ -322,7 +324,7 @@ class TestNumbers:
             for number, place in zip(numbers, positions, strict=True):
                 pixel = painter.camera.to_pixels(place)
                 assert nearest(frame, pixel - np.array([0.0, 5.0]), theme.robots[number - 1]) < 30
-                assert distance(frame, pixel + np.array([0.0, 30.0]), theme.cell(number - 1)) == 0
+                assert distance(frame, pixel + np.array([0.0, 30.0]), theme.get_cell_color(number - 1)) == 0
 
     def test_numbers_beyond_the_hues_do_not_matter(self):
         scene = replace(explained(TWO), numbers=(4, 10))
@@ -357,7 +359,7 @@ class TestCells:
         scene = self.scene(reach, used)
         frame, painter = drawn(scene, "cells")
         assert nearest(frame, painter.camera.to_pixels(np.array([3.0, 5.0])), LIGHT.cell_edge) < 70
-        assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.cell(0)) == 0
+        assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.get_cell_color(0)) == 0
 
 
 class TestTrajectories:

@@ -8,14 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from robocov_app.render.layout import (
-    columns_for,
-    fitted_radii,
-    line_crowding,
-    mark_size,
-    nearest_distance,
-    united,
-)
+from robocov_app.look.legend import merge_legends
+from robocov_app.render.layout import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
 
 points = arrays(np.float64, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(0, 100, width=32))
 
@@ -66,7 +60,7 @@ ENTRIES = st.lists(st.integers(0, 8), unique=True)
 
 
 def both(*legends: str) -> str:
-    return "".join(united([list(legend) for legend in legends], str))
+    return "".join(merge_legends([list(legend) for legend in legends], str))
 
 
 def test_what_only_a_later_one_has_stands_where_it_stands_there() -> None:
@@ -78,7 +72,7 @@ def test_what_only_a_later_one_has_stands_where_it_stands_there() -> None:
 
 @given(st.lists(ENTRIES, max_size=4))
 def test_each_entry_stands_once_and_the_first_legend_keeps_its_order(legends: list[list[int]]) -> None:
-    found = united(legends, lambda entry: entry)
+    found = merge_legends(legends, lambda entry: entry)
     assert len(found) == len(set(found))
     assert set(found) == {entry for legend in legends for entry in legend}
     if legends:

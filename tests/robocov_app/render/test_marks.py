@@ -7,8 +7,9 @@ from drawn_run import SQUARE, explained
 from written_words import check_glyph, glyphs, places
 
 from robocov.team import Team
+from robocov_app.look.colors import compute_contrast, mix
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.picture import Painter
-from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
@@ -47,7 +48,7 @@ class TestFailed:
         assert np.ptp(disc, axis=1).max() < 32  # no hue
         for robot in theme.robots:
             assert np.abs(disc - np.array(robot)).max(axis=1).min() > 20
-        assert contrast(mix(theme.background, theme.ink, 0.3), theme.ink) > 4
+        assert compute_contrast(mix(theme.background, theme.ink, 0.3), theme.ink) > 4
 
     @THEMES
     def test_has_its_number_beside_it(self, theme):

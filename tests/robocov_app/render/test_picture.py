@@ -11,9 +11,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render import fonts
 from robocov_app.render.picture import Painter, scale_for, standard_layers
-from robocov_app.render.theme import DARK, LIGHT
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
@@ -110,7 +110,7 @@ def test_what_is_magnified_is_still_true(factor, x, y):
         & (points < 8).all(axis=1)
     )
     for (column, row), robot in zip(grid[clear], distances[clear].argmin(axis=1), strict=True):
-        assert tuple(frame[row, column]) == LIGHT.cell(robot)
+        assert tuple(frame[row, column]) == LIGHT.get_cell_color(robot)
 
 
 def test_the_legend_follows_the_colors_of_the_trajectories():
@@ -216,7 +216,7 @@ sys.path.insert(0, sys.argv[1])
 from drawn_run import ROOMS, run_of, scene_of
 for module in ("pygame", "matplotlib"):
     assert module not in sys.modules, module
-import robocov_app.render.theme, robocov_app.render.camera, robocov_app.runs.encoding
+import robocov_app.look.theme, robocov_app.render.camera, robocov_app.runs.encoding
 assert "pygame" not in sys.modules and "matplotlib" not in sys.modules
 from robocov_app.render.picture import Painter
 frame = Painter(ROOMS, (320, 240)).frame(scene_of(run_of(ROOMS, 3)))

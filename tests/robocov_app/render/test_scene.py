@@ -14,10 +14,10 @@ from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov_app.figures.runs import plot_trajectories
+from robocov_app.look.theme import LIGHT
 from robocov_app.render import scene as module
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import CELL, Sensed, record_scene
-from robocov_app.render.theme import LIGHT
 from robocov_app.runs.frames import draw_frames
 from robocov_app.runs.settings import VideoSettings
 

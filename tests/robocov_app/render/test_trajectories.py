@@ -7,8 +7,9 @@ import shapely
 from drawn_pixels import SIZE, distance, drawn, layer_named, nearest
 from drawn_run import SQUARE, explained, run_of, scene_of
 
+from robocov_app.look.robot_colors import choose_trail_color
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.picture import Painter
-from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.render.trajectories import FADE_STEPS
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
@@ -144,7 +145,7 @@ class TestGaps:
             assert off_the_paths(painter, trail, each, theme) == 0
             for row in (60, 70, 78):
                 pixel = painter.camera.to_pixels(trail[row, 1])
-                assert nearest(each, pixel, theme.trail(1)) < 120
+                assert nearest(each, pixel, choose_trail_color(theme, 1)) < 120
             first = painter.camera.to_pixels(trail[40, 1])
             assert ink(each, theme)[:, : int(first[0]) - 3][int(first[1]) - 4 : int(first[1]) + 5].max() == 0
 
@@ -162,7 +163,7 @@ class TestGaps:
         for each in (frame, at_once):
             for row in (26, 44, 55):
                 pixel = painter.camera.to_pixels(trail[row, 1])
-                assert nearest(each, pixel, LIGHT.trail(1)) < 150
+                assert nearest(each, pixel, choose_trail_color(LIGHT, 1)) < 150
 
     @FADES
     def test_slow_ones_leave_none_either(self, fade):
@@ -181,7 +182,7 @@ class TestGaps:
         for count in range(1, 51):
             frame = frame_of(painter, trail[:count])
         assert off_the_paths(painter, trail, frame) == 0
-        assert nearest(frame, painter.camera.to_pixels(trail[30, 1]), LIGHT.trail(1)) < 200
+        assert nearest(frame, painter.camera.to_pixels(trail[30, 1]), choose_trail_color(LIGHT, 1)) < 200
 
     @FADES
     def test_a_robot_that_never_was_there_draws_nothing(self, fade):
@@ -219,7 +220,7 @@ class TestFading:
         rows = np.arange(68, 2, -6)
         seen = self.strengths(frame, painter, trail, rows, theme)
         age = (69 - rows) / RATE
-        full = max(abs(a - b) for a, b in zip(theme.trail(0), theme.background, strict=True))
+        full = max(abs(a - b) for a, b in zip(choose_trail_color(theme, 0), theme.background, strict=True))
         assert seen[0] > 0.85 * full
         assert all(new > old for new, old in pairwise(seen) if new)
         assert 0.35 * full < np.interp(1.5, age, seen) < 0.75 * full
@@ -231,7 +232,7 @@ class TestFading:
         """The newest is strong at any time, and nothing is missing up to now."""
         trail = straight(70)
         painter, _ = painter_of(3.0, theme)
-        full = max(abs(a - b) for a, b in zip(theme.trail(0), theme.background, strict=True))
+        full = max(abs(a - b) for a, b in zip(choose_trail_color(theme, 0), theme.background, strict=True))
         for count in range(2, 71, 4):
             frame = frame_of(painter, trail[:count])
             if count % 12 == 6:
@@ -248,14 +249,14 @@ class TestFading:
         trail = straight(70)
         painter, _ = painter_of(3.0, theme, also={"cells"})
         frame = frame_of(painter, trail)
-        low = np.minimum(theme.cell(0), theme.trail(0)) - 4
-        high = np.maximum(theme.cell(0), theme.trail(0)) + 4
+        low = np.minimum(theme.get_cell_color(0), choose_trail_color(theme, 0)) - 4
+        high = np.maximum(theme.get_cell_color(0), choose_trail_color(theme, 0)) + 4
         for x, y in np.rint(painter.camera.to_pixels(trail[8:68, 0])).astype(int):
             column = frame[y - 3 : y + 4, x]
             assert (column >= low).all()
             assert (column <= high).all()
         x, y = np.rint(painter.camera.to_pixels(trail[14, 0])).astype(int)
-        assert 0 < nearest(frame, (x, y), theme.cell(0), reach=0) < 60
+        assert 0 < nearest(frame, (x, y), theme.get_cell_color(0), reach=0) < 60
 
     def test_where_paths_cross_the_newer_is_on_top(self):
         rows = 61
@@ -266,9 +267,11 @@ class TestFading:
         painter, _ = painter_of(3.0)
         pixel = painter.camera.to_pixels(np.array([4.0, 4.0]))
         frame = frame_of(painter, trail)
-        assert nearest(frame, pixel, LIGHT.trail(0), reach=0) < nearest(frame, pixel, LIGHT.trail(1), reach=0)
+        assert nearest(frame, pixel, choose_trail_color(LIGHT, 0), reach=0) < nearest(
+            frame, pixel, choose_trail_color(LIGHT, 1), reach=0
+        )
         swapped = frame_of(painter, trail[:, ::-1])
-        assert nearest(swapped, pixel, LIGHT.trail(1), reach=0) < 110
+        assert nearest(swapped, pixel, choose_trail_color(LIGHT, 1), reach=0) < 110
 
     def test_slow_robots_have_trails_without_gaps(self):
         trail = np.empty((400, 2, 2))
@@ -321,7 +324,7 @@ class TestFading:
                 assert (frame == frame_of(painter_of(fade)[0], trail, numbers=numbers)).all()
                 for row, number in enumerate(numbers):
                     for place in painter.camera.to_pixels(trail[[30, 36], row]):
-                        assert nearest(frame, place, LIGHT.trail(number - 1)) < 90
+                        assert nearest(frame, place, choose_trail_color(LIGHT, number - 1)) < 90
 
     def test_it_may_be_switched_on_and_off(self):
         trail = walks(90)
@@ -350,7 +353,10 @@ class TestFading:
         x, y = trail[-5, 0]
         painter.camera = replace(painter.camera, center=(x, y), zoom=2e4)
         frame = frame_of(painter, trail)
-        assert nearest(frame, painter.camera.to_pixels(trail[-5, 0]), LIGHT.trail(0), reach=3) < 110
+        assert (
+            nearest(frame, painter.camera.to_pixels(trail[-5, 0]), choose_trail_color(LIGHT, 0), reach=3)
+            < 110
+        )
 
     def test_large_teams_are_in_one_quiet_color(self):
         trail = straight(40, 12) * np.array([1.0, 0.55])

@@ -9,9 +9,10 @@ from robocov.controllers.atlas import Atlas
 from robocov.planning.discovered_map import FREE, PRESUMED_WALL, WALL, DiscoveredMap
 from robocov.planning.raster import Raster
 from robocov.team import Team
+from robocov_app.look.colors import mix
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.knowledge import discovered_map
 from robocov_app.render.scene import Sensed
-from robocov_app.render.theme import DARK, LIGHT, mix
 
 
 def scene(selected: int | None = 0):

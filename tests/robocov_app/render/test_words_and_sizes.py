@@ -4,17 +4,17 @@ import numpy as np
 import pygame
 import pytest
 
+from robocov_app.look.colors import mix, parse_hex_color
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.canvas import clipped_polygon, clipped_segment
 from robocov_app.render.density import cost_label
 from robocov_app.render.distance_field import round_limit, ticks
 from robocov_app.render.layout import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
 from robocov_app.render.surface_cache import Latest, kept
-from robocov_app.render.theme import mix, rgb
 
 
 def test_colors() -> None:
-    assert rgb("88CCEE") == (136, 204, 238)
+    assert parse_hex_color("88CCEE") == (136, 204, 238)
     assert mix((0, 0, 0), (200, 100, 50), 0.5) == (100, 50, 25)
 
 

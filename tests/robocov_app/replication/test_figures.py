@@ -11,7 +11,7 @@ from robocov.metrics import CostHistory
 from robocov.voronoi import partition
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.page import tone
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.replication.paper_figures import FIGURES, WIDE_PX, draw_figure
 from robocov_app.replication.results import FigureRun
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from robocov.observation.region import Region
-from robocov_app.render.theme import DARK, LIGHT, contrast
+from robocov_app.look.colors import compute_contrast
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.replication.height_plot import PENTAGON, draw_heights, find_sensor_optima
 
 HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
@@ -48,4 +49,4 @@ def test_the_plot_shows_the_path_in_its_frame(theme) -> None:
     boxes = [each.get_window_extent() for each in frame.texts]
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
     assert all(frame.bbox.x0 < box.x0 and box.x1 < frame.bbox.x1 for box in boxes)
-    assert contrast(tuple(round(255 * c) for c in frame.texts[0].get_color()), theme.background) > 7
+    assert compute_contrast(tuple(round(255 * c) for c in frame.texts[0].get_color()), theme.background) > 7

@@ -16,8 +16,8 @@ from reported_results import HOSTILE, entry, falling, walk, watched
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.voronoi import partition
-from robocov_app.figures.styles import curve_styles
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.curve_styles import choose_controller_styles
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.report.document import report
 from robocov_app.report.replay import ReplayRun, asset, embedded_map, embedded_run, replay_html
 from robocov_app.report.results import Damaged
@@ -429,7 +429,7 @@ def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_
         + "const [data, times] = arguments; const run = new Run(data, new Plan(data.plan, () => {}));"
         + "return [times.map((time) => run.statesAt(time)), run.events.map(({said}) => said)]"
     )
-    data = embedded_run(run, 0, curve_styles(["rapf"])["rapf"], 5.0, goals=True)
+    data = embedded_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, goals=True)
     states, said = browser.js(script, {**data, "plan": embedded_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
     assert states == [[1, 1, 0, 1], [1, 2, 0, 1], [1, 2, 0, 1], [1, 2, 1, 1]]
     assert said == ["robot 2 fails", "robot 3 joins"]

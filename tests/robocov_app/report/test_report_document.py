@@ -15,7 +15,7 @@ from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
 from robocov.text import escape_controls
-from robocov_app.figures.styles import MARKS
+from robocov_app.look.curve_styles import MARKER_PATHS
 from robocov_app.report.document import MOST_LETTERS, report
 from robocov_app.report.results import Damaged
 from robocov_app.runs.saved_runs import SavedRun
@@ -240,10 +240,10 @@ def test_a_page_knows_its_own(tmp_path) -> None:
 
 
 def test_marks_are_those_of_the_plots() -> None:
-    from robocov_app.figures.styles import curve_styles
+    from robocov_app.look.curve_styles import choose_controller_styles
 
-    styles = curve_styles(["rapf", "rpf", "lloyd", *"abcdefghijklmnop"]).values()
-    assert {style.mark for style in styles} == MARKS.keys()
+    styles = choose_controller_styles(["rapf", "rpf", "lloyd", *"abcdefghijklmnop"]).values()
+    assert {style.mark for style in styles} == MARKER_PATHS.keys()
     assert len({(style.name, style.mark) for style in styles}) == len(styles)
 
 

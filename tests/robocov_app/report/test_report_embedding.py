@@ -15,7 +15,7 @@ from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov.team import Team
 from robocov.text import escape_controls
-from robocov_app.figures.styles import curve_styles
+from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.report.pictures import has_path, lives
 from robocov_app.report.replay import (
     NONE,
@@ -29,7 +29,7 @@ from robocov_app.report.replay import (
     script_json,
 )
 
-STYLE = curve_styles(["rapf"])["rapf"]
+STYLE = choose_controller_styles(["rapf"])["rapf"]
 
 
 def read_back(text: str, low: float, high: float) -> np.ndarray:

@@ -16,14 +16,14 @@ from robocov_app.figures.results import (
     plot_gain_grid,
     plot_gains,
 )
-from robocov_app.figures.styles import curve_styles
-from robocov_app.render.theme import LIGHT
+from robocov_app.look.curve_styles import choose_controller_styles
+from robocov_app.look.theme import LIGHT
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.theme_css import named_colors
 
 RNG = np.random.default_rng(5)
 TIME = np.linspace(0.0, 10.0, 40)
-STYLES = curve_styles(["rapf", "rpf", "lloyd", "mine"])
+STYLES = choose_controller_styles(["rapf", "rpf", "lloyd", "mine"])
 PANEL = 420, 290
 FIGURES = {
     "bands": lambda name="RAPF": plot_cost_bands(

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.render.theme import DARK, HEAT_LEVELS, LIGHT, contrast, rgb
+from robocov_app.look.colors import compute_contrast, parse_hex_color
+from robocov_app.look.theme import DARK, HEAT_LEVELS, LIGHT
 from robocov_app.report.theme_css import hex_code, named_colors, theme_rules, variables
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
@@ -19,7 +20,7 @@ def test_both_themes_have_the_same_names() -> None:
     assert list(named_colors(LIGHT)) == list(named_colors(DARK))
     assert declared(variables(DARK)).keys() == named_colors(DARK).keys()
     assert declared(variables(DARK))["ink"] == hex_code(DARK.ink)
-    assert rgb(hex_code((1, 171, 255))[1:]) == (1, 171, 255)
+    assert parse_hex_color(hex_code((1, 171, 255))[1:]) == (1, 171, 255)
 
 
 @THEMES
@@ -28,20 +29,20 @@ def test_all_that_is_written_can_be_read(theme, ground) -> None:
     colors = named_colors(theme)
     curves = [*theme.controllers, *(f"other-{k}" for k in range(len(theme.others)))]
     for name in ("ink", "faint", "accent", *curves):
-        assert contrast(colors[name], colors[ground]) >= 4.5, (theme.name, name, ground)
+        assert compute_contrast(colors[name], colors[ground]) >= 4.5, (theme.name, name, ground)
     for name in ("warning", "final", "trajectory", "start", "boundary"):
-        assert contrast(colors[name], colors[ground]) >= 3.0, (theme.name, name, ground)
+        assert compute_contrast(colors[name], colors[ground]) >= 3.0, (theme.name, name, ground)
 
 
 @THEMES
 def test_what_is_written_on_colors_can_be_read(theme) -> None:
     colors = named_colors(theme)
-    assert contrast(colors["on-accent"], colors["accent"]) >= 4.5
-    assert contrast(colors["on-final"], colors["final"]) >= 4.5
+    assert compute_contrast(colors["on-accent"], colors["accent"]) >= 4.5
+    assert compute_contrast(colors["on-final"], colors["final"]) >= 4.5
     for k in range(HEAT_LEVELS):
-        assert contrast(colors["ink"], colors[f"heat-{k}"]) >= 4.5
+        assert compute_contrast(colors["ink"], colors[f"heat-{k}"]) >= 4.5
     for k in range(len(theme.robots)):
-        assert contrast(colors["trajectory"], colors[f"cell-{k}"]) >= 3.0
+        assert compute_contrast(colors["trajectory"], colors[f"cell-{k}"]) >= 3.0
 
 
 def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:

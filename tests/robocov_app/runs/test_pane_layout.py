@@ -5,8 +5,8 @@ import pytest
 from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 from robocov.metrics import CostHistory
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.picture import pane_layers
-from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.runs.frames import draw_frames, select_frame_rows
 from robocov_app.runs.pane_layout import build_pane_layout, tile_frames
 from robocov_app.runs.settings import VideoSettings

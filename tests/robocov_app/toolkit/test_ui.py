@@ -11,7 +11,7 @@ import pytest
 from driven_window import opened
 
 from robocov.errors import InputError
-from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Commands, Menu, Takes, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, file_choice

@@ -15,9 +15,9 @@ from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.simulation import Simulation
+from robocov_app.look.theme import LIGHT
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import LIGHT
 from robocov_app.runs.saved_runs import load_saved_runs
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.controller_choice import ControllerChoice

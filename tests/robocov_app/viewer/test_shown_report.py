@@ -4,7 +4,7 @@ import numpy as np
 import pygame
 import pytest
 
-from robocov_app.render.theme import THEMES
+from robocov_app.look.theme import THEMES
 from robocov_app.toolkit.ui import Ui
 from robocov_app.viewer.explain import Line, Report
 from robocov_app.viewer.panel import show_report

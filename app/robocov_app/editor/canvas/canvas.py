@@ -22,13 +22,13 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
 from robocov_app.editor.tools.tool import DrawState
+from robocov_app.look.theme import Theme
 from robocov_app.render import annotations, heatmaps
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import range_label, value_range
 from robocov_app.render.fonts import shortened
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Theme
 from robocov_app.toolkit.layout import Layout, inside
 
 # Lengths in pixels at scale 1.

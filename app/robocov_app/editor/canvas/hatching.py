@@ -8,7 +8,7 @@ from shapely import total_bounds
 from robocov_app.editor.canvas.outlines import Outline, build_outline
 from robocov_app.editor.canvas.view import View, compute_pixel_box
 from robocov_app.editor.model.measurement import Measurement
-from robocov_app.render.theme import Color
+from robocov_app.look.colors import Color
 
 HATCH_STEP_PX = 7  # between slanted lines, at scale 1
 CUT_OFF_FORCE = "repulsion_robots"  # the force whose color areas have that are cut off

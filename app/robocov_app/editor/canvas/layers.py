@@ -16,11 +16,11 @@ from robocov_app.editor.edits import paths
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.tools.tool import CarriedItems, compute_frame, list_handles
+from robocov_app.look.colors import Color, mix
 from robocov_app.render import marks, sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layout import fitted_radii
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Color, mix
 
 MANY_OBJECTS = 200  # outlines of more selected objects are drawn once, and then as a picture
 DRAGGED_TINT = 0.22  # share of the accent color in obstacles that are dragged

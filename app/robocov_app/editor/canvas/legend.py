@@ -8,8 +8,8 @@ from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.hatching import CUT_OFF_FORCE, draw_hatch_page
 from robocov_app.editor.canvas.view import choose_outside_color
 from robocov_app.editor.model.measurement import Measurement
+from robocov_app.look.colors import mix
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
-from robocov_app.render.theme import mix
 
 
 def build_legend_entries(

@@ -19,10 +19,11 @@ from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import KNOB_HEIGHT_PX, DrawState, Handle
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import FARTHEST_PIXEL
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.theme import Color, Theme, mix
 from robocov_app.toolkit.overlay import tag
 
 # Lengths in pixels at scale 1.

@@ -14,11 +14,12 @@ from robocov_app.editor.canvas.reference_image import ReferenceImage
 from robocov_app.editor.canvas.view import View, choose_outside_color, compute_pixel_box
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import LIGHT
 from robocov_app.render import fonts, heatmaps
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import LIGHT, Color, mix
 
 # Lengths in pixels at scale 1.
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid

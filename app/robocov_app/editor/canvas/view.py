@@ -8,9 +8,11 @@ import numpy as np
 import pygame
 from pygame import Rect, Surface
 
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.theme import LIGHT, Color, Theme, mix, robot_hues
 
 MAX_RECT_PX = 30_000  # coordinates of rectangles are limited to this
 
@@ -52,7 +54,7 @@ class View:
 
     def build_canvas(self, surface: Surface) -> Canvas:
         """Return a canvas that draws on a surface."""
-        return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
+        return Canvas(surface, self.camera, self.theme, self.scale, choose_robot_hues(0))
 
     def build_page(self) -> Canvas:
         """Return a transparent canvas as large as the window."""

@@ -14,11 +14,12 @@ from robocov_app.editor.ui.import_sheet import ColorSheet
 from robocov_app.editor.ui.importing import Imported
 from robocov_app.formats.geometry.comparison import ImportComparison
 from robocov_app.formats.reports import format_area
+from robocov_app.look.colors import Color
+from robocov_app.look.theme import Theme
 from robocov_app.render import layout
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Color, Theme
 from robocov_app.toolkit.ui import SMALL
 
 # Lengths in pixels at scale 1.

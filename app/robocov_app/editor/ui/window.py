@@ -20,7 +20,7 @@ from robocov_app.editor.ui.play_mode import PlayWindow, TrialDrafts, build_trial
 from robocov_app.editor.ui.pointer import Pointer
 from robocov_app.editor.ui.tool_text import type_for_tool
 from robocov_app.editor.ui.typed_commands import list_typed_commands
-from robocov_app.render.theme import theme_named
+from robocov_app.look.theme import get_theme
 from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
 from robocov_app.toolkit.display import set_title
 from robocov_app.toolkit.input import OF_THE_MOUSE, show_cursor
@@ -254,7 +254,7 @@ class EditorWindow(BaseWindow):
         if key == self._arranged:
             return
         self._arranged = key
-        self.theme = theme_named(editor.theme)
+        self.theme = get_theme(editor.theme)
         self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)

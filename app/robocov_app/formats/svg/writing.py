@@ -14,7 +14,7 @@ from robocov_app.formats.geometry.primitives import transform_numbers
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.options import WriteOptions
 from robocov_app.formats.reports import ExportReport
-from robocov_app.render.theme import DARK, LIGHT, Theme
+from robocov_app.look.theme import DARK, LIGHT, Theme
 
 DEFAULT_DIGITS = 3
 """Decimals of millimeters: at true scale, as fine as the free space is known."""

@@ -5,16 +5,9 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from robocov.errors import ParameterError
-from robocov_app.render.theme import (
-    MAP_COLORS,
-    ONE_HUE_EACH,
-    THEMES,
-    contrast,
-    mix,
-    readable_on,
-    robot_hues,
-    theme_named,
-)
+from robocov_app.look.colors import choose_text_color, compute_contrast, mix
+from robocov_app.look.robot_colors import MAX_OWN_HUES, N_SHARED_HUES, choose_robot_hues, choose_trail_color
+from robocov_app.look.theme import THEMES, get_theme
 
 
 def adjacency_of(points: np.ndarray) -> np.ndarray:
@@ -24,66 +17,66 @@ def adjacency_of(points: np.ndarray) -> np.ndarray:
 
 
 def test_contrast_of_black_on_white_is_21():
-    assert contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21.0)
-    assert contrast((90, 90, 90), (90, 90, 90)) == pytest.approx(1.0)
+    assert compute_contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21.0)
+    assert compute_contrast((90, 90, 90), (90, 90, 90)) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("theme", THEMES.values(), ids=lambda theme: theme.name)
 class TestReadability:
     def test_text(self, theme):
-        assert contrast(theme.ink, theme.background) >= 10
-        assert contrast(theme.faint, theme.background) >= 4.5
-        assert contrast(theme.ink, theme.panel) >= 10
+        assert compute_contrast(theme.ink, theme.background) >= 10
+        assert compute_contrast(theme.faint, theme.background) >= 4.5
+        assert compute_contrast(theme.ink, theme.panel) >= 10
 
     def test_numbers_on_robots(self, theme):
         for fill in theme.robots:
-            assert contrast(readable_on(fill), fill) >= 4.0
+            assert compute_contrast(choose_text_color(fill), fill) >= 4.0
 
     def test_marks_and_curves_on_the_page(self, theme):
         marks = [theme.start, theme.final, theme.trajectory, theme.others[0], theme.velocity]
         marks += [*theme.controllers.values(), *theme.forces.values()]
         for mark in marks:
-            assert contrast(mark, theme.background) >= 3.0
+            assert compute_contrast(mark, theme.background) >= 3.0
 
     def test_starts_and_trajectories_on_every_cell(self, theme):
-        for hue in range(ONE_HUE_EACH):
-            assert contrast(theme.trajectory, theme.cell(hue)) >= 2.0
-            assert contrast(theme.start, theme.cell(hue)) >= 2.0
+        for hue in range(MAX_OWN_HUES):
+            assert compute_contrast(theme.trajectory, theme.get_cell_color(hue)) >= 2.0
+            assert compute_contrast(theme.start, theme.get_cell_color(hue)) >= 2.0
 
     def test_trails_can_be_followed_on_their_cells_and_differ(self, theme):
-        trails = [theme.trail(hue) for hue in range(ONE_HUE_EACH)]
-        assert len(set(trails)) == ONE_HUE_EACH
+        trails = [choose_trail_color(theme, hue) for hue in range(MAX_OWN_HUES)]
+        assert len(set(trails)) == MAX_OWN_HUES
         for hue, trail in enumerate(trails):
-            assert contrast(trail, theme.cell(hue)) >= 2.4
-            assert contrast(trail, theme.background) >= 2.4
+            assert compute_contrast(trail, theme.get_cell_color(hue)) >= 2.4
+            assert compute_contrast(trail, theme.background) >= 2.4
 
     def test_controllers_of_ones_own_differ_from_all_others(self, theme):
         curves = [*theme.controllers.values(), *theme.others]
         apart = np.abs(np.array(curves, dtype=float)[:, None] - curves).max(axis=2)
         assert (apart + 1000 * np.eye(len(curves))).min() >= 60
         for curve in curves:
-            assert contrast(curve, theme.background) >= 4.5
+            assert compute_contrast(curve, theme.background) >= 4.5
 
     def test_hues_differ(self, theme):
-        assert len(set(theme.robots)) == ONE_HUE_EACH
-        cells = np.array([theme.cell(hue) for hue in range(MAP_COLORS)], dtype=float)
-        apart = np.abs(cells[:, None] - cells[None]).max(axis=2) + 1000 * np.eye(MAP_COLORS)
+        assert len(set(theme.robots)) == MAX_OWN_HUES
+        cells = np.array([theme.get_cell_color(hue) for hue in range(N_SHARED_HUES)], dtype=float)
+        apart = np.abs(cells[:, None] - cells[None]).max(axis=2) + 1000 * np.eye(N_SHARED_HUES)
         assert apart.min() >= 9
 
     def test_the_papers_colors(self, theme):
-        red, green, blue = theme.controller("rapf")
+        red, green, blue = theme.get_controller_color("rapf")
         assert blue > red and blue > green
-        red, green, blue = theme.controller("rpf")
+        red, green, blue = theme.get_controller_color("rpf")
         assert red > green and red > blue
         assert theme.start[1] == max(theme.start)
         assert theme.final[2] == max(theme.final)
         assert theme.trajectory[0] == max(theme.trajectory)
-        assert theme.controller("somebody's own") == theme.others[0]
+        assert theme.get_controller_color("somebody's own") == theme.others[0]
 
 
 def test_unknown_theme_is_named_with_the_nearest():
     with pytest.raises(ParameterError, match="did you mean 'dark'"):
-        theme_named("drak")
+        get_theme("drak")
 
 
 def test_mix_ends():
@@ -91,29 +84,29 @@ def test_mix_ends():
     assert mix((1, 2, 3), (101, 202, 203), 1.0) == (101, 202, 203)
 
 
-@given(st.integers(1, ONE_HUE_EACH))
+@given(st.integers(1, MAX_OWN_HUES))
 def test_small_teams_have_one_hue_each(n):
-    assert robot_hues(n).tolist() == list(range(n))
+    assert choose_robot_hues(n).tolist() == list(range(n))
 
 
 @settings(deadline=None, max_examples=40)
-@given(st.integers(ONE_HUE_EACH + 1, 150), st.integers(0, 10_000))
+@given(st.integers(MAX_OWN_HUES + 1, 150), st.integers(0, 10_000))
 def test_cells_of_large_teams_differ_from_their_neighbors(n, seed):
     adjacency = adjacency_of(np.random.default_rng(seed).uniform(size=(n, 2)))
-    hues = robot_hues(n, adjacency)
-    assert hues.min() >= 0 and hues.max() < MAP_COLORS
+    hues = choose_robot_hues(n, adjacency)
+    assert hues.min() >= 0 and hues.max() < N_SHARED_HUES
     assert (hues[adjacency[:, 0]] != hues[adjacency[:, 1]]).all()
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.integers(ONE_HUE_EACH + 1, 80), st.integers(0, 10_000))
+@given(st.integers(MAX_OWN_HUES + 1, 80), st.integers(0, 10_000))
 def test_colors_stay_but_for_cells_that_conflict(n, seed):
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(n, 2))
-    before = robot_hues(n, adjacency_of(points))
-    assert robot_hues(n, adjacency_of(points), before).tolist() == before.tolist()
+    before = choose_robot_hues(n, adjacency_of(points))
+    assert choose_robot_hues(n, adjacency_of(points), before).tolist() == before.tolist()
     adjacency = adjacency_of(points + rng.normal(scale=0.01, size=(n, 2)))
-    after = robot_hues(n, adjacency, before)
+    after = choose_robot_hues(n, adjacency, before)
     assert (after[adjacency[:, 0]] != after[adjacency[:, 1]]).all()
     conflicts = int((before[adjacency[:, 0]] == before[adjacency[:, 1]]).sum())
     # a conflict may push a neighbor aside, which pushes another, but the rest of the map keeps its colors
@@ -126,11 +119,11 @@ def test_a_wheel_with_too_many_spokes_is_colored_afresh():
     spokes = [(0, i) for i in range(1, 12)]
     adjacency = np.sort(np.array(ring + spokes), axis=1)
     before = np.array([0, 0, 1, 2, 3, 4, 5, 1, 2, 3, 4, 5])
-    after = robot_hues(12, adjacency, before)
+    after = choose_robot_hues(12, adjacency, before)
     assert (after[adjacency[:, 0]] != after[adjacency[:, 1]]).all()
 
 
 def test_without_adjacency_hues_take_turns_and_stay():
-    hues = robot_hues(20)
-    assert set(hues.tolist()) == set(range(MAP_COLORS))
-    assert robot_hues(20, None, hues[::-1].copy()).tolist() == hues[::-1].tolist()
+    hues = choose_robot_hues(20)
+    assert set(hues.tolist()) == set(range(N_SHARED_HUES))
+    assert choose_robot_hues(20, None, hues[::-1].copy()).tolist() == hues[::-1].tolist()

@@ -1,0 +1,13 @@
+"""The look of pictures: colors, axes, labels and legends, decided once for all back ends.
+
+`pygame` (windows and videos, in `render`), matplotlib (files, in `figures`) and JavaScript (the replay in
+`report`) draw pictures. All of them take their decisions from here, so that the same run looks the same
+everywhere. Nothing in this package draws.
+
+- `colors`, `theme`: colors, their contrast, and the light and the dark theme.
+- `robot_colors`: hues of robots and of their cells; colors of trajectories.
+- `curve_styles`: color, dashes and marker of the curve of each controller.
+- `axes`: limits and ticks of axes.
+- `labels`: places of labels side by side, and texts that fit in.
+- `legend`: names of the elements of a picture, and one legend for several pictures.
+"""

@@ -1,0 +1,172 @@
+"""Limits and ticks of the axes of curves.
+
+One rule holds in windows, figures and replays. An axis of values starts at zero if the curves then still use
+60 % of its height: proportions can be read off, and little space is lost. Otherwise it starts just below the
+lowest value, since controllers often differ by only a few percent.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+
+MAX_LOW_FRACTION = 0.4
+"""An axis starts at zero if its lowest value is below this fraction of its highest."""
+VALUE_MARGIN = 0.08
+"""Free space above and below the values, as a fraction of their range."""
+TICK_FACTORS = (1, 2, 5, 10)
+"""Steps between ticks are one of these times a power of ten."""
+MAX_VALUE_INTERVALS = 6
+"""Maximum number of intervals between the ticks of an axis of values."""
+MAX_TIME_INTERVALS = 8
+"""Maximum number of intervals between the ticks of an axis of times."""
+MIN_TIME_LIMIT_S = 10.0
+"""A growing axis of times shows at least this many seconds."""
+_MIN_VALUE = 1e-3
+"""Equal values that are nearer to zero than this get the axis of this value."""
+
+
+class Axis(NamedTuple):
+    """Limits of an axis, and the step between its ticks."""
+
+    start: float
+    end: float
+    step: float
+
+    @property
+    def ticks(self) -> Array:
+        """Multiples of the step within the limits."""
+        return list_ticks(self.start, self.end, self.step)
+
+
+def choose_value_limits(
+    low: float, high: float, *, margin: float = VALUE_MARGIN, origin: float = 0.0
+) -> tuple[float, float]:
+    """Choose the limits of an axis of values.
+
+    Parameters
+    ----------
+    low, high : float
+        Lowest and highest value, finite.
+    margin : float
+        Free space on both sides as a fraction of the range.
+    origin : float
+        Value from which proportions are read: 0 of distances, 1 of ratios.
+
+    Returns
+    -------
+    start, end : float
+
+    Examples
+    --------
+    >>> choose_value_limits(2.0, 6.0)
+    (0.0, 6.32)
+    >>> choose_value_limits(5.0, 6.0)
+    (4.92, 6.08)
+    """
+    if high > low:
+        space = margin * (high - low)
+    else:
+        space = 0.1 * max(abs(high), _MIN_VALUE)
+    is_near_origin = 0.0 <= low - origin < MAX_LOW_FRACTION * (high - origin)
+    start = origin if is_near_origin else low - space
+    return start, high + space
+
+
+def choose_tick_step(span: float, max_intervals: float) -> float:
+    """Choose a round step that divides a span into few enough intervals.
+
+    Parameters
+    ----------
+    span : float
+        Length of the axis, positive.
+    max_intervals : float
+        Maximum number of intervals.
+
+    Returns
+    -------
+    float
+        The smallest of 1, 2 and 5 times a power of ten that is large enough.
+
+    Examples
+    --------
+    >>> [choose_tick_step(span, 6) for span in (0.5, 6.0, 60.0, 70.0)]
+    [0.1, 1.0, 10.0, 20.0]
+    """
+    min_step = span / max(max_intervals, 1.0)
+    power = 10.0 ** math.floor(math.log10(min_step))
+    # A step that is too small by a rounding error is large enough.
+    step = next(factor * power for factor in TICK_FACTORS if factor * power >= 0.999 * min_step)
+    return float(f"{step:.12g}")
+
+
+def list_ticks(start: float, end: float, step: float) -> Array:
+    """Return the multiples of a step from `start` to `end`, both included."""
+    first = math.ceil(start / step - 1e-9)
+    last = math.floor(end / step + 1e-9)
+    return np.asarray(step * np.arange(first, last + 1))
+
+
+def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> Axis:
+    """Choose the axis of curves that grow while they are watched.
+
+    Its start is a multiple of the step, so that it moves seldom.
+
+    Parameters
+    ----------
+    low, high : float
+        Lowest and highest value so far; nan if there is none.
+    max_intervals : float
+        Maximum number of intervals between ticks.
+
+    Returns
+    -------
+    Axis
+
+    Examples
+    --------
+    >>> choose_growing_value_axis(0.9, 3.2, 4)
+    Axis(start=0.0, end=3.384, step=1.0)
+    """
+    if not math.isfinite(low) or not math.isfinite(high) or high <= 0.0:
+        return Axis(0.0, 1.0, 0.5)
+    start, end = choose_value_limits(low, high)
+    start = max(start, 0.0)
+    step = choose_tick_step(end - start, max_intervals)
+    start = float(f"{step * math.floor(start / step):.12g}")
+    return Axis(start, float(f"{end:.6g}"), step)
+
+
+def choose_growing_time_limit(end_s: float) -> float:
+    """Choose where the axis of times ends while time passes.
+
+    It ends a little after the present, at a round time, so that it moves seldom.
+
+    Examples
+    --------
+    >>> [choose_growing_time_limit(t) for t in (0.0, 9.0, 9.9, 61.0)]
+    [10.0, 10.0, 15.0, 70.0]
+    """
+    if end_s <= 0.96 * MIN_TIME_LIMIT_S:
+        return MIN_TIME_LIMIT_S
+    if end_s < 40.0:
+        step = round_down(max(end_s / 4.0, 1.0)) / 2.0
+    else:
+        step = round_down(end_s / 5.0)
+    step = max(step, 5.0)
+    return float(math.ceil((end_s * 1.03 + 1e-9) / step) * step)
+
+
+def round_down(number: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above a positive number.
+
+    Examples
+    --------
+    >>> [round_down(number) for number in (0.7, 1.0, 3.9, 49.0)]
+    [0.5, 1.0, 2.0, 20.0]
+    """
+    power = 10.0 ** math.floor(math.log10(number) + 1e-12)
+    factor = max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= number * (1 + 1e-9))
+    return float(f"{factor * power:.12g}")

@@ -1,0 +1,176 @@
+"""Hues of robots and of their cells, and the colors of trajectories.
+
+A small team has one hue for each robot. No eye tells more than nine hues apart, so the cells of a larger team
+are colored like a map: only cells that share an edge must differ.
+"""
+
+from heapq import heapify, heappop, heappush
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from robocov.arrays import IntArray
+from robocov_app.look.colors import Color, compute_contrast, mix
+from robocov_app.look.theme import Theme
+
+MAX_OWN_HUES = 9
+"""Maximum number of robots that each have a hue of their own."""
+N_SHARED_HUES = 6
+"""Number of hues of a larger team."""
+MIN_TRAIL_CONTRAST = 2.4
+"""Minimum contrast of the trajectory of a robot with its cell."""
+
+ColorScheme: TypeAlias = Literal["paper", "robots"]
+"""Colors of robots and trajectories.
+
+"paper" has those of the article: red trajectories, blue final positions and pale cells, legible in print and
+in small pictures. "robots" gives each robot its own hue, so that one can follow a single robot.
+"""
+
+
+def choose_robot_hues(
+    n: int, adjacency: IntArray | None = None, previous: IntArray | None = None
+) -> IntArray:
+    """Choose the hue of each robot and of its cell.
+
+    Parameters
+    ----------
+    n : int
+        Number of robots.
+    adjacency : (m, 2) int array, optional
+        Pairs of robots whose cells share an edge. If given, the two hues differ, except where a cell has so
+        many neighbors that all hues are taken.
+    previous : (n,) int array, optional
+        Hues of the previous frame. They are changed as little as possible, so that cells do not flicker.
+
+    Returns
+    -------
+    (n,) int array
+        Indices into `Theme.robots`: one for each robot up to `MAX_OWN_HUES`, else below `N_SHARED_HUES`.
+    """
+    if n <= MAX_OWN_HUES:
+        return np.arange(n, dtype=np.intp)
+    if previous is not None and len(previous) != n:
+        previous = None
+    if adjacency is None:
+        return np.arange(n, dtype=np.intp) % N_SHARED_HUES if previous is None else previous
+    if previous is not None:
+        repaired = _repair_hues(previous.copy(), adjacency)
+        if repaired is not None:
+            return repaired
+    return _color_graph(n, adjacency)
+
+
+def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
+    """Change the hues of cells that conflict, and of few others; return None if that does not end."""
+    visits = np.zeros(len(hues), dtype=int)
+    flat = adjacency.ravel()
+    hue_pairs = hues[adjacency]
+    is_conflict = hue_pairs[:, 0] == hue_pairs[:, 1]
+    waiting = np.unique(adjacency[is_conflict]).tolist()
+    while waiting:
+        cell = waiting.pop()
+        # The two ends of an edge differ in the last bit of their index in the flat array.
+        neighbors = flat[np.flatnonzero(flat == cell) ^ 1]
+        neighbor_hues = hues[neighbors].tolist()
+        if hues[cell] not in neighbor_hues:
+            continue
+        visits[cell] += 1
+        if visits[cell] > N_SHARED_HUES:
+            return None
+        offset = cell + int(visits[cell])
+        # Ties are broken differently at each visit. Otherwise two cells could swap hues forever.
+        hues[cell] = min(
+            range(N_SHARED_HUES),
+            key=lambda hue: (neighbor_hues.count(hue), (hue + offset) % N_SHARED_HUES),
+        )
+        waiting += neighbors[hues[neighbors] == hues[cell]].tolist()
+    return hues
+
+
+def _color_graph(n: int, adjacency: IntArray) -> IntArray:
+    """Color a graph by DSATUR, using all hues about equally often.
+
+    DSATUR (Brelaz, 1979) colors the vertex next that has neighbors of the most different colors. If these are
+    all, it gets the rarest of them.
+    """
+    neighbors: list[list[int]] = [[] for _ in range(n)]
+    for first, second in adjacency.tolist():
+        neighbors[first].append(second)
+        neighbors[second].append(first)
+    hues = [-1] * n
+    uses = [0] * N_SHARED_HUES
+    neighbor_hues: list[set[int]] = [set() for _ in range(n)]
+    # Entries of the heap become outdated when a neighbor is colored. They are skipped, not removed.
+    waiting = [(0, -len(neighbors[vertex]), vertex) for vertex in range(n)]
+    heapify(waiting)
+    while waiting:
+        saturation, _, vertex = heappop(waiting)
+        if hues[vertex] >= 0 or -saturation < len(neighbor_hues[vertex]):
+            continue
+        taken = [hues[neighbor] for neighbor in neighbors[vertex]]
+        hue = min(range(N_SHARED_HUES), key=lambda hue: (taken.count(hue), uses[hue], hue))
+        hues[vertex] = hue
+        uses[hue] += 1
+        for neighbor in neighbors[vertex]:
+            if hues[neighbor] < 0 and hue not in neighbor_hues[neighbor]:
+                neighbor_hues[neighbor].add(hue)
+                heappush(waiting, (-len(neighbor_hues[neighbor]), -len(neighbors[neighbor]), neighbor))
+    return np.array(hues, dtype=np.intp)
+
+
+def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> list[Color]:
+    """Choose the color of the trajectory of each robot.
+
+    In a team that is too large for a hue of each robot, trajectories would have the colors of the cells that
+    they cross. They are all red then, as in the scheme of the paper, but paler, since they are many.
+
+    Parameters
+    ----------
+    theme : Theme
+    hues : list of int
+        Hue of each robot, see `choose_robot_hues`.
+    scheme : {"paper", "robots"}
+
+    Returns
+    -------
+    list of Color
+    """
+    if scheme == "paper":
+        return [theme.trajectory] * len(hues)
+    if len(hues) > MAX_OWN_HUES:
+        return [mix(theme.trajectory, theme.background, 0.25)] * len(hues)
+    return [choose_trail_color(theme, hue) for hue in hues]
+
+
+def choose_trail_color(theme: Theme, hue: int) -> Color:
+    """Choose the color of a trajectory: its robot's hue, as much darker as its cell demands."""
+    cell_color = theme.get_cell_color(hue)
+    fraction = 0.12
+    color = mix(theme.robots[hue], theme.ink, fraction)
+    while compute_contrast(color, cell_color) < MIN_TRAIL_CONTRAST:
+        fraction += 0.04
+        color = mix(theme.robots[hue], theme.ink, fraction)
+    return color
+
+
+def choose_curve_colors(controllers: list[str], theme: Theme) -> list[Color]:
+    """Choose a color for each curve: its controller's, or another one if that is taken.
+
+    Parameters
+    ----------
+    controllers : list of str
+        Names of the controllers; several curves may have the same.
+    theme : Theme
+
+    Returns
+    -------
+    list of Color
+        All different as long as there are enough colors.
+    """
+    chosen: list[Color] = []
+    for controller in controllers:
+        candidates = [theme.get_controller_color(controller), *theme.others]
+        free = [color for color in candidates if color not in chosen]
+        chosen.append(free[0] if free else candidates[0])
+    return chosen

@@ -1,0 +1,237 @@
+"""The light and the dark theme: colors, line widths and text sizes of everything that is drawn."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.errors import ParameterError, describe_unknown_name
+from robocov_app.look.colors import Color, compute_luminance, mix, parse_hex_color
+
+HEAT_LEVELS = 12
+"""Number of colors of a grid of numbers."""
+_QUIET_FRACTION = 0.55
+"""Fraction of the heat scale that grids of numbers use. On all of it, their text could not be read."""
+_MIN_HUE_LUMINANCE = 0.16
+"""Luminance below which a hue would sink into the background of the dark theme."""
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colors and sizes of pictures. Line widths and text sizes are pixels at scale 1.
+
+    Attributes
+    ----------
+    name : str
+        "light" or "dark".
+    background, panel : Color
+        Behind maps and curves, and behind the controls of windows.
+    ink, faint : Color
+        Of texts, and of texts that matter less.
+    grid, boundary, obstacle, obstacle_edge, cell_edge, robot_ring, velocity, unreached : Color
+        Of what their names say. `unreached` is free space that no robot can reach.
+    start, final, trajectory : Color
+        The article's green, blue and red.
+    controllers : dict of str to Color
+        Curves of the article's controllers.
+    others : tuple of Color
+        Curves of other controllers.
+    forces : dict of str to Color
+        Arrows of the terms of a controller.
+    robots : tuple of Color
+        Hues of robots, see `robot_colors`.
+    heat : tuple of Color
+        Scale of distances, from near to far.
+    density, density_strength : Color, float
+        Color of the density, and its opacity where it is highest.
+    tint, paper_tint : float
+        Fraction of the robot's hue in the color of a cell, and that in the scheme of the paper.
+    text, small_text, line, trajectory_line, boundary_line, arrow_line : float
+        Sizes of texts and widths of lines.
+    """
+
+    name: str
+    background: Color
+    panel: Color
+    ink: Color
+    faint: Color
+    grid: Color
+    boundary: Color
+    obstacle: Color
+    obstacle_edge: Color
+    cell_edge: Color
+    robot_ring: Color
+    start: Color
+    final: Color
+    trajectory: Color
+    velocity: Color
+    controllers: dict[str, Color]
+    others: tuple[Color, ...]
+    forces: dict[str, Color]
+    robots: tuple[Color, ...]
+    heat: tuple[Color, ...]
+    unreached: Color
+    density: Color
+    density_strength: float
+    tint: float
+    paper_tint: float
+    text: float = 12.0
+    small_text: float = 11.0
+    line: float = 1.0
+    trajectory_line: float = 1.8
+    boundary_line: float = 2.0
+    arrow_line: float = 2.0
+
+    @property
+    def moving_obstacle(self) -> Color:
+        """Color of an obstacle that moves."""
+        return mix(self.obstacle, self.background, 0.5)
+
+    @property
+    def failed_robot(self) -> Color:
+        """Color of a robot that has failed."""
+        return mix(self.background, self.ink, 0.3)
+
+    @property
+    def geodesic_border(self) -> Color:
+        """Color of the borders of geodesic cells on a map of distances."""
+        return mix(self.ink, self.background, 0.1)
+
+    @property
+    def quiet_heat(self) -> list[Color]:
+        """Colors of a grid of numbers from low to high; text in `ink` is legible on all of them."""
+        rows = [round(_QUIET_FRACTION * 199 * level / (HEAT_LEVELS - 1)) for level in range(HEAT_LEVELS)]
+        return [(int(red), int(green), int(blue)) for red, green, blue in self.build_heat_table(200)[rows]]
+
+    def get_cell_color(self, hue: int) -> Color:
+        """Return the color of the cell of a robot with a hue, an index into `robots`."""
+        return mix(self.background, self.robots[hue], self.tint)
+
+    def get_paper_cell_color(self, hue: int) -> Color:
+        """Return the paler color of a cell in the scheme of the paper."""
+        return mix(self.background, self.robots[hue], self.paper_tint)
+
+    def get_controller_color(self, name: str) -> Color:
+        """Return the color of the curves of a controller; those of other authors share one."""
+        return self.controllers.get(name, self.others[0])
+
+    def build_heat_table(self, count: int) -> NDArray[np.uint8]:
+        """Build the scale of distances with a number of colors.
+
+        Parameters
+        ----------
+        count : int
+
+        Returns
+        -------
+        (count, 3) uint8 array
+            Red, green and blue from near to far.
+        """
+        anchors = np.array(self.heat, dtype=float)
+        positions = np.linspace(0.0, len(anchors) - 1.0, count)
+        channels = [np.interp(positions, np.arange(len(anchors)), channel) for channel in anchors.T]
+        return np.asarray(np.rint(np.column_stack(channels)), dtype=np.uint8)
+
+
+# Each color has a code in the light theme and one in the dark theme.
+_COLORS = {
+    "background": ("FFFFFF", "13181F"),
+    "panel": ("F4F6FA", "1B212B"),
+    "ink": ("1B2330", "E8ECF2"),
+    "faint": ("5A6678", "9AA6B8"),
+    "grid": ("C3CCD8", "4A5566"),
+    "boundary": ("414D60", "A3AEC0"),
+    "obstacle": ("8C95A5", "485366"),
+    "obstacle_edge": ("5B6576", "8793A6"),
+    "cell_edge": ("66738A", "7A879B"),
+    "robot_ring": ("FFFFFF", "FFFFFF"),
+    "start": ("1E9E36", "46D160"),
+    "final": ("1F5FE0", "5B9BFF"),
+    "trajectory": ("D62222", "FF6B63"),
+    "velocity": ("1F5FE0", "5B9BFF"),
+    "unreached": ("E3DED4", "332E28"),
+    "density": ("B4550A", "FFB45A"),
+}
+_CONTROLLERS = {
+    "rapf": ("1F5FE0", "5B9BFF"),
+    "rpf": ("D62222", "FF6B63"),
+    "lloyd": ("118038", "46C46A"),
+}
+_FORCES = {
+    "attraction": ("0B7A6F", "2DD4BF"),
+    "repulsion_robots": ("D9480F", "FF9354"),
+    "repulsion_obstacle": ("A81E62", "FF7AB6"),
+    "viscosity": ("6B7280", "A9B4C4"),
+    "resultant": ("1B2330", "FFFFFF"),
+}
+_OTHERS = (
+    ("8A3FA8", "CF8BE8"),
+    ("7A5C00", "F0A94A"),
+    ("28303C", "E8ECF2"),
+    ("007A8A", "2DD4BF"),
+    ("D4127E", "FF5CA4"),
+)
+_HEAT = (
+    ("FBFCFE", "141B26"),
+    ("DCE6F2", "1B2F4B"),
+    ("B4CBE4", "23486F"),
+    ("86A9D3", "31668F"),
+    ("5D84BF", "4B88A6"),
+    ("3F60A2", "78ADB8"),
+    ("2A3F78", "B8D3C8"),
+)
+# Paul Tol's "muted" scheme: nine hues that color-blind readers tell apart. The first six are also far apart
+# as tints of cells, where sand and olive would look alike, so large teams use these.
+_MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "332288", "AA4499", "117733", "882255", "999933")
+
+_LIGHT_CODES = 0
+_DARK_CODES = 1
+
+
+def _build_theme(name: str, codes: int, robots: Sequence[Color], **numbers: Any) -> Theme:
+    """Build a theme from one of the two columns of codes."""
+    return Theme(
+        name=name,
+        controllers=_select_named(_CONTROLLERS, codes),
+        forces=_select_named(_FORCES, codes),
+        others=tuple(parse_hex_color(pair[codes]) for pair in _OTHERS),
+        heat=tuple(parse_hex_color(pair[codes]) for pair in _HEAT),
+        robots=tuple(robots),
+        **_select_named(_COLORS, codes),
+        **numbers,
+    )
+
+
+def _select_named(colors: dict[str, tuple[str, str]], codes: int) -> dict[str, Any]:
+    """Return the colors of one column by their names."""
+    return {name: parse_hex_color(pair[codes]) for name, pair in colors.items()}
+
+
+def _lighten(hue: Color) -> Color:
+    """Return a hue that is visible on the background of the dark theme."""
+    return mix(hue, (255, 255, 255), 0.38 if compute_luminance(hue) < _MIN_HUE_LUMINANCE else 0.0)
+
+
+_HUES = [parse_hex_color(code) for code in _MUTED]
+LIGHT = _build_theme("light", _LIGHT_CODES, _HUES, density_strength=0.5, tint=0.25, paper_tint=0.13)
+DARK = _build_theme(
+    "dark", _DARK_CODES, [_lighten(hue) for hue in _HUES], density_strength=0.45, tint=0.26, paper_tint=0.19
+)
+THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
+
+
+def get_theme(name: str | Theme) -> Theme:
+    """Return the theme of a name, or the theme itself.
+
+    Raises
+    ------
+    ParameterError
+        If there is no theme of this name.
+    """
+    if isinstance(name, Theme):
+        return name
+    if name not in THEMES:
+        raise ParameterError(describe_unknown_name("theme", name, THEMES))
+    return THEMES[name]
