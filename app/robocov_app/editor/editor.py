@@ -177,7 +177,7 @@ class Editor(Workspace):
     def _handle_change(self) -> None:
         super()._handle_change()
         self.problem = None
-        self.document.keep_aside()
+        self.document.update_draft()
         self.request_measurement()
 
     def request_measurement(self) -> None:

@@ -13,14 +13,8 @@ from driven_editor import of_map, opened_editor
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits.create import add_circle
-from robocov_app.editor.model.document import (
-    KIND,
-    Autosave,
-    build_record,
-    check_file,
-    find_recoverable,
-    write_sketch,
-)
+from robocov_app.editor.model.map_draft import KIND, MapDraft, build_draft_content, find_recoverable
+from robocov_app.editor.model.map_file import check_file, write_sketch
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.storage.autosave import Autosaver, remove_draft
 
@@ -33,7 +27,7 @@ def with_circles(count: int) -> Sketch:
 
 def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> None:
     keeper = Autosaver(folder, KIND, path)
-    keeper.save_draft(lambda: build_record(sketch, disk))
+    keeper.save_draft(lambda: build_draft_content(sketch, disk))
     keeper.close(discard=False)
 
 
@@ -42,11 +36,11 @@ def test_a_map_comes_back_with_its_file(tmp_path):
     disk = write_sketch(SKETCH, path)
     kept(tmp_path / "drafts", with_circles(5), path, disk)
     (found,) = find_recoverable(tmp_path / "drafts")
-    assert (found.path, found.name, found.obstacles, found.disk) == (path, "Hall", 5, disk)
+    assert (found.path, found.name, found.obstacles, found.version) == (path, "Hall", 5, disk)
     assert found.read_sketch() == with_circles(5)
     assert found.describe().startswith("“Hall”, 5 obstacles, today ")
     assert found.describe().endswith("not saved to hall.json")
-    assert check_file(found.disk) == "same"
+    assert check_file(found.version) == "same"
 
 
 def test_one_whose_file_holds_it_already_is_not_offered(tmp_path):
@@ -85,7 +79,7 @@ def test_words_for_days():
         (now - timedelta(hours=20), "yesterday 16:00"),
         (now - timedelta(days=9), "2030-05-08 12:00"),
     ]:
-        found = Autosave(Path("x"), Path("/maps/hall.json"), "Hall", when, 1, None)
+        found = MapDraft(Path("x"), Path("/maps/hall.json"), "Hall", when, 1, None)
         assert found.describe(now) == f"“Hall”, 1 obstacle, {words}, not saved to hall.json"
 
 

@@ -16,7 +16,7 @@ from robocov.environment import CircleObstacle, Environment, PolygonObstacle
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov_app.editor.edits import density as density_edits
-from robocov_app.editor.model.document import read_sketch, write_sketch
+from robocov_app.editor.model.map_file import read_sketch, write_sketch
 from robocov_app.editor.model.parser import build_sketch, parse_sketch
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch, dump_sketch

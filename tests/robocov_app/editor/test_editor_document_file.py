@@ -9,7 +9,9 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.edits import create, properties
-from robocov_app.editor.model.document import DEFAULT_BOUNDARY, ChangedError, Document, find_recoverable
+from robocov_app.editor.model.document import DEFAULT_BOUNDARY, Document
+from robocov_app.editor.model.map_draft import find_recoverable
+from robocov_app.editor.model.map_file import FileChangedError
 from robocov_app.editor.model.selection import Selection
 
 PILLAR = CircleObstacle((5, 5), 1.0)
@@ -17,7 +19,7 @@ PILLAR = CircleObstacle((5, 5), 1.0)
 
 def changed(document: Document, radius: float = 1.0) -> None:
     document.history.apply(create.add_circle(document.history.sketch, (5, 5), radius))
-    document.keep_aside()
+    document.update_draft()
 
 
 def test_a_new_sheet_offers_a_boundary_and_loses_nothing(tmp_path: Path) -> None:
@@ -55,7 +57,7 @@ def test_a_bundled_map_opens_as_a_copy_and_is_never_written(tmp_path: Path) -> N
     assert document.suggest_path(tmp_path).name == "rooms.json"
     before = bundled.read_bytes()
     with pytest.raises(MapError, match="comes with robocov"):
-        document.save(bundled, over=True)
+        document.save(bundled, overwrites=True)
     assert bundled.read_bytes() == before
 
 
@@ -63,10 +65,10 @@ def test_another_file_is_not_replaced_unasked(tmp_path: Path) -> None:
     target = tmp_path / "there.json"
     target.write_text("something else")
     document = Document.new(None)
-    with pytest.raises(ChangedError):
+    with pytest.raises(FileChangedError):
         document.save(target)
     assert target.read_text() == "something else"
-    document.save(target, over=True)
+    document.save(target, overwrites=True)
     assert load_map(target).area == 100.0
 
 
@@ -84,7 +86,7 @@ def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_
     assert document.check_disk(12.0) == "changed"
     assert document.check_disk(14.0) == "same"
     assert document.history.has_unsaved_changes
-    with pytest.raises(ChangedError):
+    with pytest.raises(FileChangedError):
         document.save(tmp_path / "plan.json")
     document.reload()
     assert (
@@ -110,7 +112,7 @@ def test_a_file_that_goes_is_noticed(tmp_path: Path) -> None:
     document.save(tmp_path / "plan.json")
     (tmp_path / "plan.json").unlink()
     assert document.check_disk(10.0) == "gone" and document.history.has_unsaved_changes
-    document.save(tmp_path / "plan.json", over=True)
+    document.save(tmp_path / "plan.json", overwrites=True)
     assert (tmp_path / "plan.json").exists()
 
 
@@ -164,8 +166,10 @@ def test_a_file_with_a_long_or_strange_name_names_its_map_as_far_as_it_can(tmp_p
 def test_a_map_that_cannot_run_would_spoil_a_valid_one(tmp_path):
     document = Document.new(None)
     document.save(tmp_path / "plan.json")
-    assert not document.would_spoil(tmp_path / "plan")
+    assert not document.would_replace_valid_map(tmp_path / "plan")
     document.history.apply(properties.delete(document.history.sketch, Selection(boundary=True)))
-    assert document.would_spoil(tmp_path / "plan") and not document.would_spoil(tmp_path / "new.json")
+    assert document.would_replace_valid_map(tmp_path / "plan") and not document.would_replace_valid_map(
+        tmp_path / "new.json"
+    )
     document.save(tmp_path / "plan.json")
-    assert not document.would_spoil(tmp_path / "plan"), "there is nothing more to be lost"
+    assert not document.would_replace_valid_map(tmp_path / "plan"), "there is nothing more to be lost"

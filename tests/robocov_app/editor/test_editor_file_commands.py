@@ -20,7 +20,8 @@ from robocov_app.cli import main
 from robocov_app.editor.edits import create
 from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import Document, find_recoverable
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.map_draft import find_recoverable
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.launch import editor_window, offer_recovery
 from robocov_app.editor.ui.typed_commands import run_typed_command
@@ -283,7 +284,7 @@ def test_recent_files_are_found_from_every_folder(
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
     lost = Document(sheet(), places / "drafts")
     lost.history.apply(create.add_circle(lost.history.sketch, (5, 5), 1.0))
-    lost.keep_aside()
+    lost.update_draft()
     lost.flush()
     lost.close(discard=False)
     with opening(places) as window:

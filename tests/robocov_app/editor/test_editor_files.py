@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
 from robocov.mapfile import load_map
 from robocov_app.editor.model import document
-from robocov_app.editor.model.document import ChangedError, check_file, read_sketch, write_sketch
+from robocov_app.editor.model.map_file import FileChangedError, check_file, read_sketch, write_sketch
 from robocov_app.editor.model.sketch import Sketch, dump_sketch
 
 SKETCH = Sketch("Hall", boundary=HALL)
@@ -20,7 +20,7 @@ SKETCH = Sketch("Hall", boundary=HALL)
 @given(drafts())
 def test_what_is_saved_is_opened_again(tmp_path, sketch):
     path = tmp_path / "draft.json"
-    write_sketch(sketch, path, over=True)
+    write_sketch(sketch, path, overwrites=True)
     again, disk = read_sketch(path)
     assert again == sketch
     assert check_file(disk) == "same"
@@ -35,14 +35,14 @@ def test_what_runs_can_be_loaded(tmp_path):
 def test_a_file_that_is_there_is_not_overwritten_unasked(tmp_path):
     path = tmp_path / "map.json"
     path.write_text("precious")
-    with pytest.raises(ChangedError, match="such a file already"):
+    with pytest.raises(FileChangedError, match="it already exists"):
         write_sketch(SKETCH, path)
     assert path.read_text() == "precious"
-    disk = write_sketch(SKETCH, path, over=True)
+    disk = write_sketch(SKETCH, path, overwrites=True)
     assert write_sketch(SKETCH, path, disk).digest == disk.digest
     # known of, but by another name
     (tmp_path / "other.json").write_text("precious")
-    with pytest.raises(ChangedError):
+    with pytest.raises(FileChangedError):
         write_sketch(SKETCH, tmp_path / "other.json", disk)
 
 
@@ -55,7 +55,7 @@ def test_changes_on_disk_are_noticed(tmp_path):
     text = path.read_text()
     path.write_text(text.replace("12", "13"))
     assert check_file(disk) == "changed", "of the same length"
-    with pytest.raises(ChangedError, match="changed by something else"):
+    with pytest.raises(FileChangedError, match="changed by another program"):
         write_sketch(SKETCH, path, disk)
     path.unlink()
     assert check_file(disk) == "gone"
@@ -70,10 +70,10 @@ def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
     one, _ = first.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])
     other, _ = second.with_obstacles([CircleObstacle((2.0, 2.0), 0.5)])
     disk_of_first = write_sketch(one, path, disk_of_first)
-    with pytest.raises(ChangedError):
+    with pytest.raises(FileChangedError):
         write_sketch(other, path, disk_of_second)
     assert read_sketch(path)[0] == renumbered(one)
-    write_sketch(other, path, disk_of_second, over=True)
+    write_sketch(other, path, disk_of_second, overwrites=True)
     assert check_file(disk_of_first) == "changed"
 
 
@@ -107,7 +107,7 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path, monkeypatch):
     assert [file.name for file in tmp_path.iterdir()] == ["map.json"]
     for bad in (tmp_path, tmp_path / "none" / "map.json", tmp_path / "map.json" / "x.json"):
         with pytest.raises(OutputError) as caught:
-            write_sketch(SKETCH, bad, over=True)
+            write_sketch(SKETCH, bad, overwrites=True)
         assert "\n" not in str(caught.value)
     with pytest.raises(OutputError):
         write_sketch(SKETCH, tmp_path / "a\0b.json")

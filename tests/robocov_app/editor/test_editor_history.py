@@ -3,8 +3,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov_app.editor.edits import create, properties, transform
-from robocov_app.editor.model.document import History
 from robocov_app.editor.model.geometry import DECIMALS
+from robocov_app.editor.model.history import History
 from robocov_app.editor.model.parser import build_sketch
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, to_document

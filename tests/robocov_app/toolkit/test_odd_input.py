@@ -15,7 +15,8 @@ from driven_window import Driver, opened
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import Document, find_recoverable
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.map_draft import find_recoverable
 from robocov_app.editor.model.selection import Selection
 from robocov_app.jobs.workers import LatestWorker
 from robocov_app.toolkit.input import wheel_notches

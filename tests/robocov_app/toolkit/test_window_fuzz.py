@@ -14,7 +14,7 @@ from random_events import RandomEvents
 
 from robocov.environment import Environment
 from robocov_app.editor.edits.create import add_circle
-from robocov_app.editor.model.document import History
+from robocov_app.editor.model.history import History
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.costs import Costs

@@ -1,7 +1,13 @@
-"""Sketches read from documents: what a map may not be is kept, what is no map at all is refused."""
+"""Reading of sketches from map documents.
+
+A sketch may break the rules of maps, so that its mistakes can be mended in the editor. What cannot be
+represented as a sketch, such as a point of three coordinates, is an error.
+"""
+
+from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -24,20 +30,38 @@ from robocov.mapfile.models import FORMAT, VERSION, MapModel
 from robocov_app.editor.model.background import read_marks
 from robocov_app.editor.model.sketch import KINDS, Item, Sketch
 
-_MAP = [field.alias or name for name, field in MapModel.model_fields.items()]
-_OBSTACLES: dict[str, type[Obstacle]] = {kind: shape for shape, kind in KINDS.items()}
-_STARTS: dict[str, Any] = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
-# parser method of each key
-_READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
-_READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
-_READ_AS |= dict.fromkeys(("radius", "width", "speed"), "number")
-# extent of a raster on a map without a boundary, m, unless it states its own
-_UNBOUNDED: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-_Read = TypeVar("_Read")
+_MAP_KEYS = [field.alias or name for name, field in MapModel.model_fields.items()]
+_OBSTACLE_CLASSES: dict[str, type[Obstacle]] = {kind: shape for shape, kind in KINDS.items()}
+_START_CLASSES: dict[str, Any] = {
+    "disc": env.DiscStart,
+    "uniform": env.UniformStart,
+    "points": env.PointsStart,
+}
+_EXTENT_WITHOUT_BOUNDARY: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+"""Extent of a density picture on a map without a boundary, m, unless the picture has its own extent."""
+_Value = TypeVar("_Value")
 
 
 def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> Sketch:
-    """Return the sketch in the text of a file; messages call it `where`, and `folder` holds its pictures."""
+    """Read a sketch from the text of a file.
+
+    Parameters
+    ----------
+    text : str or bytes
+    where : str
+        Name of the file in messages.
+    folder : Path, optional
+        Folder of its pictures.
+
+    Returns
+    -------
+    Sketch
+
+    Raises
+    ------
+    MapError
+        If it cannot be represented as a sketch; the message has the line and column.
+    """
     document = parse_json(text, where)
     try:
         return build_sketch(document, where, folder)
@@ -46,102 +70,184 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
 
 
 def build_sketch(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
-    """Return the sketch in a parsed document, whatever rule it breaks; MapError where it is no map at all."""
+    """Build a sketch from a parsed document, whatever rules of maps it breaks.
+
+    Parameters
+    ----------
+    document : object
+    where : str
+        Name of the document in messages.
+    folder : Path, optional
+        Folder of its pictures.
+
+    Returns
+    -------
+    Sketch
+
+    Raises
+    ------
+    MapError
+        If it cannot be represented as a sketch.
+    """
     where = to_one_line(where)
     require_json(document, where)
     check_header(document, where, FORMAT, VERSION)
     reader = _Reader(where)
-    members = reader.members(document, (), _MAP)
-    obstacles = reader.typed(list, members.get("obstacles", []), ("obstacles",), "a list of obstacles")
-    shapes = [reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)]
-    starts = reader.typed(dict, members.get("starts", {}), ("starts",), "an object")
-    extra = reader.typed(dict, members.get("extra", {}), ("extra",), "an object")
-    marks, background, others = read_marks(extra, [shape.name for shape in shapes])
-    boundary, schema, density = (members.get(key) for key in ("boundary", "$schema", "density"))
-    boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
+    members = reader.read_object(document, (), _MAP_KEYS)
+    shapes = _read_obstacles(reader, members.get("obstacles", []))
+    extra = reader.require_type(dict, members.get("extra", {}), ("extra",), "an object")
+    marks, background, other_keys = read_marks(extra, [shape.name for shape in shapes])
+    boundary = None
+    if members.get("boundary") is not None:
+        boundary = reader.read_ring(members["boundary"], ("boundary",))
+    schema = None
+    if members.get("$schema") is not None:
+        schema = reader.read_text(members["$schema"], ("$schema",))
+    density = None
+    if members.get("density") is not None:
+        extent = boundary or _EXTENT_WITHOUT_BOUNDARY
+        density = parse_density(members["density"], extent, where, folder)
     return Sketch(
-        name=reader.text(members.get("name", ""), ("name",)),
-        description=reader.text(members.get("description", ""), ("description",)),
+        name=reader.read_text(members.get("name", ""), ("name",)),
+        description=reader.read_text(members.get("description", ""), ("description",)),
         boundary=boundary,
         obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
-        starts=tuple((name, reader.either(_STARTS, spec, ("starts", name))) for name, spec in starts.items()),
+        starts=_read_starts(reader, members.get("starts", {})),
         background=background,
-        extra=others,
-        schema=None if schema is None else reader.text(schema, ("$schema",)),
-        density=None if density is None else parse_density(density, boundary or _UNBOUNDED, where, folder),
+        extra=other_keys,
+        schema=schema,
+        density=density,
+    )
+
+
+def _read_obstacles(reader: _Reader, value: Any) -> list[Obstacle]:
+    obstacles = reader.require_type(list, value, ("obstacles",), "a list of obstacles")
+    return [
+        reader.read_variant(_OBSTACLE_CLASSES, obstacle, ("obstacles", k))
+        for k, obstacle in enumerate(obstacles)
+    ]
+
+
+def _read_starts(reader: _Reader, value: Any) -> tuple[tuple[str, Any], ...]:
+    starts = reader.require_type(dict, value, ("starts",), "an object")
+    return tuple(
+        (name, reader.read_variant(_START_CLASSES, start, ("starts", name))) for name, start in starts.items()
     )
 
 
 class _Reader:
-    """Reads parts of the map document that messages call `where`; each MapError names the place in it."""
+    """Reads the parts of a map document; the message of each MapError has the path in the document.
+
+    Parameters
+    ----------
+    where : str
+        Name of the document in messages.
+    """
 
     def __init__(self, where: str) -> None:
         self._where = where
+        self._readers: dict[str, Callable[[Any, JsonPath], Any]] = {
+            "center": self.read_point,
+            "holes": self.read_rings,
+            "name": self.read_text,
+            "path": self.read_motion,
+            "points": self.read_ring,
+            "positions": self.read_ring,
+            "radius": self.read_number,
+            "repeat": self.read_repeat,
+            "speed": self.read_number,
+            "vertices": self.read_ring,
+            "width": self.read_number,
+        }
 
-    def refuse(self, path: JsonPath, what: str, *, at_key: bool = False) -> NoReturn:
-        at = f"{format_path(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
-        raise MapError.from_mistakes(self._where, [Mistake(path, at + what, at_key)])
+    def fail(self, path: JsonPath, message: str, *, at_key: bool = False) -> NoReturn:
+        """Raise MapError for the value at a path, or with `at_key` for its key."""
+        named_path = path[:-1] if at_key else path
+        if named_path:
+            message = f"{format_path(named_path)}: {message}"
+        raise MapError.from_mistakes(self._where, [Mistake(path, message, at_key)])
 
-    def typed(self, kind: type[_Read], value: Any, path: JsonPath, wanted: str) -> _Read:
+    def require_type(self, kind: type[_Value], value: Any, path: JsonPath, expected: str) -> _Value:
+        """Return a value if it is of a type."""
         if not isinstance(value, kind):
-            self.refuse(path, f"expected {wanted}, got {quote_json(value)}")
+            self.fail(path, f"expected {expected}, got {quote_json(value)}")
         return value
 
-    def members(self, value: Any, path: JsonPath, known: Sequence[str]) -> dict[str, Any]:
-        for key in self.typed(dict, value, path, "an object"):
-            if key not in known:
-                self.refuse((*path, key), describe_unknown_name("key", str(key), known), at_key=True)
-        return value  # type: ignore[no-any-return]
+    def read_object(self, value: Any, path: JsonPath, keys: Sequence[str]) -> dict[str, Any]:
+        """Return an object that has no keys besides the given ones."""
+        members = self.require_type(dict, value, path, "an object")
+        for key in members:
+            if key not in keys:
+                self.fail((*path, key), describe_unknown_name("key", str(key), keys), at_key=True)
+        return members
 
-    def text(self, value: Any, path: JsonPath) -> str:
-        return self.typed(str, value, path, "a string")
+    def read_text(self, value: Any, path: JsonPath) -> str:
+        """Return a string."""
+        return self.require_type(str, value, path, "a string")
 
-    def number(self, value: Any, path: JsonPath) -> float:
+    def read_number(self, value: Any, path: JsonPath) -> float:
+        """Return a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            self.refuse(path, f"expected a number, got {quote_json(value)}")
+            self.fail(path, f"expected a number, got {quote_json(value)}")
         return float(value)
 
-    def point(self, value: Any, path: JsonPath) -> Point:
+    def read_point(self, value: Any, path: JsonPath) -> Point:
+        """Return a position, m."""
         if not isinstance(value, list | tuple) or len(value) != 2:
-            self.refuse(path, f"expected a point [x, y] in meters, got {quote_json(value)}")
+            self.fail(path, f"expected a point [x, y] in meters, got {quote_json(value)}")
         x, y = value
-        if type(x) is float and type(y) is float:  # most of a large file: no path for each
+        if type(x) is float and type(y) is float:
+            # A large file consists mostly of such points, for which no paths need to be built.
             return x, y
-        return self.number(x, (*path, 0)), self.number(y, (*path, 1))
+        return self.read_number(x, (*path, 0)), self.read_number(y, (*path, 1))
 
-    def ring(self, value: Any, path: JsonPath) -> Ring:
-        points = self.typed(list, value, path, "a list of points [x, y]")
-        return tuple([self.point(point, (*path, k)) for k, point in enumerate(points)])
+    def read_ring(self, value: Any, path: JsonPath) -> Ring:
+        """Return a list of positions, m."""
+        points = self.require_type(list, value, path, "a list of points [x, y]")
+        return tuple([self.read_point(point, (*path, k)) for k, point in enumerate(points)])
 
-    def rings(self, value: Any, path: JsonPath) -> tuple[Ring, ...]:
-        rings = self.typed(list, value, path, "a list of rings")
-        return tuple([self.ring(ring, (*path, k)) for k, ring in enumerate(rings)])
+    def read_rings(self, value: Any, path: JsonPath) -> tuple[Ring, ...]:
+        """Return a list of lists of positions, m."""
+        rings = self.require_type(list, value, path, "a list of rings")
+        return tuple([self.read_ring(ring, (*path, k)) for k, ring in enumerate(rings)])
 
-    def repeat(self, value: Any, path: JsonPath) -> env.Repeat:
+    def read_repeat(self, value: Any, path: JsonPath) -> env.Repeat:
+        """Return the way in which a moving obstacle repeats its path."""
         if value not in env.REPEATS:
-            self.refuse(path, f"expected one of {', '.join(env.REPEATS)}, got {quote_json(value)}")
+            self.fail(path, f"expected one of {', '.join(env.REPEATS)}, got {quote_json(value)}")
         return value  # type: ignore[no-any-return]
 
-    def way(self, value: Any, path: JsonPath) -> env.ObstaclePath:
-        return self.built(env.ObstaclePath, value, path)
+    def read_motion(self, value: Any, path: JsonPath) -> env.ObstaclePath:
+        """Return the path of a moving obstacle."""
+        return self.read_fields(env.ObstaclePath, value, path)
 
-    def either(self, classes: Mapping[str, type[_Read]], value: Any, path: JsonPath) -> _Read:
-        wanted = f"one of {', '.join(classes)}"
-        if "kind" not in self.typed(dict, value, path, f"an object whose kind is {wanted}"):
-            self.refuse((*path, "kind"), "missing")
-        kind = value["kind"]
+    def read_variant(self, classes: Mapping[str, type[_Value]], value: Any, path: JsonPath) -> _Value:
+        """Return an object of the class that its key ``kind`` names."""
+        expected = f"one of {', '.join(classes)}"
+        members = self.require_type(dict, value, path, f"an object whose kind is {expected}")
+        if "kind" not in members:
+            self.fail((*path, "kind"), "missing")
+        kind = members["kind"]
         if kind not in tuple(classes):
-            self.refuse((*path, "kind"), f"expected {wanted}, got {quote_json(kind)}")
-        return self.built(classes[kind], value, path, "kind")
+            self.fail((*path, "kind"), f"expected {expected}, got {quote_json(kind)}")
+        return self.read_fields(classes[kind], value, path, other_keys=("kind",))
 
-    def built(self, of: type[_Read], value: Any, path: JsonPath, *more: str) -> _Read:
-        """Return an object of a dataclass whose fields are the keys; what may be None may also be null."""
-        known: tuple[Field[Any], ...] = fields(of)  # type: ignore[arg-type]
-        members = self.members(value, path, [*more, *(field.name for field in known)])
-        found = {}
-        for key, default in ((field.name, field.default) for field in known):
-            if key in members and not (members[key] is None and default is None):
-                found[key] = getattr(self, _READ_AS[key])(members[key], (*path, key))
-            elif default is MISSING:
-                self.refuse((*path, key), "missing")
-        return of(**found)
+    def read_fields(
+        self, cls: type[_Value], value: Any, path: JsonPath, other_keys: Sequence[str] = ()
+    ) -> _Value:
+        """Return an object of a dataclass whose fields are the keys of a JSON object.
+
+        A field whose default is None may also be null.
+        """
+        dataclass_fields: tuple[Field[Any], ...] = fields(cls)  # type: ignore[arg-type]
+        names = [field.name for field in dataclass_fields]
+        members = self.read_object(value, path, [*other_keys, *names])
+        arguments = {}
+        for field in dataclass_fields:
+            name = field.name
+            is_default = name in members and members[name] is None and field.default is None
+            if name in members and not is_default:
+                arguments[name] = self._readers[name](members[name], (*path, name))
+            elif field.default is MISSING:
+                self.fail((*path, name), "missing")
+        return cls(**arguments)

@@ -15,7 +15,9 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model import require
 from robocov_app.editor.model.background import create_background
-from robocov_app.editor.model.document import SUFFIX, Autosave, ChangedError, Document, is_open_elsewhere
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.map_draft import MapDraft, is_open_elsewhere
+from robocov_app.editor.model.map_file import SUFFIX, FileChangedError
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import MAX_RECENT
 from robocov_app.editor.ui.import_dialog import ImportDialog
@@ -189,7 +191,7 @@ class FileCommands:
             worker = LatestWorker(job, "imports", patience=IMPORT_PATIENCE_S)
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, accept))
 
-    def recover(self, draft: Autosave) -> None:
+    def recover(self, draft: MapDraft) -> None:
         """Open a map that an editor left unsaved."""
         message = f"recovered: {draft.describe()}"
         self.leave(lambda: self._show(Document.recover(draft, self.drafts), message))
@@ -220,14 +222,14 @@ class FileCommands:
     ) -> str | None:
         """Save the map, after asking before a file is replaced that has changed or holds a valid map."""
         document = self.editor.document
-        if not overwrites and not spoils and document.would_spoil(path):
+        if not overwrites and not spoils and document.would_replace_valid_map(path):
             text = f"{path.name} holds a valid map; this one cannot run yet."
             save_draft = partial(self._save, path, then, spoils=True)
             self._ask_overwrite("Save a draft over it?", text, then, save_draft)
             return None
         try:
-            message = document.save(path, over=overwrites)
-        except ChangedError as error:
+            message = document.save(path, overwrites=overwrites)
+        except FileChangedError as error:
             overwrite = partial(self._save, path, then, overwrites=True)
             self._ask_overwrite("Replace the file?", str(error), then, overwrite)
             return None

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from robocov.errors import InputError
 from robocov_app.editor.editor import Editor
-from robocov_app.editor.model.document import Autosave, Document, find_recoverable, is_open_elsewhere
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.map_draft import MapDraft, find_recoverable, is_open_elsewhere
 from robocov_app.editor.model.measurement import create_measurement_worker
 from robocov_app.editor.settings import (
     LAYERS,
@@ -144,7 +145,7 @@ def _choose_scale(scale: float | None, settings: EditorSettings, *, has_display:
     return get_screen_scale() if has_display else 1.0
 
 
-def offer_recovery(window: EditorWindow, drafts: Sequence[Autosave]) -> None:
+def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
     """Offer to recover the first of several drafts; after discarding it, the next one."""
     if not drafts:
         return

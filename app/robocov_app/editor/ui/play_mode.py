@@ -126,9 +126,9 @@ class TrialDrafts:
         self._due = now + DRAFT_PAUSE_S
         change = build_trial_change(self._document.history.sketch, self._tried, environment)
         if change is None:
-            self._document.keep_aside()
+            self._document.update_draft()
         else:
-            self._document.keep_draft(change.sketch)
+            self._document.save_draft(change.sketch)
 
 
 def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:

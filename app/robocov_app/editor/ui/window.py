@@ -121,7 +121,7 @@ class EditorWindow(BaseWindow):
         """Return a function that takes back all changes since now."""
         editor = self.editor
         document = editor.document
-        restore_history = document.history.save_point()
+        restore_history = document.history.build_save_point()
 
         def take_back() -> None:
             self.pointer.reset()
@@ -136,7 +136,7 @@ class EditorWindow(BaseWindow):
                 raise
             finally:
                 editor.revision += 1
-                document.keep_aside()
+                document.update_draft()
 
         return take_back
 
@@ -354,7 +354,7 @@ class EditorWindow(BaseWindow):
         change = build_trial_change(editor.sketch, viewer.tried, viewer.session.displayed.environment)
         if change is not None and not viewer.elsewhere:
             editor.apply(change)
-        editor.document.keep_aside()
+        editor.document.update_draft()
         # A key that is still held down repeats, and must not start the next trial.
         if pygame.key.get_pressed()[pygame.K_F5]:
             self.commands.forget_keys(pygame.K_F5)
