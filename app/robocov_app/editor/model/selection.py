@@ -65,15 +65,16 @@ class Selection:
     @classmethod
     def of(cls, *owners: Owner) -> Selection:
         """Return the selection of some objects."""
-        items = frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY)
-        starts = frozenset(each for each in owners if isinstance(each, str))
+        items = frozenset(owner for owner in owners if isinstance(owner, int) and owner != BOUNDARY)
+        starts = frozenset(owner for owner in owners if isinstance(owner, str))
         return cls(items, starts=starts, boundary=BOUNDARY in owners)
 
     @classmethod
     def select_all(cls, sketch: Sketch) -> Selection:
         """Return the selection of everything except locked and hidden obstacles."""
-        shut = frozenset(item.key for item in sketch.obstacles if not item.is_selectable)
-        return cls.of(*(owner for owner in sketch.owners if owner not in shut)).restrict_to(sketch)
+        excluded = frozenset(item.key for item in sketch.obstacles if not item.is_selectable)
+        owners = [owner for owner in sketch.owners if owner not in excluded]
+        return cls.of(*owners).restrict_to(sketch)
 
     @property
     def owners(self) -> frozenset[Owner]:
@@ -86,19 +87,30 @@ class Selection:
 
     def union(self, other: Selection) -> Selection:
         """Return the union of two selections."""
-        items, starts = self.items | other.items, self.starts | other.starts
-        return Selection(items, self.vertices | other.vertices, starts, self.boundary or other.boundary)
+        return Selection(
+            items=self.items | other.items,
+            vertices=self.vertices | other.vertices,
+            starts=self.starts | other.starts,
+            boundary=self.boundary or other.boundary,
+        )
 
     def toggle(self, other: Selection) -> Selection:
         """Return the symmetric difference of two selections, as after a click with Shift."""
-        items, starts = self.items ^ other.items, self.starts ^ other.starts
-        return Selection(items, self.vertices ^ other.vertices, starts, self.boundary != other.boundary)
+        return Selection(
+            items=self.items ^ other.items,
+            vertices=self.vertices ^ other.vertices,
+            starts=self.starts ^ other.starts,
+            boundary=self.boundary != other.boundary,
+        )
 
     def restrict_to(self, sketch: Sketch) -> Selection:
         """Return the part of the selection that exists in a map, for instance after undoing."""
-        items, starts = self.items & sketch.index_by_key.keys(), self.starts & dict(sketch.starts).keys()
-        vertices = frozenset(vertex for vertex in self.vertices if has_vertex(sketch, vertex))
-        return Selection(items, vertices, starts, self.boundary and sketch.boundary is not None)
+        return Selection(
+            items=self.items & sketch.index_by_key.keys(),
+            vertices=frozenset(vertex for vertex in self.vertices if has_vertex(sketch, vertex)),
+            starts=self.starts & dict(sketch.starts).keys(),
+            boundary=self.boundary and sketch.boundary is not None,
+        )
 
     def without_vertices(self) -> Selection:
         """Return the selection without its vertices."""
@@ -112,11 +124,13 @@ class Selection:
 
     def describe(self, sketch: Sketch) -> str:
         """Describe the selection: "wall “west”", "3 obstacles", "2 vertices"."""
-        owners, vertices = self.owners, len(self.vertices)
-        if sum(map(bool, (self.items, self.starts, self.boundary, vertices))) > 1:
-            return f"{len(owners) + vertices} things"
-        if vertices:
-            return f"{vertices} vertices" if vertices > 1 else "vertex"
+        owners = self.owners
+        vertex_count = len(self.vertices)
+        kinds = [self.items, self.starts, self.boundary, self.vertices]
+        if sum(map(bool, kinds)) > 1:
+            return f"{len(owners) + vertex_count} things"
+        if vertex_count:
+            return f"{vertex_count} vertices" if vertex_count > 1 else "vertex"
         if len(owners) > 1:
             return format_count(len(owners), "obstacle" if self.items else "start")
         return sketch.display_name(next(iter(owners))) if owners else "nothing"

@@ -106,8 +106,8 @@ class Sketch:
     @classmethod
     def from_environment(cls, environment: env.Environment) -> Self:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
-        shapes, free_keys = environment.obstacles, dict(environment.extra)
-        marks, background, extra = read_marks(free_keys, [shape.name for shape in shapes])
+        shapes = environment.obstacles
+        marks, background, extra = read_marks(dict(environment.extra), [shape.name for shape in shapes])
         return cls(
             boundary=environment.boundary,
             obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
@@ -123,9 +123,11 @@ class Sketch:
 
     def build_unchecked_environment(self) -> env.Environment:
         """Build the map without checking its rules; if it breaks any, using it may raise any error."""
-        shapes, marks = [item.shape for item in self.obstacles], dict[int, dict[str, Any]]()
+        shapes = [item.shape for item in self.obstacles]
+        marks: dict[int, dict[str, Any]] = {}
         for k, item in enumerate(self.obstacles):
-            marks[k] = {name: value for name in MARKS if (value := getattr(item, name))}
+            values = {name: getattr(item, name) for name in MARKS}
+            marks[k] = {name: value for name, value in values.items() if value}
         return env.Environment(
             boundary=self.boundary or (),
             obstacles=tuple(shapes),
@@ -169,8 +171,10 @@ class Sketch:
         if isinstance(thing, env.PolygonObstacle):
             return (thing.vertices, *thing.holes)
         if isinstance(thing, env.CircleObstacle | env.DiscStart):
-            (x, y), r = thing.center, thing.radius
-            return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
+            x, y = thing.center
+            radius = thing.radius
+            rim = ((x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius))
+            return (((x, y), *rim),)
         return (getattr(thing, _LINES[type(thing)]),) if type(thing) in _LINES else ()
 
     def list_rings(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
@@ -252,7 +256,8 @@ class Sketch:
         corners = corners[np.isfinite(corners).all(axis=1)]
         if not len(corners):
             return None
-        (low_x, low_y), (high_x, high_y) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        low_x, low_y = corners.min(axis=0).tolist()
+        high_x, high_y = corners.max(axis=0).tolist()
         return low_x, low_y, high_x, high_y
 
 
@@ -272,20 +277,43 @@ def dump_sketch(sketch: Sketch) -> str:
 def build_geometry(shape: Obstacle) -> shapely.Geometry:
     """Build the area that an obstacle covers as a valid geometry, m; empty beyond the reach of maps."""
     if isinstance(shape, env.CircleObstacle):
-        if not _is_near([shape.center]):
-            return shapely.GeometryCollection()
-        return shape.polygon if 0.0 < shape.radius <= MAX_SIZE_M else shapely.Point(shape.center)
+        return _build_circle(shape)
     points = shape.points if isinstance(shape, env.WallObstacle) else shape.vertices
-    if not _is_near(points) or not points:
+    if not points or not _is_near(points):
         return shapely.GeometryCollection()
-    line = shapely.LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
     if isinstance(shape, env.WallObstacle):
-        return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= MAX_SIZE_M else line
-    if len(points) < 3:
-        return line
+        return _build_wall(shape)
+    return _build_polygon(shape)
+
+
+def _build_circle(circle: env.CircleObstacle) -> shapely.Geometry:
+    """Build the area of a circle, or its center if its radius is invalid."""
+    if not _is_near([circle.center]):
+        return shapely.GeometryCollection()
+    has_valid_radius = 0.0 < circle.radius <= MAX_SIZE_M
+    return circle.polygon if has_valid_radius else shapely.Point(circle.center)
+
+
+def _build_wall(wall: env.WallObstacle) -> shapely.Geometry:
+    """Build the area of a wall, or its line if its width or length is invalid."""
+    line = _build_line(wall.points)
+    is_valid = line.length > 0.0 and 0.0 < wall.width <= MAX_SIZE_M
+    return wall.polygon if is_valid else line
+
+
+def _build_polygon(shape: env.PolygonObstacle) -> shapely.Geometry:
+    """Build the area of a polygon without invalid holes, or its line if it has fewer than three vertices."""
+    if len(shape.vertices) < 3:
+        return _build_line(shape.vertices)
     holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_near(hole)]
-    polygon = shape.polygon if len(holes) == len(shape.holes) else shapely.Polygon(points, holes)
+    has_valid_holes = len(holes) == len(shape.holes)
+    polygon = shape.polygon if has_valid_holes else shapely.Polygon(shape.vertices, holes)
     return polygon if polygon.is_valid else shapely.make_valid(polygon)
+
+
+def _build_line(points: Sequence[Point]) -> shapely.Geometry:
+    """Build a line, or a point if all points are the same."""
+    return shapely.LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
 
 
 def _is_near(points: Iterable[Point]) -> bool:
