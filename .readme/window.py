@@ -15,15 +15,15 @@ from PIL import Image
 from robocov.mapfile import find_map_file, load_map
 from robocov_app.editor.edits.create import add_rectangle
 from robocov_app.editor.ui.launch import editor_window
-from robocov_app.viewer.film import pixels
 from robocov_app.viewer.launch import HEADLESS_FPS, Launcher
+from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 
 if TYPE_CHECKING:
     from robocov_app.editor.ui.window import EditorWindow
-    from robocov_app.viewer.window import Window
+    from robocov_app.viewer.window import ViewerWindow
 
 HERE = Path(__file__).parent
 HANDBOOK = HERE.parent / "app/handbook/pictures"
@@ -46,7 +46,8 @@ def picture(theme: str, name: str) -> None:
                 session.fail_robot(5)
             window.frame(1.0 / HEADLESS_FPS)
         viewer = window.viewer
-        viewer.active, viewer.hand.selected = 1, 4
+        viewer.inspection.active_pane = 1
+        viewer.inspection.selected = 4
         window.panel.show_tab("robot")
         viewer.pass_time(60.0)  # what was said is old
         for _ in range(8):
@@ -75,9 +76,9 @@ def editor(theme: str, name: str) -> None:
         keep(window, HANDBOOK / name)
 
 
-def keep(window: Window | EditorWindow, file: Path) -> None:
+def keep(window: ViewerWindow | EditorWindow, file: Path) -> None:
     """Save what a window shows, as small as it can be."""
-    small = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
+    small = Image.fromarray(copy_pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
     small.save(file, optimize=True)
 
 
@@ -94,13 +95,13 @@ def film(name: str) -> None:
     with launcher.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
         window.do("tour")
-        assert window.tour is not None
-        for frame in range(round(window.tour.seconds * HEADLESS_FPS)):
-            if window.tour is None:
+        assert window.lesson.player is not None
+        for frame in range(round(window.lesson.player.duration * HEADLESS_FPS)):
+            if window.lesson.player is None:
                 break
             window.frame(1.0 / HEADLESS_FPS)
             if frame % 2 == 0:
-                encoder.stdin.write(pixels(window.screen).tobytes())
+                encoder.stdin.write(copy_pixels(window.screen).tobytes())
 
 
 if __name__ == "__main__":

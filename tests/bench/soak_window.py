@@ -22,7 +22,7 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 WARM = 10
 """Minutes until all that is kept is there."""
@@ -42,7 +42,7 @@ def main(minutes: int, robots: int) -> None:
     with tempfile.TemporaryDirectory() as folder, open_display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
         viewer = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
-        window = Window(viewer, (1280, 720), 1.0)
+        window = ViewerWindow(viewer, (1280, 720), 1.0)
         warm = resident()
         for minute in range(1, minutes + 1):
             for _ in range(60 * FPS):
@@ -73,7 +73,7 @@ def touch(viewer: Presenter, rng: np.random.Generator) -> None:
                 for failed in list(viewer.session.timeline.panes[0].setup.failed):
                     viewer.session.revive_robot(failed)
             case _:
-                viewer.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
+                viewer.comparison.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
     except RobocovError as error:
         print(f"refused: {error}")
 

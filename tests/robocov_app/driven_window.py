@@ -16,14 +16,14 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.display import open_display
 from robocov_app.toolkit.ui import Shown
-from robocov_app.viewer.commands import parameter_commands, viewer_commands
+from robocov_app.viewer.commands import list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.film import pixels
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 SIZE = (900, 600)
 FRAME = 1 / 50
@@ -65,12 +65,12 @@ def opened(
         viewer = Presenter(
             session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name
         )
-        driver = Driver(Window(viewer, size, scale, patient=True))
+        driver = Driver(ViewerWindow(viewer, size, scale, is_unattended=True))
         driver.settle()
         driver.settle()  # now it knows how high the legend is
         yield driver
         driver.window.close()
-        driver.window.keeper.finish()
+        driver.window.run_saver.finish()
 
 
 def key_event(name: str) -> dict[str, Any]:
@@ -85,7 +85,9 @@ def key_event(name: str) -> dict[str, Any]:
 def listed(viewer: Presenter) -> Commands:
     """Return the commands without a window."""
     titles = {layer.name: layer.title for layer in standard_layers()}
-    return Commands(viewer_commands(viewer, titles), viewer.attempt, lambda: parameter_commands(viewer))
+    return Commands(
+        list_viewer_commands(viewer, titles), viewer.attempt, lambda: list_parameter_commands(viewer)
+    )
 
 
 def do(viewer: Presenter, name: str) -> None:
@@ -99,7 +101,7 @@ def typed(viewer: Presenter, text: str) -> None:
 class Driver:
     """Does to a window what people do; each deed takes a frame or some."""
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self, window: ViewerWindow) -> None:
         self.window = window
         window.contains_faults = False
         self.viewer = window.viewer
@@ -255,7 +257,7 @@ class Driver:
 
     def picture(self) -> Any:
         """Return the pixels of the window."""
-        return pixels(self.window.screen).astype(int)
+        return copy_pixels(self.window.screen).astype(int)
 
     def same(self, other: Any) -> bool:
         return bool(np.array_equal(self.picture(), other))

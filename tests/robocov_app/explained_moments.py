@@ -10,7 +10,8 @@ from robocov import Simulation, Team
 from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbors import Neighbors
-from robocov_app.viewer.explain import Line, Report, explain
+from robocov_app.viewer.explanation.explain import RobotReport, explain
+from robocov_app.viewer.explanation.lines import ReportLine
 
 
 def moment(
@@ -26,7 +27,7 @@ def moment(
     robot=0,
     names=None,
     **terms,
-) -> Report:
+) -> RobotReport:
     """Explain one robot at a moment made by hand; without `forces` they are the sum of the terms."""
     positions = np.array(positions, dtype=float)
     limits = {name: terms.pop(name) for name in tuple(terms) if name in Team.__dataclass_fields__}
@@ -44,10 +45,10 @@ def moment(
     )
     goals = None if goals is None else np.array(goals, dtype=float)
     snapshot = Snapshot(seen, Decision(np.array(forces, dtype=float), goals, terms, cells))
-    return explain(snapshot, team, environment, robot, names=names, recent=recent)
+    return explain(snapshot, team, environment, robot, numbers=names, recent=recent)
 
 
-def run(simulation: Simulation, seconds: float) -> list[Report]:
+def run(simulation: Simulation, seconds: float) -> list[RobotReport]:
     """Let a run go on, and explain all robots at its end with what they did of late."""
     past = [snapshot.positions for snapshot in simulation.snapshots(seconds)]
     recent = np.array(past[-round(SETTLED_WINDOW_S / simulation.dt) - 1 :: 8])
@@ -58,23 +59,23 @@ def run(simulation: Simulation, seconds: float) -> list[Report]:
     ]
 
 
-def texts(report: Report) -> list[str]:
+def texts(report: RobotReport) -> list[str]:
     return [line.text for line in report.lines]
 
 
-def line(report: Report, kind: str) -> Line:
+def line(report: RobotReport, kind: str) -> ReportLine:
     (found,) = (line for line in report.lines if line.kind == kind)
     return found
 
 
-def sums_up(report: Report) -> None:
+def sums_up(report: RobotReport) -> None:
     total = np.array(line(report, "resultant").vector)
     parts = [one.vector for one in report.lines if one.vector is not None and one.kind != "resultant"]
     scale = max((np.abs(part).max() for part in parts), default=0.0)
     assert np.sum(parts or [(0.0, 0.0)], axis=0) == pytest.approx(total, abs=1e-5 + 1e-8 * scale)
 
 
-def says_no_nonsense(report: Report) -> None:
+def says_no_nonsense(report: RobotReport) -> None:
     for text in (report.title, report.verdict, *texts(report)):
         assert text == " ".join(text.split()) != ""
         assert not re.search(r"nan|inf|None|\de[+-]?\d|-0\.00|\bj\b", text), text

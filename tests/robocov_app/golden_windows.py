@@ -20,7 +20,7 @@ def compared(window) -> None:
 
 
 def asked(window) -> None:
-    window.viewer.hand.selected = 2
+    window.viewer.inspection.selected = 2
     window.panel.show_tab("robot")
     window.do("layer:force_attraction")
     window.do("layer:distances")
@@ -62,8 +62,8 @@ def played(window, frames: int) -> None:
 
 def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
-    from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import Launcher
+    from robocov_app.viewer.screen_video import copy_pixels
     from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
 
@@ -73,7 +73,7 @@ def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> n
     with opening.window() as window:
         spoil(window)
         play(window)
-        return pixels(window.screen).copy()
+        return copy_pixels(window.screen).copy()
 
 
 def golden(name: str) -> np.ndarray:

@@ -21,7 +21,7 @@ from robocov_app.web import events as page_events
 EVENTS_PER_FRAME = 8
 RARE_COMMANDS = {
     "screenshot": 3,
-    "film": 2,
+    "video": 2,
     "fullscreen": 4,
     "save": 6,
     "save:as": 4,

@@ -190,7 +190,7 @@ def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
         driver.settle()
         assert target() == "sensing" and chosen("sensing")
         driver.viewer.attempt(lambda: driver.window.commands.typed("target 3"))
-        assert driver.viewer.trouble and "one of centroid, sensing, median" in driver.viewer.message
+        assert driver.viewer.has_error_message and "one of centroid, sensing, median" in driver.viewer.message
         driver.push("reset:target")
         assert target() == "centroid"
 

@@ -22,7 +22,7 @@ from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 TEAM_SIZES = (6, 50, 200, 1000)
 DRAWING_GOALS_S = {50: 4e-3}
@@ -60,7 +60,7 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
     with open_display(headless=True):
         layers = {layer.name for layer in standard_layers() if layer.default}
         presenter = Presenter(session, Costs(DEFAULT_LATTICE), layers, Path(), "rooms")
-        window = Window(presenter, SIZE_PX, 1.0)
+        window = ViewerWindow(presenter, SIZE_PX, 1.0)
         try:
             with collect_garbage_rarely():
                 measured = _use_window(window, seconds)
@@ -105,7 +105,7 @@ def _build_session(robots: int) -> Session:
     return Session(scenario)
 
 
-def _use_window(window: Window, seconds: float) -> _Measurements:
+def _use_window(window: ViewerWindow, seconds: float) -> _Measurements:
     """Advance and draw the window for some seconds."""
     clock = pygame.time.Clock()
     # The first frames prepare the cost of the map, and draw everything that is stored afterwards.

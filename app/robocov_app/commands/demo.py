@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.session import Session
-    from robocov_app.viewer.window import Window
+    from robocov_app.viewer.window import ViewerWindow
 
 _MAX_CONTROLLERS = 4
 """Maximum number of controllers side by side."""
@@ -131,11 +131,11 @@ def _build_launcher(options: Arguments) -> Launcher:
         theme=options.theme,
         size=parse_window_size(options.size),
         scale=options.scale,
-        also=shown_layers,
-        without=hidden_layers,
+        shown_layers=shown_layers,
+        hidden_layers=hidden_layers,
         headless=options.is_headless,
         served=options.serve,
-        laws=controllers,
+        controllers=controllers,
         lattice=options.lattice,
         file=file,
         offers_lesson=file is None and options.lesson is None and not options.tour,
@@ -210,10 +210,10 @@ def _open_window(launcher: Launcher, options: Arguments) -> int:
     return 0
 
 
-def _start_lesson(window: Window, options: Arguments) -> None:
+def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
     """Start the lesson that the options name."""
     if options.lesson is not None:
-        window.start_lesson(options.lesson)
+        window.lesson.start(options.lesson)
     elif options.tour:
         window.do("tour")
 
@@ -233,8 +233,8 @@ def _render(launcher: Launcher, options: Arguments) -> int:
         _start_lesson(window, options)
         count = options.frames
         if count is None:
-            assert window.tour is not None
-            count = round(window.tour.seconds * HEADLESS_FPS)
+            assert window.lesson.player is not None
+            count = round(window.lesson.player.duration * HEADLESS_FPS)
         with show_progress("frames", count) as update:
             frames = _draw_frames(window, count, interruption, update, is_whole_tour=options.frames is None)
             folder = None if result is None else result.staging
@@ -246,7 +246,7 @@ def _render(launcher: Launcher, options: Arguments) -> int:
 
 
 def _draw_frames(
-    window: Window,
+    window: ViewerWindow,
     count: int,
     interruption: Interruption,
     update: Callable[[int], None],
@@ -254,13 +254,13 @@ def _draw_frames(
     is_whole_tour: bool,
 ) -> Iterator[Frame]:
     """Draw frames of the window, until the count, the end of the tour, or an interruption."""
-    from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
+    from robocov_app.viewer.screen_video import copy_pixels
 
     for number in range(1, count + 1):
-        is_tour_over = is_whole_tour and window.tour is None
+        is_tour_over = is_whole_tour and window.lesson.player is None
         if interruption.requested or is_tour_over:
             return
         window.frame(1.0 / HEADLESS_FPS)
-        yield pixels(window.screen)
+        yield copy_pixels(window.screen)
         update(number)

@@ -115,11 +115,11 @@ def _save_screenshot(window: EditorWindow, path: Path, page: str) -> None:
     """Draw the window with a page of its panel, and save it as PNG."""
     from robocov.files.writing import replace_file
     from robocov_app.runs.encoding import encode_png
-    from robocov_app.viewer.film import pixels
+    from robocov_app.viewer.screen_video import copy_pixels
 
     window.panel.show_tab(page)
     window.editor.message = ""
     for _ in range(_SCREENSHOT_FRAMES):
         window.frame(_SCREENSHOT_FRAME_S)
     with replace_file(path) as temporary:
-        temporary.write_bytes(encode_png(pixels(window.screen)))
+        temporary.write_bytes(encode_png(copy_pixels(window.screen)))

@@ -33,17 +33,17 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> int:
     """Run `robocov lesson`, and return its exit status."""
     from robocov.kernel_compilation import compile_kernels
-    from robocov_app.viewer.lessons import checked, load_lesson
+    from robocov_app.viewer.lessons import check_lesson, load_lesson
 
     saved = load_lesson(options.file)
     assert saved.lesson is not None
     compile_kernels()
-    chapters = checked(saved)
+    chapters = check_lesson(saved)
     rows = []
     lines = [saved.lesson.title]
-    for number, (title, seconds, ends) in enumerate(chapters, start=1):
-        rows.append({"title": title, "seconds": seconds, "ends": ends})
-        end = f"ends after {seconds:.1f} s" if ends else "never ends"
-        lines.append(f"  {number:2}  {title:44}  {end}")
+    for number, chapter in enumerate(chapters, start=1):
+        rows.append({"title": chapter.title, "seconds": chapter.duration, "ends": chapter.ends})
+        end = f"ends after {chapter.duration:.1f} s" if chapter.ends else "never ends"
+        lines.append(f"  {number:2}  {chapter.title:44}  {end}")
     print_answer(options, {"title": saved.lesson.title, "chapters": rows}, *lines)
     return 0 if all(row["ends"] for row in rows) else _NEVER_ENDS

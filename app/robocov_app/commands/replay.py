@@ -142,9 +142,9 @@ def _open_window(options: Arguments, session: Session, file: Path | None = None)
         Path(),
         theme=options.film.theme,
         size=parse_window_size(options.film.size),
-        laws=options.controller,
-        also=shown_layers,
-        without=hidden_layers,
+        controllers=options.controller,
+        shown_layers=shown_layers,
+        hidden_layers=hidden_layers,
         file=file,
         served=options.serve,
     )

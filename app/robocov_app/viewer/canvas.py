@@ -24,9 +24,10 @@ from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
-from robocov_app.viewer.presenter import FADE, Presenter
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.tools import Preview
+from robocov_app.viewer.tools.tool import Preview
+from robocov_app.viewer.view import FADE_S
 
 RAYS, MOST_RAYS = 120, 720  # of one scan, of all scans of a pane together
 FAR_SCAN = 12.0  # meters that scans reach where the sensor has no limit
@@ -128,7 +129,9 @@ class ViewerCanvas:
         for pane, painter, box in zip(
             session.timeline.panes, self._painters, self.layout.panes, strict=False
         ):
-            painter.visible = self.viewer.shown | ({"caption"} & {layer.name for layer in painter.layers})
+            painter.visible = self.viewer.view.layers | (
+                {"caption"} & {layer.name for layer in painter.layers}
+            )
             scene, surface = self._scene(pane, painter), screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
             self._draw_tool(surface, len(self._scenes), scene)
@@ -145,8 +148,8 @@ class ViewerCanvas:
             if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
                 self._limit = round_limit(1.1 * largest)
         numbers, scans = setup.numbers, list[tuple[Array, Array]]()
-        selected = numbers.index(viewer.selected) if viewer.selected in numbers else None
-        if "scan" in viewer.shown:  # of the robot that is asked about, else of all unless they are many
+        selected = numbers.index(viewer.selected_robot) if viewer.selected_robot in numbers else None
+        if "scan" in viewer.view.layers:  # of the robot that is asked about, else of all unless they are many
             rows = range(len(numbers)) if selected is None else [selected]
             ranges, places = setup.team.sensing_range, snapshot.positions
             rays = min(RAYS, MOST_RAYS // len(rows))
@@ -155,10 +158,10 @@ class ViewerCanvas:
                 scans.append(
                     (places[row], pane.simulation.sensor.scan_from(places[row], rays, reach[row])[1])
                 )
-        path = known.path if known is not None and viewer.cursor is not None else None
+        path = known.path if known is not None and viewer.inspection.cursor is not None else None
         look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
         look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
-        fade = FADE if viewer.fade else None
+        fade = FADE_S if viewer.view.fades_trajectories else None
         return pane.build_scene(setup, snapshot, session.displayed.get_trail(pane), trail_fade=fade, **look)
 
     def _caption_cost(self, pane: Pane) -> str:
@@ -182,7 +185,7 @@ class ViewerCanvas:
             place, target = positions[numbers.index(hand[0])], hand[1]
             begin, end = canvas.camera.to_pixels(np.array([place, target])).tolist()
             canvas.dashes(begin, end, ink, canvas.width(1.5), dash=3.0)
-        asked = self.viewer.selected
+        asked = self.viewer.selected_robot
         if asked is not None and asked in scene.failed:
             radius = max(scene.failed_radius(asked) * canvas.camera.zoom, 9.0 * canvas.scale)
             ring = partial(sprites.ring, round(radius) + 4.0 * canvas.scale, ink, 2.2 * canvas.scale)
@@ -193,7 +196,7 @@ class ViewerCanvas:
                 radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
                 center = canvas.camera.to_pixels(positions[row]).tolist()
                 canvas.stamp(partial(sprites.ring, radius, ink, 1.2 * canvas.scale), center)
-        if (preview := self.viewer.tool.preview(self.viewer.session)) is not None:
+        if (preview := self.viewer.tool.build_preview(self.viewer.session)) is not None:
             self._draw_preview(canvas, preview)
         surface.set_clip(None)
 
@@ -213,17 +216,17 @@ class ViewerCanvas:
         points = canvas.camera.to_pixels(np.array(preview.line))
         if len(points) > 1:
             canvas.outline(points, accent, canvas.width(1.5), closed=False)
-            if preview.closed:
+            if preview.is_closed:
                 canvas.dashes(points[-1].tolist(), points[0].tolist(), accent, canvas.width(1.0))
-        for x, y in points.tolist() if preview.marks else ():
+        for x, y in points.tolist() if preview.has_marks else ():
             size = 3 * canvas.scale
             box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
             pygame.draw.rect(surface, self.theme.background, box)
             pygame.draw.rect(surface, accent, box, canvas.width(1.5))
-        if preview.words:
+        if preview.label:
             x, y = points[-1].tolist()
             at = x + 12 * canvas.scale, y - 14 * canvas.scale
-            tag(surface, preview.words, at, self.theme, canvas.scale)
+            tag(surface, preview.label, at, self.theme, canvas.scale)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:
         if len(self._scenes) < 2:
@@ -232,7 +235,7 @@ class ViewerCanvas:
         for pane, box in enumerate(self.layout.panes):
             rect = pygame.Rect(box)
             pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
-            if pane == self.viewer.active:
+            if pane == self.viewer.active_pane:
                 bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * scale))))
                 screen.fill(
                     theme.get_controller_color(self.viewer.session.timeline.panes[pane].controller.name), bar
@@ -242,7 +245,7 @@ class ViewerCanvas:
         if self._strip is None or self._strip[0] != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(theme.background)
-            camera, shown = self._painters[0].camera, frozenset(self.viewer.shown)
+            camera, shown = self._painters[0].camera, frozenset(self.viewer.view.layers)
             page.blit(
                 legend_strip(entries, Canvas(page, camera, theme, scale, choose_robot_hues(1), shown)), (0, 0)
             )
@@ -252,7 +255,7 @@ class ViewerCanvas:
     def shared_rows(self) -> int:
         if len(self._scenes) < 2:
             return 0
-        kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.shown)
+        kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.view.layers)
         page = pygame.Surface((self.layout.arena[2], 1))
         canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, choose_robot_hues(1))
         needed, before = len(legend_rows(canvas, self._legend_entries())), self._rows

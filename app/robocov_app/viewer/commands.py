@@ -1,194 +1,295 @@
-"""The list of the viewer's commands: keys, buttons, tool tips, help and palette all read it."""
+"""Commands of the viewer that need no window: keys, buttons, tool tips, help and palette read this list."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from robocov.errors import ParameterError
 from robocov_app.toolkit.command import Command, Takes
+from robocov_app.viewer.parameters import Parameter
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, format_speed
-from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.tools import Tool
 
-# headings of the help, in their order
-GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
-_NUMBERED = (
-    "cells centroids trajectories velocities force_attraction force_repulsion_robots "
-    "force_repulsion_obstacle force_viscosity force_resultant links "
-    "distances geodesic_cells path scan sensed sensing communication obstacle_points goals starts "
-    "obstacles boundary grid robots failed selection legend scale_bar status color_bar"
-)
-_NUMBER_KEYS = [f"{modifier}{digit}" for modifier in ("", "shift+", "alt+") for digit in "1234567890"]
-_LAYER_KEYS = {**dict(zip(_NUMBERED.split(), _NUMBER_KEYS, strict=True)), "density": "alt+d"}
-_TOOLS = "hand polygon wall circle brush eraser robot failure ruler"
-_TOOL_KEYS = dict(zip(_TOOLS.split(), "vpwcgxadm", strict=True))
-REPEATS = True
+GROUPS = ("Run", "Time", "Compare", "Edit", "Tools", "View", "File", "Help", "Show")
+"""Headings of the help, in their order."""
+
+RESIZE_STEP = 1.25  # factor of the keys [ and ]
+MIN_SPEED = 0.01
+MAX_SPEED = 1000.0
+
+_LAYER_KEYS = {
+    "cells": "1",
+    "centroids": "2",
+    "trajectories": "3",
+    "velocities": "4",
+    "force_attraction": "5",
+    "force_repulsion_robots": "6",
+    "force_repulsion_obstacle": "7",
+    "force_viscosity": "8",
+    "force_resultant": "9",
+    "links": "0",
+    "distances": "shift+1",
+    "geodesic_cells": "shift+2",
+    "path": "shift+3",
+    "scan": "shift+4",
+    "sensed": "shift+5",
+    "sensing": "shift+6",
+    "communication": "shift+7",
+    "obstacle_points": "shift+8",
+    "goals": "shift+9",
+    "starts": "shift+0",
+    "obstacles": "alt+1",
+    "boundary": "alt+2",
+    "grid": "alt+3",
+    "robots": "alt+4",
+    "failed": "alt+5",
+    "selection": "alt+6",
+    "legend": "alt+7",
+    "scale_bar": "alt+8",
+    "status": "alt+9",
+    "color_bar": "alt+0",
+    "density": "alt+d",
+}
 
 
-class Row(NamedTuple):
-    """A command of a group; its keys are separated by commas."""
+def list_viewer_commands(viewer: Presenter, layer_titles: dict[str, str]) -> list[Command]:
+    """Return the commands that need no window.
 
-    name: str
-    title: str
-    run: Callable[..., object]
-    keys: str = ""
-    repeats: bool = False
-    takes: Takes | None = None
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    layer_titles : dict of str to str
+        Titles of the layers by their names.
 
-
-def grouped(rows: dict[str, Iterable[Row]]) -> list[Command]:
+    Returns
+    -------
+    list of Command
+        The commands, in the order of help and palette.
+    """
     return [
-        Command(name, title, group, run, tuple(filter(None, keys.split(", "))), repeats=repeats, takes=takes)
-        for group, each in rows.items()
-        for name, title, run, keys, repeats, takes in each
+        *_list_run_commands(viewer),
+        *_list_time_commands(viewer),
+        *_list_compare_commands(viewer),
+        *_list_edit_commands(viewer),
+        *_list_view_commands(viewer),
+        *_list_file_commands(viewer),
+        *_list_tool_commands(viewer),
+        *_list_layer_commands(viewer, layer_titles),
     ]
 
 
-def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
-    """Return the commands that need no window; `titles` are the layers', by their names."""
+def _list_run_commands(viewer: Presenter) -> list[Command]:
+    playback = viewer.playback
+    files = viewer.files
+    add_robot = partial(playback.restart_with_more_robots, 1)
+    remove_robot = partial(playback.restart_with_more_robots, -1)
+    slower = partial(playback.change_speed, -1)
+    faster = partial(playback.change_speed, 1)
+    next_map = partial(files.open_next_map, 1)
+    previous_map = partial(files.open_next_map, -1)
+    speeds = [format_speed(speed).rstrip("×") for speed in SPEEDS]
+    takes_start = Takes("start", options=playback.list_starts)
+    takes_map = Takes("map or file", options=files.list_maps)
+    takes_speed = Takes("factor", _read_speed, lambda: speeds)
 
-    def files() -> list[str]:
-        return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
+    def set_robots(robots: int) -> None:
+        playback.restart(robots=robots)
 
-    def branches() -> list[str]:
-        return [str(k + 1) for k in range(len(viewer.session.timeline.document.list_branches()))]
+    def set_seed(seed: int) -> None:
+        playback.restart(seed=seed)
 
-    def next_seed() -> None:
-        viewer.restart(seed=viewer.session.timeline.scenario.seed + 1)
+    def set_start(name: str) -> None:
+        playback.restart(start=name)
 
-    def look_on(seconds: float) -> None:
-        viewer.look_at(viewer.session.displayed.time + seconds)
-
-    def more(robots: int) -> None:
-        viewer.restart(robots=len(viewer.numbers) + robots)
-
-    def enter(branch: str) -> None:
-        viewer.session.seek(viewer.session.timeline.document.find_branch(branch).node)
-
-    start, law = Takes("start", options=viewer.starts), Takes("controller", options=lambda: viewer.laws)
-    target = Takes("file", lambda text: Path(text) if text else None)
-    ask_next, speeds = viewer.ask_next, [format_speed(each).rstrip("×") for each in SPEEDS]
-
-    def tool_row(tool: Tool) -> Row:
-        run = partial(viewer.take_tool, tool.name)
-        return Row(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", run, _TOOL_KEYS[tool.name])
-
-    def switch(layer: str) -> None:
-        viewer.shown ^= {layer}
-
-    def layer_row(name: str) -> Row:
-        return Row(f"layer:{name}", titles[name], partial(switch, name), _LAYER_KEYS.get(name, ""))
-
-    layers = dict.fromkeys([*(name for name in _LAYER_KEYS if name in titles), *titles])
-    groups: dict[str, Iterable[Row]] = {
-        "Run": [
-            Row("pause", "Play or pause", viewer.pause, "space"),
-            Row("step", "Single step", lambda: viewer.session.playback.step(), ".", REPEATS),
-            Row("restart", "Restart", viewer.restart, "r"),
-            Row("settle", "Play until settled, then stop", viewer.settle, "s"),
-            Row("slower", "Slower", lambda: viewer.change_speed(-1), "-", REPEATS),
-            Row("faster", "Faster", lambda: viewer.change_speed(1), "=, +", REPEATS),
-            Row("seed:next", "Other starting positions (next seed)", next_seed, "n"),
-            Row("start:next", "Next start of the map", viewer.next_start, "shift+n"),
-            Row("more", "One robot more, from the start", partial(more, 1), "shift+=, shift++", REPEATS),
-            Row("fewer", "One robot fewer, from the start", partial(more, -1), "shift+-", REPEATS),
-            Row("map:next", "Next map", lambda: viewer.next_map(1), "page down"),
-            Row("map:previous", "Previous map", lambda: viewer.next_map(-1), "page up"),
-            Row("robots", "Number of robots", lambda n: viewer.restart(robots=n), takes=_whole("robots")),
-            Row("seed", "Seed", lambda n: viewer.restart(seed=n), takes=_whole("seed")),
-            Row("start", "Start of the map", lambda name: viewer.restart(start=name), takes=start),
-            Row("map", "Open a map", viewer.open_map, takes=Takes("map or file", options=viewer.maps)),
-            Row("speed", "Speed", viewer.set_speed, takes=Takes("factor", _speed, lambda: speeds)),
-        ],
-        "Time": [
-            Row("back", "Back by a moment", lambda: viewer.look_by(-1), "left", REPEATS),
-            Row("forward", "On by a moment", lambda: viewer.look_by(1), "right", REPEATS),
-            Row("back:second", "Back by a second", lambda: look_on(-1.0), "shift+left", REPEATS),
-            Row("forward:second", "On by a second", lambda: look_on(1.0), "shift+right", REPEATS),
-            Row("first", "To the beginning", lambda: viewer.look_at(0.0), "home"),
-            Row(
-                "live",
-                "To the present",
-                lambda: viewer.session.show_time(viewer.session.timeline.end_time),
-                "end",
-            ),
-            Row("branch:here", "Go on from the moment shown", viewer.branch, "b"),
-            Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
-            Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
-            Row("time", "Go to a time", viewer.look_at, takes=Takes("seconds", partial(_positive, "time"))),
-            Row("branch", "Enter a branch", enter, takes=Takes("branch", options=branches)),
-        ],
-        "Compare": [
-            Row("law", "Next controller in this pane", viewer.next_law, "o"),
-            Row("pane:add", "Compare with one more controller", viewer.add_pane, "k"),
-            Row("pane:remove", "Remove this pane", viewer.remove_pane, "shift+k"),
-            Row("pane:next", "Next pane", viewer.next_pane, "`"),
-            Row("controller", "Controller", viewer.use_law, takes=law),
-        ],
-        "Touch": [
-            Row("undo", "Undo", viewer.undo, "ctrl+z", REPEATS),
-            Row("redo", "Redo", viewer.redo, "ctrl+y, ctrl+shift+z", REPEATS),
-            Row("robot:next", "Ask the next robot", partial(ask_next, 1), "tab", REPEATS),
-            Row("robot:previous", "Ask the previous robot", partial(ask_next, -1), "shift+tab", REPEATS),
-            Row("robot:fail", "Fail or revive the robot asked", viewer.fail_or_revive, "shift+d"),
-            Row("robot:remove", "Take the robot that is asked out", viewer.remove_robot, "delete"),
-            Row("finish", "Finish what is being drawn", viewer.finish, "return, enter"),
-            Row("cancel", "Give up; close", viewer.cancel, "escape"),
-            Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
-            Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),
-            Row("robot", "Ask a robot", viewer.ask, takes=_whole("robot", lambda: map(str, viewer.numbers))),
-        ],
-        "View": [
-            Row("theme", "Light or dark", viewer.switch_theme, "t"),
-            Row("fade", "Trajectories fade", viewer.switch_fade, "shift+t"),
-            Row("suggestions", "Suggestions when settled", viewer.switch_suggestions, "shift+h"),
-            Row("panel", "Hide or show the panel", viewer.switch_panel, "h"),
-        ],
-        "Keep": [
-            Row("save:session", "Save the session", viewer.save_session, "ctrl+s"),
-            Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
-            Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
-            Row("open", "Open a session", viewer.open_session, takes=Takes("file", Path, files)),
-            Row("save", "Save the session as", viewer.save_session, takes=target),
-        ],
-        "Tools": map(tool_row, viewer.tools.values()),
-        "Show": map(layer_row, layers),
-    }
-    return grouped(groups)
+    return [
+        Command("pause", "Play or pause", "Run", playback.toggle_pause, ("space",)),
+        Command("step", "Single step", "Run", playback.step, (".",), repeats=True),
+        Command("restart", "Restart", "Run", playback.restart, ("r",)),
+        Command("settle", "Play until settled, then stop", "Run", playback.toggle_settling, ("s",)),
+        Command("slower", "Slower", "Run", slower, ("-",), repeats=True),
+        Command("faster", "Faster", "Run", faster, ("=", "+"), repeats=True),
+        Command(
+            "seed:next", "New starting positions (next seed)", "Run", playback.restart_with_next_seed, ("n",)
+        ),
+        Command("start:next", "Next start of the map", "Run", playback.restart_at_next_start, ("shift+n",)),
+        Command(
+            "more", "Restart with one more robot", "Run", add_robot, ("shift+=", "shift++"), repeats=True
+        ),
+        Command("fewer", "Restart with one fewer robot", "Run", remove_robot, ("shift+-",), repeats=True),
+        Command("map:next", "Next map", "Run", next_map, ("page down",)),
+        Command("map:previous", "Previous map", "Run", previous_map, ("page up",)),
+        Command("robots", "Number of robots", "Run", set_robots, takes=_take_whole_number("robots")),
+        Command("seed", "Seed", "Run", set_seed, takes=_take_whole_number("seed")),
+        Command("start", "Start of the map", "Run", set_start, takes=takes_start),
+        Command("map", "Open a map", "Run", files.open_map, takes=takes_map),
+        Command("speed", "Speed", "Run", playback.set_speed, takes=takes_speed),
+    ]
 
 
-def parameter_commands(viewer: Presenter) -> Iterator[Command]:
-    for each in viewer.parameters():
-        run, words = partial(viewer.set_parameter, each.name), tuple(getattr(each, "offered", ()))
-        takes = Takes(f"now {each.words()}", each.read, lambda words=words: words)  # type: ignore[misc]
-        plain = each.name.removeprefix("team.")
-        yield Command(plain, f"Set {each.label}", "Run", run, takes=takes)
-        if plain != each.name:
-            yield Command(each.name, f"Set {each.label}", "Run", run, takes=takes, hidden=True)
+def _list_time_commands(viewer: Presenter) -> list[Command]:
+    playback = viewer.playback
+    step_back = partial(playback.look_by, -1)
+    step_forward = partial(playback.look_by, 1)
+    second_back = partial(playback.look_by_seconds, -1.0)
+    second_forward = partial(playback.look_by_seconds, 1.0)
+    go_to_start = partial(playback.look_at, 0.0)
+    previous_branch = partial(playback.enter_next_branch, -1)
+    next_branch = partial(playback.enter_next_branch, 1)
+    takes_time = Takes("seconds", partial(_read_positive_number, "time"))
+    takes_branch = Takes("branch", options=playback.list_branch_names)
+    return [
+        Command("back", "Step back", "Time", step_back, ("left",), repeats=True),
+        Command("forward", "Step forward", "Time", step_forward, ("right",), repeats=True),
+        Command("back:second", "Back by a second", "Time", second_back, ("shift+left",), repeats=True),
+        Command(
+            "forward:second", "Forward by a second", "Time", second_forward, ("shift+right",), repeats=True
+        ),
+        Command("first", "Go to the start", "Time", go_to_start, ("home",)),
+        Command("live", "Go to the present", "Time", playback.look_at_present, ("end",)),
+        Command("branch:here", "Continue from here", "Time", playback.branch, ("b",)),
+        Command("branch:previous", "Previous branch", "Time", previous_branch, ("alt+left",)),
+        Command("branch:next", "Next branch", "Time", next_branch, ("alt+right",)),
+        Command("time", "Go to a time", "Time", playback.look_at, takes=takes_time),
+        Command("branch", "Enter a branch", "Time", playback.enter_branch, takes=takes_branch),
+    ]
 
 
-def _whole(word: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
+def _list_compare_commands(viewer: Presenter) -> list[Command]:
+    comparison = viewer.comparison
+    takes_controller = Takes("controller", options=lambda: viewer.controllers)
+    return [
+        Command(
+            "controller:next",
+            "Next controller in this pane",
+            "Compare",
+            comparison.choose_next_controller,
+            ("o",),
+        ),
+        Command("pane:add", "Compare with one more controller", "Compare", comparison.add_pane, ("k",)),
+        Command("pane:remove", "Remove this pane", "Compare", comparison.remove_pane, ("shift+k",)),
+        Command("pane:next", "Next pane", "Compare", comparison.activate_next_pane, ("`",)),
+        Command("controller", "Controller", "Compare", comparison.use_controller, takes=takes_controller),
+    ]
+
+
+def _list_edit_commands(viewer: Presenter) -> list[Command]:
+    playback = viewer.playback
+    robots = viewer.robots
+    select_next = partial(robots.select_next, 1)
+    select_previous = partial(robots.select_next, -1)
+    enlarge = partial(viewer.resize_tool, RESIZE_STEP)
+    shrink = partial(viewer.resize_tool, 1 / RESIZE_STEP)
+    takes_robot = _take_whole_number("robot", lambda: map(str, viewer.robot_numbers))
+    return [
+        Command("undo", "Undo", "Edit", playback.undo, ("ctrl+z",), repeats=True),
+        Command("redo", "Redo", "Edit", playback.redo, ("ctrl+y", "ctrl+shift+z"), repeats=True),
+        Command("robot:next", "Inspect the next robot", "Edit", select_next, ("tab",), repeats=True),
+        Command(
+            "robot:previous",
+            "Inspect the previous robot",
+            "Edit",
+            select_previous,
+            ("shift+tab",),
+            repeats=True,
+        ),
+        Command("robot:fail", "Fail or revive selected robot", "Edit", robots.fail_or_revive, ("shift+d",)),
+        Command("robot:remove", "Remove selected robot", "Edit", robots.remove, ("delete",)),
+        Command("finish", "Finish drawing", "Edit", viewer.finish_drawing, ("return", "enter")),
+        Command("cancel", "Cancel", "Edit", viewer.cancel, ("escape",)),
+        Command("wider", "Wider walls; a larger brush", "Edit", enlarge, ("]",), repeats=True),
+        Command("narrower", "Narrower walls; a smaller brush", "Edit", shrink, ("[",), repeats=True),
+        Command("robot", "Inspect a robot", "Edit", robots.select, takes=takes_robot),
+    ]
+
+
+def _list_view_commands(viewer: Presenter) -> list[Command]:
+    view = viewer.view
+    return [
+        Command("theme", "Light or dark", "View", view.toggle_theme, ("t",)),
+        Command("fade", "Fading trajectories", "View", view.toggle_fading, ("shift+t",)),
+        Command("suggestions", "Suggestions when settled", "View", view.toggle_suggestions, ("shift+h",)),
+        Command("panel", "Hide or show the panel", "View", view.toggle_panel, ("h",)),
+    ]
+
+
+def _list_file_commands(viewer: Presenter) -> list[Command]:
+    files = viewer.files
+    takes_session = Takes("file", Path, files.list_sessions)
+    takes_target = Takes("file", _read_path)
+    return [
+        Command("save:session", "Save session", "File", files.save_session, ("ctrl+s",)),
+        Command("recover", "Recover a session", "File", files.recover, ("ctrl+shift+o",)),
+        Command("save:map", "Save map", "File", files.save_map, ("ctrl+shift+s",)),
+        Command("open", "Open a session", "File", files.open_session, takes=takes_session),
+        Command("save", "Save session as", "File", files.save_session, takes=takes_target),
+    ]
+
+
+def _list_tool_commands(viewer: Presenter) -> list[Command]:
+    commands: list[Command] = []
+    for tool in viewer.toolbox.by_name.values():
+        title = f"{tool.title}: {tool.hint}"
+        choose = partial(viewer.choose_tool, tool.name)
+        commands.append(Command(f"tool:{tool.name}", title, "Tools", choose, (tool.key,)))
+    return commands
+
+
+def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
+    """Return the commands that show or hide layers: those with keys first, in the order of the keys."""
+    names = [name for name in _LAYER_KEYS if name in titles]
+    names += [name for name in titles if name not in _LAYER_KEYS]
+    commands: list[Command] = []
+    for name in names:
+        keys = (_LAYER_KEYS[name],) if name in _LAYER_KEYS else ()
+        toggle = partial(viewer.view.toggle_layer, name)
+        commands.append(Command(f"layer:{name}", titles[name], "Show", toggle, keys))
+    return commands
+
+
+def list_parameter_commands(viewer: Presenter) -> Iterator[Command]:
+    """Yield a typed command for each gain of the controller in use and each limit of the team."""
+    for parameter in viewer.comparison.list_parameters():
+        title = f"Set {parameter.label}"
+        set_value = partial(viewer.comparison.set_parameter, parameter.name)
+        takes = _take_parameter(parameter)
+        short_name = parameter.name.removeprefix("team.")
+        yield Command(short_name, title, "Run", set_value, takes=takes)
+        if short_name != parameter.name:
+            yield Command(parameter.name, title, "Run", set_value, takes=takes, hidden=True)
+
+
+def _take_parameter(parameter: Parameter) -> Takes:
+    return Takes(f"now {parameter.format()}", parameter.parse, lambda: parameter.choices)
+
+
+def _take_whole_number(name: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
     def read(text: str) -> int:
         try:
             return int(text)
         except ValueError:
-            raise ParameterError(f"{word}: expected a whole number, got {text!r}") from None
+            raise ParameterError(f"{name}: expected a whole number, got {text!r}") from None
 
     return Takes("whole number", read, options)
 
 
-def _speed(text: str) -> float:
-    return math.inf if text in ("max", "inf") else _positive("speed", text, 0.01, 1000.0)
+def _read_path(text: str) -> Path | None:
+    """Return a path; None for an empty text, for the session's own file."""
+    return Path(text) if text else None
 
 
-def _positive(word: str, text: str, low: float = 0.0, high: float = 1e300) -> float:
+def _read_speed(text: str) -> float:
+    if text in ("max", "inf"):
+        return math.inf
+    return _read_positive_number("speed", text, MIN_SPEED, MAX_SPEED)
+
+
+def _read_positive_number(name: str, text: str, low: float = 0.0, high: float = 1e300) -> float:
     try:
         value = float(text.rstrip("×x"))
     except ValueError:
         value = math.nan
     if not low <= value <= high:
-        raise ParameterError(f"{word}: expected a positive number, got {text!r}")
+        raise ParameterError(f"{name}: expected a positive number, got {text!r}")
     return value

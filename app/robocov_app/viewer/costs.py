@@ -1,11 +1,11 @@
-"""The exact cost of all panes beside the window: asked for in turn, each answer with its own time."""
+"""The exact coverage cost of all panes, computed in another process; each answer has its own time."""
 
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,117 +19,71 @@ from robocov_app.jobs.messages import Line, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_field import Field, FieldLattice
 
-_PAUSE = 0.05  # seconds between two words on how far a map is
-_Sites: TypeAlias = tuple[Sites, Array, Array | None]  # with corners and weights: what all results share
-_INDICES = ("owner", "first_corner", "last_corner")
+PROGRESS_INTERVAL_S = 0.05  # between two reports of how far the preparation of a map is
+MIN_LISTED_TIME_S = 1.0  # a shorter remaining time is not shown
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
-    """The newest that is known of a pane's cost."""
+class KnownCost:
+    """The latest known cost of a pane.
+
+    Attributes
+    ----------
+    time : float
+        Time to which it belongs, s.
+    result : CoverageResult
+        The cost.
+    path : (k, 2) array, m, or None
+        Path from the cursor to its nearest robot; empty if there is none.
+    get_lattice : callable
+        Returns the sites for drawing.
+    travel_time : float or None
+        Mean time until the first robot arrives, s.
+    """
 
     time: float
     result: CoverageResult
-    path: Array | None  # way-points from the cursor to its nearest robot, empty where none can come
-    lattice: Callable[[], FieldLattice]  # returns the sites as a field wants them
-    travel_time: float | None = None  # s, mean time until the first robot is at a place
+    path: Array | None
+    get_lattice: Callable[[], FieldLattice]
+    travel_time: float | None = None
 
     @cached_property
     def field(self) -> Field:
-        return Field(self.lattice(), self.result)
+        """Distance field for drawing."""
+        return Field(self.get_lattice(), self.result)
 
 
-class Costs:
-    """Costs for a window, computed in another process, or `direct` where pictures must not depend on it."""
+class _SharedSites(NamedTuple):
+    """What all results on a map share: sites, corners of geodesics, and weights of the sites."""
 
-    def __init__(self, lattice: int = DEFAULT_LATTICE, *, direct: bool = False) -> None:
-        self.known: dict[int, Known] = {}  # by pane, of the map as it is
-        self.state = ""  # how far a new map is, or why there is no cost
-        self.lattice = lattice  # sites along a side
-        self._worker: Worker[Known | _Sites] = DirectWorker(CostService(), _CostWire())
-        if not direct:
-            service = "robocov_app.viewer.costs:CostService"
-            self._worker = LatestWorker(service, "computes the cost", _CostWire)
-        self._map: CostQuestion | None = None
-        self._asked: CostQuestion | None = None
-        self._number, self._ready = 0, False
-        self._waiting: dict[int, CostQuestion] = {}
-        self._pane: int | None = None  # of what is asked; None for a map, or where nobody wants it any more
-
-    def environment(self, environment: Environment) -> None:
-        self._number += 1
-        self._map = CostQuestion(self._number, environment, self.lattice)
-        self.known, self._waiting = {}, {}
-        self._prepare()
-        self.poll()
-
-    def forget(self) -> None:
-        """Leave out what has been asked and is not yet answered: it was of another run."""
-        self._waiting, self.known, self._pane = {}, {}, None
-
-    def ask(
-        self,
-        pane: int,
-        time: float,
-        at: Array,
-        point: Array | None = None,
-        speeds: Array | None = None,
-        *,
-        aside: bool = False,
-    ) -> None:
-        """Ask for the cost at (n, 2) m, a path from a point and, with (n,) m/s, the mean time.
-
-        What was asked about the pane before and is not yet on its way is forgotten. `aside`: for a curve; it
-        does not become what is known of the pane.
-        """
-        if self._map is not None:  # it keeps its place among the panes that wait, so that each has its turn
-            asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
-            self._waiting[pane] = replace(asked, aside=aside)
-
-    def poll(self) -> list[tuple[int, Known]]:
-        answers, worker = [], self._worker
-        while self._asked is not None or self._ask_next():
-            answer = worker.poll()
-            if worker.busy:
-                if worker.progress is not None:
-                    fraction, seconds = worker.progress
-                    left = f", {seconds:.0f} s left" if seconds >= 1.0 else ""
-                    self.state = f"cost: preparing the map, {fraction:.0%}{left}"
-                break
-            asked, self._asked = self._asked, None
-            if asked is self._map:
-                self._ready = answer is not None
-                self.state = "" if self._ready else f"no cost: {worker.trouble}"
-            elif answer is None:
-                if not worker.is_alive:
-                    self._prepare()  # it is started again; not if it dies of that too
-            elif self._pane is not None and isinstance(answer, Known):
-                if asked is None or not asked.aside:
-                    self.known[self._pane] = answer
-                answers.append((self._pane, answer))
-        return answers
-
-    def close(self) -> None:
-        self.forget()
-        self._worker.close()
-
-    def _prepare(self) -> None:
-        self._ready, self.state = False, "cost: preparing the map"
-        self._asked, self._pane = self._map, None
-        self._worker.put(self._map)
-
-    def _ask_next(self) -> bool:
-        if not self._waiting or not self._ready:
-            return False
-        self._pane = next(iter(self._waiting))
-        self._asked = self._waiting.pop(self._pane)
-        self._worker.put(self._asked)
-        return True
+    sites: Sites
+    corners: Array
+    weights: Array | None
 
 
 @dataclass(frozen=True, eq=False)
 class CostQuestion:
-    """Request for the cost on map `number`, which is told once. Without positions: prepare it."""
+    """Request for the cost on a map; without positions: prepare the map.
+
+    Attributes
+    ----------
+    number : int
+        Number of the map.
+    environment : Environment or None
+        The map; it is sent only once.
+    lattice : int
+        Number of sites along the longer side of the map.
+    time : float
+        Time, s.
+    positions : (n, 2) array, m, or None
+        Positions of the robots.
+    point : (2,) array, m, or None
+        Start of a path to its nearest robot.
+    speeds : (n,) array, m/s, or None
+        Maximum speeds of the robots, for the mean time.
+    is_for_curve : bool
+        Whether the answer is meant for a curve, and is not the latest cost of its pane.
+    """
 
     number: int
     environment: Environment | None
@@ -138,13 +92,155 @@ class CostQuestion:
     positions: Array | None = None
     point: Array | None = None
     speeds: Array | None = None
-    aside: bool = False
+    is_for_curve: bool = False
+
+
+class Costs:
+    """Costs of the panes of a window.
+
+    Parameters
+    ----------
+    lattice : int
+        Number of sites along the longer side of the map.
+    direct : bool
+        Whether to compute costs at once instead of in another process: for pictures that must not depend on
+        its speed.
+
+    Attributes
+    ----------
+    known : dict of int to KnownCost
+        Latest costs by the number of the pane.
+    state : str
+        Progress of the preparation of a map, or why there is no cost; otherwise empty.
+    lattice : int
+        Number of sites along the longer side of the map.
+    """
+
+    def __init__(self, lattice: int = DEFAULT_LATTICE, *, direct: bool = False) -> None:
+        self.known: dict[int, KnownCost] = {}
+        self.state = ""
+        self.lattice = lattice
+        self._worker: Worker[KnownCost | _SharedSites] = DirectWorker(CostService(), _CostWire())
+        if not direct:
+            service = "robocov_app.viewer.costs:CostService"
+            self._worker = LatestWorker(service, "computes the cost", _CostWire)
+        self._map_question: CostQuestion | None = None
+        self._asked: CostQuestion | None = None
+        self._map_number = 0
+        self._is_prepared = False
+        self._waiting: dict[int, CostQuestion] = {}
+        self._asked_pane: int | None = None  # None if the answer is not wanted any more
+
+    def set_environment(self, environment: Environment) -> None:
+        """Prepare the costs on another map."""
+        self._map_number += 1
+        self._map_question = CostQuestion(self._map_number, environment, self.lattice)
+        self.known = {}
+        self._waiting = {}
+        self._prepare_map()
+        self.poll()
+
+    def forget(self) -> None:
+        """Drop all costs and questions, because they belong to another run."""
+        self._waiting = {}
+        self.known = {}
+        self._asked_pane = None
+
+    def ask(
+        self,
+        pane: int,
+        time: float,
+        positions: Array,
+        point: Array | None = None,
+        speeds: Array | None = None,
+        *,
+        is_for_curve: bool = False,
+    ) -> None:
+        """Ask for the cost of a pane. A question about it that still waits is replaced.
+
+        Parameters
+        ----------
+        pane : int
+            Number of the pane.
+        time : float
+            Time, s.
+        positions : (n, 2) array, m
+            Positions of the robots.
+        point : (2,) array, m, optional
+            Start of a path to its nearest robot.
+        speeds : (n,) array, m/s, optional
+            Maximum speeds of the robots, for the mean time.
+        is_for_curve : bool
+            Whether the answer is meant for a curve only.
+        """
+        if self._map_question is None:
+            return
+        # A replaced question keeps its place, so that panes take turns.
+        self._waiting[pane] = replace(
+            self._map_question,
+            time=time,
+            positions=np.array(positions),
+            point=point,
+            speeds=speeds,
+            is_for_curve=is_for_curve,
+        )
+
+    def poll(self) -> list[tuple[int, KnownCost]]:
+        """Return the answers since the last call, with the numbers of their panes, and ask what waits."""
+        answers: list[tuple[int, KnownCost]] = []
+        while self._asked is not None or self._ask_next():
+            answer = self._worker.poll()
+            if self._worker.busy:
+                self._show_progress()
+                break
+            asked = self._asked
+            self._asked = None
+            if asked is self._map_question:
+                self._is_prepared = answer is not None
+                self.state = "" if self._is_prepared else f"no cost: {self._worker.trouble}"
+            elif answer is None:
+                # Start the process again after it has died; if it dies of the map, too, it stays so.
+                if not self._worker.is_alive:
+                    self._prepare_map()
+            elif self._asked_pane is not None and isinstance(answer, KnownCost):
+                if asked is None or not asked.is_for_curve:
+                    self.known[self._asked_pane] = answer
+                answers.append((self._asked_pane, answer))
+        return answers
+
+    def close(self) -> None:
+        """End the process."""
+        self.forget()
+        self._worker.close()
+
+    def _show_progress(self) -> None:
+        if self._worker.progress is None:
+            return
+        fraction, remaining = self._worker.progress
+        text = f", {remaining:.0f} s left" if remaining >= MIN_LISTED_TIME_S else ""
+        self.state = f"cost: preparing the map, {fraction:.0%}{text}"
+
+    def _prepare_map(self) -> None:
+        self._is_prepared = False
+        self.state = "cost: preparing the map"
+        self._asked = self._map_question
+        self._asked_pane = None
+        self._worker.put(self._map_question)
+
+    def _ask_next(self) -> bool:
+        """Ask the question that has waited longest; return whether there was one."""
+        if not self._waiting or not self._is_prepared:
+            return False
+        self._asked_pane = next(iter(self._waiting))
+        self._asked = self._waiting.pop(self._asked_pane)
+        self._worker.put(self._asked)
+        return True
 
 
 class _Answer(NamedTuple):
-    """Answer on its way: sites only where they are others than before."""
+    """Answer of the service; with the shared sites only if they have changed."""
 
-    sites: _Sites | None
+    shared: _SharedSites | None
     time: float = 0.0
     result: CoverageResult | None = None
     path: Array | None = None
@@ -152,36 +248,44 @@ class _Answer(NamedTuple):
 
 
 class _CostWire(Wire):
-    """Says each map once, and puts together what is said once of the results."""
+    """Sends each map once, and completes answers with the sites that were sent once."""
 
     def __init__(self) -> None:
-        self._told = -1
-        self._sites: _Sites | None = None
-        self._lattice: Callable[[], FieldLattice] | None = None
+        self._sent_map = -1
+        self._shared: _SharedSites | None = None
+        self._get_lattice: Callable[[], FieldLattice] | None = None
 
     def encode(self, question: CostQuestion) -> CostQuestion:
-        if question.number == self._told or question.environment is None:
+        """Leave the map out if it was sent already."""
+        if question.number == self._sent_map or question.environment is None:
             return replace(question, environment=None)
-        self._told = question.number
-        # without what has been derived already: that is quickly done again, and long to send
+        self._sent_map = question.number
+        # A copy has no cached properties, which take long to send and are quickly computed again.
         return replace(question, environment=replace(question.environment))
 
-    def decode(self, answer: _Answer) -> Known | _Sites:
-        if answer.sites is not None:
-            self._sites, sites = answer.sites, answer.sites[0]
-            self._lattice = cache(lambda: FieldLattice(sites))
-        assert self._sites is not None and self._lattice is not None
+    def decode(self, answer: _Answer) -> KnownCost | _SharedSites:
+        """Add the shared sites to an answer."""
+        if answer.shared is not None:
+            self._shared = answer.shared
+            sites = answer.shared.sites
+            self._get_lattice = cache(lambda: FieldLattice(sites))
+        assert self._shared is not None and self._get_lattice is not None
         if answer.result is None:
-            return self._sites
-        sites, corners, weights = self._sites
-        same: dict[str, Any] = {"points": sites.points, "corners": corners, "weights": weights}
-        indices = {name: getattr(answer.result, name).astype(np.intp) for name in _INDICES}
-        result = replace(answer.result, **indices, **same)
-        return Known(answer.time, result, answer.path, self._lattice, answer.travel_time)
+            return self._shared
+        result = replace(
+            answer.result,
+            owner=answer.result.owner.astype(np.intp),
+            first_corner=answer.result.first_corner.astype(np.intp),
+            last_corner=answer.result.last_corner.astype(np.intp),
+            points=self._shared.sites.points,
+            corners=self._shared.corners,
+            weights=self._shared.weights,
+        )
+        return KnownCost(answer.time, result, answer.path, self._get_lattice, answer.travel_time)
 
 
 class CostService:
-    """Prepares the newest map, and answers the newest question about it."""
+    """Prepares the latest map, and answers the latest question about it."""
 
     failing = "the cost could not be computed"
 
@@ -189,63 +293,91 @@ class CostService:
         # If another process is compiling these kernels already, wait for it.
         compile_kernels([call_cost_kernels])
         self._cost: CoverageCost | None = None
-        self._told: CoverageCost | None = None
-        self._momentary: TimeVaryingCost | None = None
+        self._sent_cost: CoverageCost | None = None  # whose sites were sent last
+        self._varying_cost: TimeVaryingCost | None = None
 
     def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
+        """Answer the last of several questions."""
         maps = [question for question in questions if question.environment is not None]
         if maps:
             self._prepare(maps[-1], line)
-        cost, momentary, question = self._cost, self._momentary, questions[-1]
-        if cost is None or momentary is None:
+        cost = self._cost
+        varying_cost = self._varying_cost
+        question = questions[-1]
+        if cost is None or varying_cost is None:
             raise InputError("the map has no cost")
         answer = _Answer(None)
         if question.positions is not None:
-            answer, cost = _evaluated(momentary, question), momentary.get_cost(question.time)
-        sites = None if cost is self._told else (cost.sites, cost.corners, cost.weights)
-        self._told = cost
-        return answer._replace(sites=sites)
+            answer = _evaluate(varying_cost, question, question.positions)
+            cost = varying_cost.get_cost(question.time)
+        shared = None
+        if cost is not self._sent_cost:
+            shared = _SharedSites(cost.sites, cost.corners, cost.weights)
+        self._sent_cost = cost
+        return answer._replace(shared=shared)
 
-    def _prepare(self, asked: CostQuestion, line: Line) -> None:
-        environment, before, said = asked.environment, self._cost, (began := time.perf_counter())
+    def _prepare(self, question: CostQuestion, line: Line) -> None:
+        environment = question.environment
         assert environment is not None
+        started_at = time.perf_counter()
+        reported_at = started_at
 
-        def give_up(done: float) -> None:
-            if any(question.environment is not None for question in line.newer()):
+        def check_newer_map(fraction: float) -> None:
+            if any(newer.environment is not None for newer in line.newer()):
                 raise RobocovError("there is a newer map")
 
-        def tell(done: float) -> None:
-            nonlocal said
-            give_up(done)
+        def report_progress(fraction: float) -> None:
+            nonlocal reported_at
+            check_newer_map(fraction)
             now = time.perf_counter()
-            if now - said > _PAUSE and done > 0.0:
-                said = now
-                line.tell((done, (now - began) * (1.0 - done) / done))
+            if now - reported_at > PROGRESS_INTERVAL_S and fraction > 0.0:
+                reported_at = now
+                line.tell((fraction, (now - started_at) * (1.0 - fraction) / fraction))
 
-        self._momentary = None
-        if before and before.lattice == asked.lattice and before.environment.has_same_geometry(environment):
+        self._varying_cost = None
+        before = self._cost
+        is_reusable = (
+            before is not None
+            and before.lattice == question.lattice
+            and before.environment.has_same_geometry(environment)
+        )
+        if before is not None and is_reusable:
             self._cost = before.with_density(environment)
         else:
-            self._cost = CoverageCost(environment, asked.lattice, progress=tell)
-        self._momentary = TimeVaryingCost(self._cost, progress=give_up)
+            self._cost = CoverageCost(environment, question.lattice, progress=report_progress)
+        self._varying_cost = TimeVaryingCost(self._cost, progress=check_newer_map)
 
 
-def _evaluated(momentary: TimeVaryingCost, question: CostQuestion) -> _Answer:
-    now, positions = question.time, question.positions
-    assert positions is not None
-    result = momentary.evaluate_all_robots(now, positions)
+def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> _Answer:
+    """Compute the answer to a question, without what all results on a map share."""
+    result = cost.evaluate_all_robots(question.time, positions)
     if result is None:
         raise InputError("positions: expected at least one at a free position, got none")
-    path = travel_time = None
-    if question.speeds is not None:
-        first = momentary(now, positions, speeds=question.speeds)
-        travel_time = None if first is None else first.mean_time
+    path: Array | None = None
     if question.point is not None:
-        with suppress(RobocovError):  # the point is not free
-            path = momentary.get_cost(now).find_path(
-                positions[momentary.find_counted_robots(now, positions)], question.point
-            )
-    indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}  # half as long on the way
-    same: dict[str, Any] = dict.fromkeys(["weights", "environment", "sites"])
-    same |= dict.fromkeys(["points", "corners"], np.empty((0, 2)))
-    return _Answer(None, now, replace(result, **indices, **same), path, travel_time)
+        # There is no path from a point that is not free.
+        with suppress(RobocovError):
+            counted = cost.find_counted_robots(question.time, positions)
+            path = cost.get_cost(question.time).find_path(positions[counted], question.point)
+    # Small integers are half as long to send.
+    result = replace(
+        result,
+        owner=result.owner.astype(np.int32),
+        first_corner=result.first_corner.astype(np.int32),
+        last_corner=result.last_corner.astype(np.int32),
+        points=np.empty((0, 2)),
+        corners=np.empty((0, 2)),
+        weights=None,
+        environment=None,
+        sites=None,
+    )
+    travel_time = _compute_travel_time(cost, question, positions)
+    return _Answer(None, question.time, result, path, travel_time)
+
+
+def _compute_travel_time(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> float | None:
+    """Return the mean time until the first robot arrives, s, if speeds are given."""
+    if question.speeds is None:
+        return None
+    result = cost(question.time, positions, speeds=question.speeds)
+    return None if result is None else result.mean_time

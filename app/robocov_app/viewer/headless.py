@@ -35,7 +35,7 @@ from robocov_app.runs.settings import OutputSettings, VideoSettings
 from robocov_app.runs.video import VIDEO_HOLD_S, get_video_name, write_frames_and_video
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import write_csv, write_json
-from robocov_app.viewer.film import pixels
+from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.document import Node, SessionDocument, replay
 from robocov_app.viewer.session.edits import PlaceRobot
 from robocov_app.viewer.session.map_edits import add_obstacle
@@ -253,7 +253,7 @@ def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
     strip.fill(theme.panel)
     picture = label(shortened(words, text, size[0] - 2 * text, True), text, theme.ink, True)
     strip.blit(picture, picture.get_rect(midleft=(text, size[1] // 2)))
-    return pixels(strip)
+    return copy_pixels(strip)
 
 
 def _scene(pane: Pane, histories: list[History], name: str) -> Scene:

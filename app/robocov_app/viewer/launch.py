@@ -1,8 +1,8 @@
-"""Opening the window: with a display or without, from the command line's options."""
+"""Opening the viewer's window, with a display or without, and keeping its settings."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -24,9 +24,10 @@ from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
+from robocov_app.viewer.session.run_saver import RunSaver
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import find_recoverable_drafts
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 NO_DISPLAY = (
     "no display: the window needs one (over ssh, try ssh -X); --out DIR with --frames N "
@@ -34,16 +35,41 @@ NO_DISPLAY = (
 )
 HEADLESS_FPS = 30  # frames per second of what is rendered without a display
 
+MIN_WIDTH_PX = 900
+MAX_WIDTH_PX = 7680
+MIN_HEIGHT_PX = 600
+MAX_HEIGHT_PX = 4320
 
-class Settings(BaseModel):
-    """Appearance of the window, not what happens in it, kept in the user's folder for settings."""
+
+class WindowSettings(BaseModel):
+    """Appearance of the window, kept in the user's folder for settings.
+
+    Attributes
+    ----------
+    theme : {"light", "dark"}
+        Colors.
+    scale : float or None
+        Size of texts and widgets; None for that of the screen.
+    width, height : int
+        Size of the window, px.
+    shown : tuple of str or None
+        Names of the visible layers; None for the default ones.
+    tab : str
+        Page of the panel.
+    fade : bool
+        Whether trajectories show the last seconds only.
+    suggests : bool
+        Whether the window suggests what to try.
+    recent : tuple of str
+        Session files used last.
+    """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
     theme: Literal["light", "dark"] = "light"
     scale: float | None = Field(default=None, ge=0.5, le=4.0)
-    width: int = Field(default=1280, ge=900, le=7680)
-    height: int = Field(default=720, ge=600, le=4320)
+    width: int = Field(default=1280, ge=MIN_WIDTH_PX, le=MAX_WIDTH_PX)
+    height: int = Field(default=720, ge=MIN_HEIGHT_PX, le=MAX_HEIGHT_PX)
     shown: tuple[str, ...] | None = None
     tab: str = "parameters"
     fade: bool = False
@@ -53,108 +79,192 @@ class Settings(BaseModel):
 
 @dataclass
 class Launcher:
-    """Launch settings of a window."""
+    """Opens a window on a session.
+
+    Attributes
+    ----------
+    session : Session
+        The session.
+    map_name : str
+        Bundled name or path of its map.
+    folder : Path
+        Folder in which files are saved.
+    theme : str or None
+        ``light`` or ``dark``; None for the one used last.
+    size : tuple of int or None
+        Width and height, px; None for those used last.
+    scale : float or None
+        Size of texts and widgets; None for the one used last.
+    shown_layers : frozenset of str
+        Layers that are visible in addition to those used last.
+    hidden_layers : frozenset of str
+        Layers that are hidden.
+    headless : bool
+        Whether to draw without a display, in steps of 1 / `HEADLESS_FPS` however long a frame takes.
+    served : bool
+        Whether to draw for a browser: without a display, but in real time. No settings are kept; drafts are
+        below `folder`.
+    controllers : tuple of str
+        Names of controllers to offer in addition to the built-in ones.
+    lattice : int
+        Number of sites along the longer side of the map, for the cost.
+    file : Path or None
+        File of the session.
+    offers_lesson : bool
+        Whether to offer the lesson when the window is opened for the first time.
+    """
 
     session: Session
     map_name: str
-    folder: Path  # where things are saved
-    theme: str | None = None  # this and the next two: None for what was used last
+    folder: Path
+    theme: str | None = None
     size: tuple[int, int] | None = None
     scale: float | None = None
-    also: frozenset[str] = frozenset()  # names of layers
-    without: frozenset[str] = frozenset()
-    headless: bool = False  # draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes
-    served: bool = False  # draw without a display, but live; no settings are kept, drafts below `folder`
-    laws: tuple[str, ...] = ()  # names of controllers to choose from beside the built-in ones
+    shown_layers: frozenset[str] = frozenset()
+    hidden_layers: frozenset[str] = frozenset()
+    headless: bool = False
+    served: bool = False
+    controllers: tuple[str, ...] = ()
     lattice: int = DEFAULT_LATTICE
     file: Path | None = None
     offers_lesson: bool = False
-    _usual: set[str] = field(default_factory=set, init=False)  # layers that are shown without these options
 
     @contextmanager
-    def window(self) -> Iterator[Window]:
-        """Give the window, with settings from before, which are kept; InputError when there is no display."""
-        keeper = None
+    def window(self) -> Iterator[ViewerWindow]:
+        """Open the window with its settings, and keep what was changed of them.
+
+        Raises
+        ------
+        InputError
+            If there is no display.
+        """
+        saver: RunSaver | None = None
         try:
-            with open_display(headless=self._alone, missing_message=NO_DISPLAY):
-                file = None if self._alone else find_settings_file()
-                settings, trouble = load_settings(Settings, file)
-                window = self._opened(settings)
-                window.viewer.say(trouble)
-                if found := find_recoverable_drafts(self._drafts):
-                    window.offer_recovery(found)
-                elif self.offers_lesson and file is not None and not file.exists():
-                    window.offer_lesson()
-                keeper, begun = window.keeper, self._settings_of(window, settings)
+            with open_display(headless=self._needs_no_display, missing_message=NO_DISPLAY):
+                file = None if self._needs_no_display else find_settings_file()
+                settings, message = load_settings(WindowSettings, file)
+                window = self._open_window(settings)
+                saver = window.run_saver
+                window.viewer.show_message(message)
+                self._offer_help(window, file)
+                at_opening = self._read_settings(window, settings)
                 try:
                     yield window
-                    ended = self._settings_of(window, settings)
-                    save_settings(merge_changed_settings(settings, begun, ended), file)
+                    at_closing = self._read_settings(window, settings)
+                    save_settings(merge_changed_settings(settings, at_opening, at_closing), file)
                 finally:
-                    window.viewer.workspace.close()
+                    window.viewer.files.workspace.close()
                     window.viewer.costs.close()
         finally:
-            if keeper is not None:  # the window is gone; what is still being saved is waited for
-                keeper.finish()
-                for words, bad in keeper.poll():
-                    if bad:
-                        echo(f"robocov: {words}", to_stderr=True)
+            if saver is not None:
+                _wait_for_runs(saver)
 
     @property
-    def _alone(self) -> bool:
+    def _needs_no_display(self) -> bool:
         return self.headless or self.served
 
     @property
-    def _drafts(self) -> Path | None:
-        """The folder for drafts; None if none are kept."""
+    def _draft_folder(self) -> Path | None:
+        """Folder for drafts; None if none are kept."""
         if self.headless:
             return None
         return find_draft_folder(self.folder if self.served else None)
 
-    def _opened(self, settings: Settings) -> Window:
-        self._usual = {layer.name for layer in standard_layers() if layer.default}
-        if settings.shown is not None:
-            self._usual = {layer.name for layer in standard_layers()} & set(settings.shown)
-        shown = (self._usual | self.also) - self.without
-        scale = self.scale or settings.scale or (1.0 if self._alone else get_screen_scale())
-        size = self.size or (settings.width, settings.height)
-        if self.size is None and self.scale is not None:  # text of that size needs a window of that size
-            size = max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale))
-        if self.size is None and not self._alone:
-            size = fit_to_screen(size)
+    def _offer_help(self, window: ViewerWindow, settings_file: Path | None) -> None:
+        """Offer to recover unsaved work, else the lesson if the user has never opened the window."""
+        drafts = find_recoverable_drafts(self._draft_folder)
+        if drafts:
+            window.offer_recovery(drafts)
+        elif self.offers_lesson and settings_file is not None and not settings_file.exists():
+            window.offer_lesson()
+
+    def _open_window(self, settings: WindowSettings) -> ViewerWindow:
+        scale = self._choose_scale(settings)
+        size = self._choose_size(settings, scale)
         if not self.headless:
             self.session.playback.clock.budget = FRAME_BUDGET_S
         costs = Costs(self.lattice, direct=self.headless)
         try:
-            viewer = Presenter(
-                self.session,
-                costs,
-                shown,
-                self.folder,
-                map_name=self.map_name,
-                laws=self.laws,
-                kept_in=self._drafts,
-                file=self.file,
-            )
-            viewer.theme = self.theme or settings.theme
-            viewer.fade, viewer.suggests, viewer.recent = settings.fade, settings.suggests, [*settings.recent]
-            window = Window(viewer, size, scale, patient=self.headless)
-            window.faults = FaultLog(self._drafts)
+            viewer = self._build_presenter(costs, settings)
+            window = ViewerWindow(viewer, size, scale, is_unattended=self.headless)
+            window.faults = FaultLog(self._draft_folder)
             window.contains_faults = not self.headless
         except BaseException:
             costs.close()
             raise
         if self.scale is not None and window.layout.scale < self.scale:
-            wide, high = (round(each * self.scale) for each in SMALLEST)
-            needs = f"scale {self.scale:g} needs a window of {wide} × {high}"
-            viewer.say(f"{needs}: {window.layout.scale:g} it is")
+            width = round(SMALLEST[0] * self.scale)
+            height = round(SMALLEST[1] * self.scale)
+            viewer.show_message(
+                f"scale {self.scale:g} needs a window of {width} × {height}; using {window.layout.scale:g}"
+            )
         window.panel.show_tab(settings.tab)
         return window
 
-    def _settings_of(self, window: Window, before: Settings) -> Settings:
-        viewer, (width, height) = window.viewer, window.windowed or window.screen.get_size()
-        look = {name: getattr(viewer, name) for name in ("theme", "fade", "suggests")}
-        shown = viewer.shown - (self.also - self._usual) | (self.without & self._usual)
-        kept = {"recent": tuple(viewer.recent), "shown": tuple(sorted(shown)), "tab": window.panel.tab}
-        size = {"width": min(max(width, 900), 7680), "height": min(max(height, 600), 4320)}
-        return before.model_copy(update=look | kept | size)
+    def _build_presenter(self, costs: Costs, settings: WindowSettings) -> Presenter:
+        layers = (_list_usual_layers(settings) | self.shown_layers) - self.hidden_layers
+        viewer = Presenter(
+            self.session,
+            costs,
+            layers,
+            self.folder,
+            self.map_name,
+            controllers=self.controllers,
+            draft_folder=self._draft_folder,
+            file=self.file,
+        )
+        viewer.view.theme = self.theme or settings.theme
+        viewer.view.fades_trajectories = settings.fade
+        viewer.view.has_suggestions = settings.suggests
+        viewer.files.recent = list(settings.recent)
+        return viewer
+
+    def _choose_scale(self, settings: WindowSettings) -> float:
+        scale = self.scale or settings.scale
+        if scale:
+            return scale
+        return 1.0 if self._needs_no_display else get_screen_scale()
+
+    def _choose_size(self, settings: WindowSettings, scale: float) -> tuple[int, int]:
+        if self.size is not None:
+            return self.size
+        size = (settings.width, settings.height)
+        if self.scale is not None:
+            # Text of that size needs a window that is large enough for it.
+            size = (max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale)))
+        return size if self._needs_no_display else fit_to_screen(size)
+
+    def _read_settings(self, window: ViewerWindow, before: WindowSettings) -> WindowSettings:
+        """Return the settings of a window; layers chosen by options of the command line do not count."""
+        viewer = window.viewer
+        view = viewer.view
+        usual = _list_usual_layers(before)
+        layers = view.layers - (self.shown_layers - usual) | (self.hidden_layers & usual)
+        width, height = window.windowed or window.screen.get_size()
+        changes = {
+            "theme": view.theme,
+            "fade": view.fades_trajectories,
+            "suggests": view.has_suggestions,
+            "recent": tuple(viewer.files.recent),
+            "shown": tuple(sorted(layers)),
+            "tab": window.panel.tab,
+            "width": min(max(width, MIN_WIDTH_PX), MAX_WIDTH_PX),
+            "height": min(max(height, MIN_HEIGHT_PX), MAX_HEIGHT_PX),
+        }
+        return before.model_copy(update=changes)
+
+
+def _list_usual_layers(settings: WindowSettings) -> set[str]:
+    """Return the layers used last, or the default ones."""
+    layers = standard_layers()
+    if settings.shown is None:
+        return {layer.name for layer in layers if layer.default}
+    return {layer.name for layer in layers} & set(settings.shown)
+
+
+def _wait_for_runs(saver: RunSaver) -> None:
+    """Wait until all runs are saved, after the window is gone; print what went wrong."""
+    saver.finish()
+    for message, is_error in saver.poll():
+        if is_error:
+            echo(f"robocov: {message}", to_stderr=True)

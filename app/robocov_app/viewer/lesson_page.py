@@ -1,84 +1,194 @@
-"""The lesson over the window: its page in the place of the panel, or its caption."""
+"""How a lesson is shown: as a page in place of the panel, or as a caption over the map."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 import pygame
 
-from robocov_app.look.colors import mix
+from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.fonts import label, shortened
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import card, flat_canvas, wrapped
-from robocov_app.viewer.lessons import LessonPlayer
-
-Spot = tuple[pygame.Rect, Callable[[], object]]
+from robocov_app.viewer.lessons import LessonPlayer, LessonState
 
 
-def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
-    scale, title = layout.scale, f"{tour.number + 1}  {tour.chapter.title}"
+class ClickArea(NamedTuple):
+    """A part of the page that can be clicked.
+
+    Attributes
+    ----------
+    box : Rect
+        Where it is, px.
+    action : callable
+        What a click does.
+    """
+
+    box: pygame.Rect
+    action: Callable[[], object]
+
+
+# Lengths in pixels at scale 1.
+_CAPTION_TEXT_PX = 14
+_CAPTION_TITLE_PX = 15.5
+_CAPTION_WIDTH_PX = 800
+_CAPTION_LINE_PX = 20
+_PAGE_MARGIN_PX = 20
+_PAGE_TITLE_PX = 18
+_PAGE_TEXT_PX = 14
+_PAGE_LINE_PX = 21
+_ANSWER_INDENT_PX = 12
+_CHAPTER_TEXT_PX = 12
+_CHAPTER_ROW_PX = 23
+_MIN_CHAPTER_ROW_PX = 15
+_PAGE_HINT = "← → chapters · Space · F2 just play · Esc ends"
+
+
+def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: LessonPlayer) -> None:
+    """Draw a lesson as a card over the map, for windows without a panel."""
+    scale = layout.scale
     left, top, width, height = layout.arena
-    size, bold, wide = round(14 * scale), round(15.5 * scale), min(width - 40 * scale, 800 * scale)
-    lines = wrapped(" ".join([tour.chapter.text, *tour.asks]), size, wide - 44 * scale)
-    box = pygame.Rect(0, 0, round(wide), round((44 + 20 * len(lines)) * scale))
-    box.midbottom = round(left + width / 2), round(top + height - 44 * scale)
+    text_size = round(_CAPTION_TEXT_PX * scale)
+    title_size = round(_CAPTION_TITLE_PX * scale)
+    card_width = min(width - 40 * scale, _CAPTION_WIDTH_PX * scale)
+    text = " ".join([lesson.chapter.text, *lesson.lines])
+    lines = wrapped(text, text_size, card_width - 44 * scale)
+    box = pygame.Rect(0, 0, round(card_width), round((44 + _CAPTION_LINE_PX * len(lines)) * scale))
+    box.midbottom = (round(left + width / 2), round(top + height - 44 * scale))
     card(screen, box, theme, scale)
-    x, thick = box.left + round(22 * scale), max(2, round(2 * scale))
-    screen.blit(label(title, bold, theme.final, True), (x, box.top + round(11 * scale)))
+    x = box.left + round(22 * scale)
+    title = f"{lesson.number + 1}  {lesson.chapter.title}"
+    screen.blit(label(title, title_size, theme.final, True), (x, box.top + round(11 * scale)))
     for k, line in enumerate(lines):
-        screen.blit(label(line, size, theme.ink), (x, box.top + round((35 + 20 * k) * scale)))
-    bar = pygame.Rect(box.left + 8, box.bottom - max(3, round(3 * scale)), box.width - 16, thick)
+        y = box.top + round((35 + _CAPTION_LINE_PX * k) * scale)
+        screen.blit(label(line, text_size, theme.ink), (x, y))
+    bar_top = box.bottom - max(3, round(3 * scale))
+    bar = pygame.Rect(box.left + 8, bar_top, box.width - 16, max(2, round(2 * scale)))
     screen.fill(mix(theme.panel, theme.ink, 0.15), bar)
-    bar.width = round(bar.width * tour.progress)
+    bar.width = round(bar.width * lesson.progress)
     screen.fill(theme.final, bar)
 
 
-def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> list[Spot]:
-    """Show a lesson in place of the panel; return where a click answers, or goes to a chapter."""
-    scale, spots = layout.scale, list[Spot]()
-    left, top, width, height = layout.panel
+def draw_lesson_page(
+    screen: pygame.Surface, layout: Layout, theme: Theme, lesson: LessonPlayer
+) -> list[ClickArea]:
+    """Draw a lesson in place of the panel.
+
+    Returns
+    -------
+    list of ClickArea
+        Answers and chapters.
+    """
     screen.fill(theme.panel, layout.panel)
-    canvas = flat_canvas(screen, theme, scale)
-    x, y, wide = left + 20 * scale, top + 18 * scale, width - 40 * scale
-    screen.blit(label("LESSON", round(11 * scale), theme.faint, True), (round(x), round(y)))
-    y += 30 * scale
-    bold, size = round(18 * scale), round(14 * scale)
-    for line in wrapped(tour.chapter.title, bold, wide, True):
-        screen.blit(label(line, bold, theme.final, True), (round(x), round(y)))
-        y += 25 * scale
-    y += 6 * scale
-    for line in wrapped(tour.chapter.text, size, wide):
-        screen.blit(label(line, size, theme.ink), (round(x), round(y)))
-        y += 21 * scale
-    y += 8 * scale
-    for k, asked in enumerate(tour.asks):
-        first, answers = y, tour.state == "asks" and k > 0
-        for line in wrapped(asked, size, wide - 24 * scale * answers):
-            screen.blit(label(line, size, theme.final), (round(x + 12 * scale * answers), round(y)))
-            y += 21 * scale
-        if answers:
-            box = pygame.Rect(round(x), round(first - 5 * scale), round(wide), round(y - first + 8 * scale))
-            pygame.draw.rect(screen, theme.final, box, 1, border_radius=round(5 * scale))
-            spots.append((box, partial(tour.reply, k)))
-        y += 11 * scale * (tour.state == "asks")
-    chapters, small = tour.lesson.chapters, round(12 * scale)
-    y, bottom = y + 6 * scale, top + height - 62 * scale
-    row = min(23 * scale, max((bottom - y) / len(chapters), 15 * scale))
-    y = max(y, bottom - row * len(chapters))
-    for k, chapter in enumerate(chapters):
-        now, color = k == tour.number, theme.ink if k == tour.number else theme.faint
-        fill = theme.final if k <= tour.number else mix(theme.panel, theme.ink, 0.25)
-        canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (x + 4 * scale, y + 8 * scale))
-        words = shortened(chapter.title, small, wide - 18 * scale, now)
-        screen.blit(label(words, small, color, now), (round(x + 16 * scale), round(y)))
-        box = pygame.Rect(round(x), round(y - 3 * scale), round(wide), round(row))
-        spots.append((box, partial(tour.skip, k - tour.number)))
-        y += row
-    bar = pygame.Rect(round(x), round(top + height - 46 * scale), round(wide), max(3, round(3 * scale)))
-    pygame.draw.rect(screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
-    bar.width = max(round(bar.width * tour.progress), bar.height)
-    pygame.draw.rect(screen, theme.final, bar, border_radius=bar.height)
-    hint = label("← → chapters · Space · F2 just play · Esc ends", round(11 * scale), theme.faint)
-    screen.blit(hint, (round(x), round(top + height - 32 * scale)))
-    return spots
+    page = _LessonPage(screen, layout, theme, lesson)
+    page.draw()
+    return page.areas
+
+
+@dataclass
+class _LessonPage:
+    """A page that is drawn from top to bottom; `y` is where it continues, px."""
+
+    screen: pygame.Surface
+    layout: Layout
+    theme: Theme
+    lesson: LessonPlayer
+    areas: list[ClickArea] = field(default_factory=list)
+    y: float = 0.0
+
+    def __post_init__(self) -> None:
+        left, top, width, _ = self.layout.panel
+        self.scale = self.layout.scale
+        self.x = left + _PAGE_MARGIN_PX * self.scale
+        self.width = width - 2 * _PAGE_MARGIN_PX * self.scale
+        self.y = top + 18 * self.scale
+
+    def draw(self) -> None:
+        """Draw heading, text, questions and tasks, the list of chapters and the progress."""
+        lesson = self.lesson
+        scale = self.scale
+        self._write("LESSON", 11, self.theme.faint, bold=True)
+        self.y += 30 * scale
+        title_size = round(_PAGE_TITLE_PX * scale)
+        for line in wrapped(lesson.chapter.title, title_size, self.width, True):
+            self._write(line, _PAGE_TITLE_PX, self.theme.final, bold=True)
+            self.y += 25 * scale
+        self.y += 6 * scale
+        self._write_paragraph(lesson.chapter.text, self.theme.ink)
+        self.y += 8 * scale
+        for k, line in enumerate(lesson.lines):
+            if lesson.state is LessonState.ASKING and k > 0:
+                self._draw_answer(k, line)
+            else:
+                self._write_paragraph(line, self.theme.final)
+            if lesson.state is LessonState.ASKING:
+                self.y += 11 * scale
+        self._draw_chapters()
+        self._draw_progress()
+
+    def _write(
+        self, text: str, size: float, color: Color, *, indent: float = 0.0, bold: bool = False
+    ) -> None:
+        picture = label(text, round(size * self.scale), color, bold)
+        self.screen.blit(picture, (round(self.x + indent * self.scale), round(self.y)))
+
+    def _write_paragraph(self, text: str, color: Color, *, indent: float = 0.0) -> None:
+        """Write wrapped text, indented on both sides, and continue below it."""
+        width = self.width - 2 * indent * self.scale
+        for line in wrapped(text, round(_PAGE_TEXT_PX * self.scale), width):
+            self._write(line, _PAGE_TEXT_PX, color, indent=indent)
+            self.y += _PAGE_LINE_PX * self.scale
+
+    def _draw_answer(self, number: int, text: str) -> None:
+        """Draw an answer in a frame that can be clicked."""
+        top = self.y
+        scale = self.scale
+        self._write_paragraph(text, self.theme.final, indent=_ANSWER_INDENT_PX)
+        height = round(self.y - top + 8 * scale)
+        box = pygame.Rect(round(self.x), round(top - 5 * scale), round(self.width), height)
+        pygame.draw.rect(self.screen, self.theme.final, box, 1, border_radius=round(5 * scale))
+        self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
+
+    def _draw_chapters(self) -> None:
+        """Draw the list of chapters, above the progress if there is space."""
+        _, top, _, height = self.layout.panel
+        scale = self.scale
+        count = len(self.lesson.lesson.chapters)
+        self.y += 6 * scale
+        bottom = top + height - 62 * scale
+        row = min(_CHAPTER_ROW_PX * scale, max((bottom - self.y) / count, _MIN_CHAPTER_ROW_PX * scale))
+        self.y = max(self.y, bottom - row * count)
+        for number in range(count):
+            self._draw_chapter(number, row)
+            self.y += row
+
+    def _draw_chapter(self, number: int, row: float) -> None:
+        theme = self.theme
+        scale = self.scale
+        lesson = self.lesson
+        is_current = number == lesson.number
+        fill = theme.final if number <= lesson.number else mix(theme.panel, theme.ink, 0.25)
+        canvas = flat_canvas(self.screen, theme, scale)
+        canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (self.x + 4 * scale, self.y + 8 * scale))
+        size = round(_CHAPTER_TEXT_PX * scale)
+        title = shortened(lesson.lesson.chapters[number].title, size, self.width - 18 * scale, is_current)
+        color = theme.ink if is_current else theme.faint
+        self._write(title, _CHAPTER_TEXT_PX, color, indent=16, bold=is_current)
+        box = pygame.Rect(round(self.x), round(self.y - 3 * scale), round(self.width), round(row))
+        self.areas.append(ClickArea(box, partial(lesson.skip, number - lesson.number)))
+
+    def _draw_progress(self) -> None:
+        _, top, _, height = self.layout.panel
+        theme = self.theme
+        scale = self.scale
+        bottom = top + height
+        bar_top = round(bottom - 46 * scale)
+        bar = pygame.Rect(round(self.x), bar_top, round(self.width), max(3, round(3 * scale)))
+        pygame.draw.rect(self.screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
+        bar.width = max(round(bar.width * self.lesson.progress), bar.height)
+        pygame.draw.rect(self.screen, theme.final, bar, border_radius=bar.height)
+        self.y = bottom - 32 * scale
+        self._write(_PAGE_HINT, 11, theme.faint)

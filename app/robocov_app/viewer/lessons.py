@@ -1,185 +1,380 @@
-"""Lessons: session files with chapters that wait for the simulation, ask, hand over, and go on."""
+"""Lessons: session files with chapters that play, ask, let the user try, and continue."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 
 from robocov.errors import MapError, Mistake
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.file import SavedSession, load_session
-from robocov_app.viewer.session.file_models import ChapterModel, ConditionModel
+from robocov_app.viewer.session.file_models import ChapterModel, ConditionModel, QuestionModel, TaskModel
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import SessionWorkspace
+from robocov_app.viewer.tools.tool import Tool
 
-FIRST = Path(__file__).with_name("assets") / "lesson-1.robocov"  # the lesson that comes with robocov
-READING = 4.0  # seconds on the wall after a chapter's end, and for an answer where nobody answers
-LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
-PLAIN = {  # layers that every chapter shows
-    *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
-    *("selection", "color_bar", "legend", "scale_bar", "status", "caption"),
-}
+FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # comes with robocov
+READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
+READING_S_PER_WORD = 0.25
+MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up a chapter
+STEPS_PER_SECOND = 60
+BASE_LAYERS = frozenset(
+    {
+        "cells",
+        "grid",
+        "obstacles",
+        "boundary",
+        "trajectories",
+        "starts",
+        "robots",
+        "failed",
+        "selection",
+        "color_bar",
+        "legend",
+        "scale_bar",
+        "status",
+        "caption",
+    }
+)
+"""Layers that every chapter shows."""
 
 
-def load_lesson(path: Path = FIRST) -> SavedSession:
-    """Return the lesson in a session file; MapError as `load_session`, or where there is none in it."""
+class LessonState(StrEnum):
+    """What a chapter is doing."""
+
+    PLAYING = "playing"
+    ASKING = "asking"  # for an answer, before it plays
+    TASK = "task"  # the user does something
+    ENDED = "ended"
+    LEFT = "left"  # the user plays with what the chapter shows
+
+
+def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
+    """Load a session file with a lesson.
+
+    Raises
+    ------
+    MapError
+        If it cannot be read, or has no lesson.
+    """
     saved = load_session(path)
     if saved.lesson is None:
         raise MapError.from_mistakes(str(path), [Mistake.at_path(("lesson",), "missing")])
     return saved
 
 
-def holds(condition: ConditionModel, session: Session) -> bool:
-    pane = session.timeline.panes[0]
-    reached = condition.step is not None and session.timeline.step >= condition.step
-    if reached or (condition.settled and session.timeline.is_settled):
+def is_fulfilled(condition: ConditionModel, session: Session) -> bool:
+    """Return whether a session fulfills a condition of a chapter."""
+    if condition.step is not None and session.timeline.step >= condition.step:
         return True
-    if condition.mean_distance_below is not None and len(pane.distance_curve):
-        return bool(pane.distance_curve.values[-1] < condition.mean_distance_below)
-    if condition.robot is None or (row := pane.get_row(condition.robot)) is None:
+    if condition.settled and session.timeline.is_settled:
+        return True
+    curve = session.timeline.panes[0].distance_curve
+    if condition.mean_distance_below is not None and len(curve):
+        return bool(curve.values[-1] < condition.mean_distance_below)
+    if condition.robot is None:
         return False
-    place, inside, outside = pane.simulation.positions[row], condition.inside, condition.outside
+    return _is_robot_in_place(condition, session, condition.robot)
 
-    def within(box: list[float]) -> bool:
-        return bool((box[:2] <= place).all() and (place <= box[2:]).all())
 
-    return (inside is not None and within(inside)) or (outside is not None and not within(outside))
+def _is_robot_in_place(condition: ConditionModel, session: Session, robot: int) -> bool:
+    """Return whether a robot is inside the one box of a condition, or outside the other."""
+    pane = session.timeline.panes[0]
+    row = pane.get_row(robot)
+    if row is None:
+        return False
+    position = pane.simulation.positions[row]
+
+    def is_within(box: list[float]) -> bool:
+        return bool((box[:2] <= position).all() and (position <= box[2:]).all())
+
+    if condition.inside is not None and is_within(condition.inside):
+        return True
+    return condition.outside is not None and not is_within(condition.outside)
+
+
+@dataclass(frozen=True)
+class _ViewerBefore:
+    """What the viewer showed before a lesson."""
+
+    workspace: SessionWorkspace
+    map_name: str
+    layers: set[str]
+    tool: Tool
+    active_pane: int
+    selected: int | None
 
 
 class LessonPlayer:
-    """Plays the chapters of a lesson, and then gives the session from before back."""
+    """Plays the chapters of a lesson, and restores the session from before at the end.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    fit_view : callable
+        Shows the whole map.
+    saved : SavedSession
+        A session with a lesson.
+    is_unattended : bool
+        Whether nobody answers and does tasks, as in a video.
+
+    Attributes
+    ----------
+    lesson : LessonModel
+        The lesson.
+    session : Session
+        The session that the lesson plays.
+    number : int
+        Index of the chapter.
+    state : LessonState
+        What the chapter is doing.
+    answer : int or None
+        Number of the user's answer, from 1.
+    is_done : bool
+        Whether the lesson has ended.
+    is_held : bool
+        Whether the chapter stays after its end.
+    """
 
     def __init__(
-        self, viewer: Presenter, fit: Callable[[], None], saved: SavedSession, *, alone: bool = False
+        self,
+        viewer: Presenter,
+        fit_view: Callable[[], None],
+        saved: SavedSession,
+        *,
+        is_unattended: bool = False,
     ) -> None:
         assert saved.lesson is not None
-        self.lesson, self._viewer, self._fit = saved.lesson, viewer, fit
-        self.alone = alone  # nobody is there to answer or to do tasks, as in a film
-        self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
-        self._asked_before, self.session = viewer.hand.selected, _begun(saved)
+        self.lesson = saved.lesson
+        self.is_unattended = is_unattended
+        self.session = _open_at_start(saved)
         self.session.playback.clock.budget = viewer.session.playback.clock.budget
+        self.state = LessonState.PLAYING
+        self.number = 0
+        self.answer: int | None = None
+        self.is_done = False
+        self.is_held = False
+        self._viewer = viewer
+        self._fit_view = fit_view
+        self._waited_s = 0.0  # in the present state
         self._workspace = SessionWorkspace(self.session, None)
-        self.state = "plays"  # or asks, task, ended, left
-        self.answer: int | None = None  # from 1
-        self.done = self.held = False
-        self._begin(0)
+        self._before = _ViewerBefore(
+            workspace=viewer.files.workspace,
+            map_name=viewer.files.map_name,
+            layers=viewer.view.layers,
+            tool=viewer.tool,
+            active_pane=viewer.inspection.active_pane,
+            selected=viewer.inspection.selected,
+        )
+        self._start_chapter(0)
 
     @property
     def chapter(self) -> ChapterModel:
+        """The chapter that is shown."""
         return self.lesson.chapters[self.number]
 
     @property
-    def asks(self) -> list[str]:
-        chapter = self.chapter
-        question, lines = chapter.question, []
-        if question is not None and self.state == "asks":
-            lines = [question.text, *(f"{k}  {each}" for k, each in enumerate(question.answers, 1))]
-        elif question is not None and self.state == "ended" and self.answer is not None:
-            right = question.answers[question.right - 1]
-            lines = [f"{'Right' if self.answer == question.right else 'Not quite'}: {right}", question.why]
-        if chapter.task is not None and self.state in ("task", "ended"):
-            lines.append("Now you: " + chapter.task.text if self.state == "task" else chapter.task.done)
+    def lines(self) -> list[str]:
+        """Question with its answers, comment on the user's answer, task: whatever the state shows."""
+        lines: list[str] = []
+        if self.chapter.question is not None:
+            lines += self._list_question_lines(self.chapter.question)
+        if self.chapter.task is not None:
+            lines += self._list_task_lines(self.chapter.task)
         return [line for line in lines if line]
 
+    def _list_question_lines(self, question: QuestionModel) -> list[str]:
+        if self.state is LessonState.ASKING:
+            answers = [f"{number}  {answer}" for number, answer in enumerate(question.answers, 1)]
+            return [question.text, *answers]
+        if self.state is LessonState.ENDED and self.answer is not None:
+            correct = question.answers[question.right - 1]
+            is_correct = self.answer == question.right
+            return [
+                f"✓ Correct: {correct}" if is_correct else f"✗ Not quite. Correct: {correct}",
+                question.why,
+            ]
+        return []
+
+    def _list_task_lines(self, task: TaskModel) -> list[str]:
+        if self.state is LessonState.TASK:
+            return [f"Now you: {task.text}"]
+        if self.state is LessonState.ENDED:
+            return [task.done]
+        return []
+
     @property
-    def seconds(self) -> float:
-        return sum(
-            (each.until.step or 0) / 60 / each.speed + READING * (2 if each.question else 1) + 0.5
-            for each in self.lesson.chapters
-        )
+    def duration(self) -> float:
+        """Duration of the lesson in an unattended window, s of real time."""
+        duration = 0.0
+        for chapter in self.lesson.chapters:
+            pauses = 2 if chapter.question else 1
+            duration += (chapter.until.step or 0) / STEPS_PER_SECOND / chapter.speed
+            duration += READING_S * pauses + 0.5
+        return duration
 
     @property
     def progress(self) -> float:
-        end = self.chapter.until.step
-        part = min(self.session.timeline.step / end, 1.0) if end else 0.5
-        return (self.number + (1.0 if self.state == "ended" else part)) / len(self.lesson.chapters)
+        """Fraction of the lesson that is over."""
+        fraction = 0.5
+        if self.state is LessonState.ENDED:
+            fraction = 1.0
+        elif self.chapter.until.step:
+            fraction = min(self.session.timeline.step / self.chapter.until.step, 1.0)
+        return (self.number + fraction) / len(self.lesson.chapters)
 
     def advance(self, seconds: float) -> None:
-        if self.done or self.state == "left":
+        """Let real time pass: a chapter ends, and the next one starts after a while."""
+        if self.is_done or self.state is LessonState.LEFT:
             return
-        session, chapter = self.session, self.chapter
-        self._waited += seconds
-        reading = READING + (0.0 if self.alone else 0.25 * len(" ".join(self.asks).split()))
-        if self.state == "asks" and self.alone and self._waited >= READING:
-            assert chapter.question is not None
-            self.reply(chapter.question.right)
-        elif self.state == "plays" and holds(chapter.until, session):
-            tries = chapter.task is not None and not self.alone
-            self._turn("task" if tries else "ended")
-            session.playback.is_playing = session.playback.is_playing and tries
-        elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
-            self._turn("ended")
-        elif self.state == "ended" and self._waited >= reading and not self.held:
+        self._waited_s += seconds
+        advance_state = {
+            LessonState.ASKING: self._advance_question,
+            LessonState.PLAYING: self._advance_playing,
+            LessonState.TASK: self._advance_task,
+            LessonState.ENDED: self._advance_end,
+        }
+        advance_state[self.state]()
+
+    def _advance_question(self) -> None:
+        if self.is_unattended and self._waited_s >= READING_S:
+            assert self.chapter.question is not None
+            self.reply(self.chapter.question.right)
+
+    def _advance_playing(self) -> None:
+        if not is_fulfilled(self.chapter.until, self.session):
+            return
+        has_task = self.chapter.task is not None and not self.is_unattended
+        self._enter_state(LessonState.TASK if has_task else LessonState.ENDED)
+        self.session.playback.is_playing = self.session.playback.is_playing and has_task
+
+    def _advance_task(self) -> None:
+        assert self.chapter.task is not None
+        if is_fulfilled(self.chapter.task.until, self.session):
+            self._enter_state(LessonState.ENDED)
+
+    def _advance_end(self) -> None:
+        reading_s = READING_S
+        if not self.is_unattended:
+            reading_s += READING_S_PER_WORD * len(" ".join(self.lines).split())
+        if self._waited_s >= reading_s and not self.is_held:
             self.skip(1)
 
     def reply(self, answer: int) -> None:
+        """Answer the question with a number from 1, and play the chapter."""
         question = self.chapter.question
-        if self.state == "asks" and question is not None and 1 <= answer <= len(question.answers):
+        if self.state is not LessonState.ASKING or question is None:
+            return
+        if 1 <= answer <= len(question.answers):
             self.answer = answer
-            self._turn("plays")
+            self._enter_state(LessonState.PLAYING)
             self.session.playback.is_playing = True
 
-    def skip(self, by: int) -> None:
-        if self.number + by >= len(self.lesson.chapters):
+    def skip(self, chapters: int) -> None:
+        """Go to a later or an earlier chapter, or to the end."""
+        number = self.number + chapters
+        if number >= len(self.lesson.chapters):
             self.end()
         else:
-            self._begin(max(self.number + by, 0))
+            self._start_chapter(max(number, 0))
 
-    def leave(self, *, task: bool = False) -> None:
-        """Let whoever watches play with what is there; a `task` is left only where that is asked for."""
-        if task or self.state != "task":
-            self._turn("left")
+    def leave(self, *, during_task: bool = False) -> None:
+        """Let the user play with what is shown; tasks are left only if `during_task`."""
+        if during_task or self.state is not LessonState.TASK:
+            self._enter_state(LessonState.LEFT)
 
     def end(self) -> None:
+        """Restore the session from before the lesson."""
         viewer = self._viewer
+        before = self._before
         self._workspace.close()
-        viewer.workspace, map_name, viewer.shown, viewer.tool, viewer.active = self._before
-        viewer.show_session(viewer.workspace.session)
-        viewer.map_name, viewer.hand.selected = map_name, self._asked_before
-        viewer.say("the lesson has ended; what was before it is there again")
-        self._fit()
-        self.done = True
+        viewer.files.workspace = before.workspace
+        viewer.view.layers = before.layers
+        viewer.toolbox.current = before.tool
+        viewer.inspection.active_pane = before.active_pane
+        viewer.show_session(before.workspace.session)
+        viewer.files.map_name = before.map_name
+        viewer.inspection.selected = before.selected
+        viewer.show_message("the lesson has ended; your session from before is back")
+        self._fit_view()
+        self.is_done = True
 
-    def hold(self) -> str:
-        """Let a chapter that has ended stay, or let the next one come; return words for it."""
-        self.held, self.session.playback.is_playing = not self.held, False
-        return "this chapter stays until Space or →" if self.held else "on to the next chapter"
+    def toggle_hold(self) -> str:
+        """Keep a chapter that has ended, or let the next one start; return a message."""
+        self.is_held = not self.is_held
+        self.session.playback.is_playing = False
+        return "this chapter stays until Space or →" if self.is_held else "on to the next chapter"
 
-    def _turn(self, state: str) -> None:
-        self.state, self._waited, self.held = state, 0.0, False
-        self._viewer.version += 1
+    def _enter_state(self, state: LessonState) -> None:
+        self.state = state
+        self._waited_s = 0.0
+        self.is_held = False
+        self._viewer.revision += 1
 
-    def _begin(self, number: int) -> None:
-        self.number, self.answer = number, None
-        chapter, viewer, session = self.chapter, self._viewer, self.session
-        _set_out(session, chapter)
-        session.playback.is_playing, session.playback.stop_when_settled = chapter.question is None, False
-        session.playback.clock.speed, viewer.workspace = chapter.speed, self._workspace
+    def _start_chapter(self, number: int) -> None:
+        self.number = number
+        self.answer = None
+        chapter = self.chapter
+        viewer = self._viewer
+        session = self.session
+        _go_to_start(session, chapter)
+        session.playback.is_playing = chapter.question is None
+        session.playback.stop_when_settled = False
+        session.playback.clock.speed = chapter.speed
+        viewer.files.workspace = self._workspace
         viewer.show_session(session)
-        viewer.map_name = session.displayed.environment.name
-        viewer.tool, viewer.active, viewer.hand.selected = viewer.hand, 0, chapter.robot
-        viewer.shown, viewer.message = PLAIN | set(chapter.show), ""
-        self._fit()
-        self._turn("asks" if chapter.question is not None else "plays")
+        viewer.files.map_name = session.displayed.environment.name
+        viewer.toolbox.current = viewer.toolbox.hand
+        viewer.inspection.active_pane = 0
+        viewer.inspection.selected = chapter.robot
+        viewer.view.layers = set(BASE_LAYERS) | set(chapter.show)
+        viewer.clear_message()
+        self._fit_view()
+        self._enter_state(LessonState.PLAYING if chapter.question is None else LessonState.ASKING)
 
 
-def _set_out(session: Session, chapter: ChapterModel) -> None:
+def _go_to_start(session: Session, chapter: ChapterModel) -> None:
+    """Go to the start of a chapter, and let its changes happen again as time passes."""
     target = session.timeline.document.nodes[chapter.touch]
     session.seek(session.timeline.document.get_path(target)[0], 0)
     session.timeline.finish_seek()
     session.timeline.follow(target)
 
 
-def _begun(saved: SavedSession) -> Session:
+def _open_at_start(saved: SavedSession) -> Session:
     return Session.open(replace(saved, head=saved.document.nodes[0], step=0))
 
 
-def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
-    """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter."""
+@dataclass(frozen=True)
+class ChapterResult:
+    """What a chapter does without a user.
+
+    Attributes
+    ----------
+    title : str
+        Title of the chapter.
+    duration : float
+        Simulated time, s.
+    ends : bool
+        Whether it ends within `MAX_TASK_S`.
+    """
+
+    title: str
+    duration: float
+    ends: bool
+
+
+def check_lesson(saved: SavedSession) -> list[ChapterResult]:
+    """Play a lesson without a window, and return what each chapter does."""
     assert saved.lesson is not None
-    session, found = _begun(saved), []
+    session = _open_at_start(saved)
+    results: list[ChapterResult] = []
     for chapter in saved.lesson.chapters:
-        _set_out(session, chapter)
-        while not (ended := holds(chapter.until, session)) and session.timeline.end_time < LONGEST_TASK:
+        _go_to_start(session, chapter)
+        ends = is_fulfilled(chapter.until, session)
+        while not ends and session.timeline.end_time < MAX_TASK_S:
             session.playback.step()
-        found.append((chapter.title, session.timeline.end_time, ended))
-    return found
+            ends = is_fulfilled(chapter.until, session)
+        results.append(ChapterResult(chapter.title, session.timeline.end_time, ends))
+    return results

@@ -1,10 +1,9 @@
-"""The panel at the right: what is chosen often stays in sight, the rest is on pages."""
+"""The panel at the right: frequent settings stay in sight, the rest is on pages."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import chain, zip_longest
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,276 +13,400 @@ from robocov_app.render.fonts import shortened
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.overlay import flat_canvas
 from robocov_app.toolkit.ui import SMALL, SidePanel, Ui
-from robocov_app.viewer.explain import NOTHING, Report
-from robocov_app.viewer.parameters import Parameter, Pick
+from robocov_app.viewer.explanation.explain import RobotReport
+from robocov_app.viewer.explanation.lines import ReportLine
+from robocov_app.viewer.explanation.text import MIN_FORCE_N
+from robocov_app.viewer.parameters import NumberParameter, OptionParameter, Parameter
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
 from robocov_app.viewer.session.scenario import MAX_PANES
 
-TABS = ("parameters", "show", "robot", "keep")
-# layers without a check box: a picture without them is no use; they have keys all the same
-NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
-_KEPT = (
-    *(("Screenshot", "screenshot"), ("Record film", "film")),
-    *(("Save session", "save:session"), ("Recover…", "recover")),
-    *(("Save run", "save:run"), ("Save map", "save:map")),
-    *(("◀ Branch", "branch:previous"), ("Branch ▶", "branch:next")),
-    *(("Undo", "undo"), ("Redo", "redo"), ("Keys", "help"), ("Commands…", "palette")),
-    *(("Lesson", "tour"), ("Full screen", "fullscreen")),
+TABS = ("parameters", "show", "robot", "file")
+TAB_WIDTHS_PX = (86, 64, 64, 64)
+LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
+"""Layers that are nearly always wanted; they can be switched by their keys all the same."""
+
+_FILE_BUTTONS = (
+    ("Screenshot", "screenshot"),
+    ("Record video", "video"),
+    ("Save session", "save:session"),
+    ("Recover…", "recover"),
+    ("Save run", "save:run"),
+    ("Save map", "save:map"),
+    ("◀ Branch", "branch:previous"),
+    ("Branch ▶", "branch:next"),
+    ("Undo", "undo"),
+    ("Redo", "redo"),
+    ("Keys", "help"),
+    ("Commands…", "palette"),
+    ("Lesson", "tour"),
+    ("Full screen", "fullscreen"),
 )
-_ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simulation goes on
-_NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
+_REDRAW_INTERVAL_S = 0.25  # while the simulation runs
+_NO_ROBOT_TEXT = "Click a robot, or press Tab, to see why it moves and why it does not."
+_NO_ROBOT_REASON = "no robot is selected: click one first, or press Tab"
+
+# Lengths in pixels at scale 1.
+_ARROW_PX = 13.0
+_MIN_ARROW_FRACTION = 0.35
+_ARROW_CENTER_PX = (14, 8)
+_REPORT_INDENT_PX = 34.0
+_LABEL_PX = 100
+_RESET_PX = 22
+_PARAMETER_GAP_PX = 3
 
 
-class Panel(SidePanel):
-    """Shows what there is, and lets it be edited; `report` is on the robot that is asked about."""
+class ViewerPanel(SidePanel):
+    """Shows the session's settings and lets the user change them.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    layer_titles : dict of str to str
+        Titles of the layers by their names.
+    commands : Commands
+        The window's commands.
+    do : callable
+        Runs a command by its name.
+
+    Attributes
+    ----------
+    commands : Commands
+        The window's commands.
+    report : RobotReport or None
+        Explanation of the selected robot.
+    """
 
     def __init__(
-        self, viewer: Presenter, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
+        self, viewer: Presenter, layer_titles: dict[str, str], commands: Commands, do: Callable[[str], None]
     ) -> None:
-        self.viewer, self.titles, self._commands, self._do = viewer, titles, commands, do
-        self.report: Report | None = None
-        self._age = 0.0
+        self.viewer = viewer
+        self.titles = layer_titles
+        self.report: RobotReport | None = None
+        self.commands = commands
+        self._do = do
+        self._age_s = 0.0  # of what is drawn
         super().__init__(TABS[0])
 
     def show_tab(self, name: str) -> None:
+        """Show a page of the panel, if there is one of that name."""
         if name in TABS:
             self.tab = name
-            self.viewer.version += 1
+            self.viewer.revision += 1
+
+    def show_next_tab(self) -> None:
+        """Show the next page of the panel."""
+        self.show_tab(TABS[(TABS.index(self.tab) + 1) % len(TABS)])
 
     def update(self, seconds: float) -> None:
-        self._age += seconds
+        """Redraw the panel if its content has changed."""
+        self._age_s += seconds
         if self.covered and self.ui.busy:
             self.ui.stop_typing()
-        viewer, session = self.viewer, self.viewer.session
-        shows = (viewer.version, self.tab, viewer.theme, session.playback.is_playing, id(self.report))
-        old = self._age >= _ASKED_AGAIN and session.playback.is_playing and not session.timeline.is_settled
-        if shows != self._drawn or old:
-            self._drawn, self._age, self.ui.stale = shows, 0.0, True
+        viewer = self.viewer
+        session = viewer.session
+        content = (viewer.revision, self.tab, viewer.view.theme, session.playback.is_playing, id(self.report))
+        is_running = session.playback.is_playing and not session.timeline.is_settled
+        is_old = is_running and self._age_s >= _REDRAW_INTERVAL_S
+        if content != self._drawn or is_old:
+            self._drawn = content
+            self._age_s = 0.0
+            self.ui.stale = True
 
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
-        self._environment(ui)
-        self._controllers(ui)
-        self._run(ui)
-        self._tools(ui)
-        if (tab := ui.tabs("tab", TABS, self.tab, 86, 64, 64, 64)) is not None:
+        self._show_environment(ui)
+        self._show_controllers(ui)
+        self._show_run(ui)
+        self._show_tools(ui)
+        tab = ui.tabs("tab", TABS, self.tab, *TAB_WIDTHS_PX)
+        if tab is not None:
             self.show_tab(tab)
-        pages = {"parameters": self._parameters, "show": self._show, "robot": self._robot, "keep": self._keep}
+        pages = {
+            "parameters": self._show_parameters,
+            "show": self._show_layers,
+            "robot": self._show_robot,
+            "file": self._show_files,
+        }
         pages[self.tab](ui)
 
-    def _does(self, ui: Ui, text: str, action: str, **look: Any) -> None:
-        if ui.button(text, key=action, tip=self._commands[action].tip, **look):
-            self._do(action)
+    def _show_button(
+        self, ui: Ui, text: str, command: str, *, is_on: bool = False, is_small: bool = False, why: str = ""
+    ) -> None:
+        """Show a button that runs a command; `why` disables it."""
+        tip = self.commands[command].tip
+        if ui.button(text, key=command, tip=tip, chosen=is_on, small=is_small, why=why):
+            self._do(command)
 
-    def _environment(self, ui: Ui) -> None:
-        viewer, session = self.viewer, self.viewer.session
-        files = short_names(viewer.maps())
-        names = {name: file for file, name in files.items()}
+    def _show_environment(self, ui: Ui) -> None:
+        viewer = self.viewer
+        scenario = viewer.session.timeline.scenario
+        files = viewer.files
+        labels = shorten_names(files.list_maps())
+        maps = {label: name for name, label in labels.items()}
         ui.header("ENVIRONMENT")
         ui.row(172, 0, height=28, below=5)
-        if (name := ui.dropdown("map", list(names), files.get(viewer.map_name, viewer.map_name))) is not None:
-            viewer.attempt(partial(viewer.open_map, names[name]))
-        if (start := ui.dropdown("start", viewer.starts(), session.timeline.scenario.start_name)) is not None:
-            viewer.attempt(lambda: viewer.restart(start=start))
+        label = ui.dropdown("map", list(maps), labels.get(files.map_name, files.map_name))
+        if label is not None:
+            viewer.attempt(partial(files.open_map, maps[label]))
+        start = ui.dropdown("start", viewer.playback.list_starts(), scenario.start_name)
+        if start is not None:
+            viewer.attempt(partial(viewer.playback.restart, start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
-        if (robots := ui.text_entry("robots", str(len(viewer.numbers)))) is not None:
-            viewer.attempt(lambda: self._commands.typed(f"robots {robots}"))
-        self._does(ui, "−", "fewer")
-        self._does(ui, "+", "more")
+        robots = ui.text_entry("robots", str(len(viewer.robot_numbers)))
+        if robots is not None:
+            viewer.attempt(partial(self.commands.typed, f"robots {robots}"))
+        self._show_button(ui, "−", "fewer")
+        self._show_button(ui, "+", "more")
         ui.cell()
         ui.label("Seed")
-        if (seed := ui.text_entry("seed", str(session.timeline.scenario.seed))) is not None:
-            viewer.attempt(lambda: self._commands.typed(f"seed {seed}"))
-        self._does(ui, "↻", "seed:next")
+        seed = ui.text_entry("seed", str(scenario.seed))
+        if seed is not None:
+            viewer.attempt(partial(self.commands.typed, f"seed {seed}"))
+        self._show_button(ui, "↻", "seed:next")
 
-    def _controllers(self, ui: Ui) -> None:
-        viewer, session = self.viewer, self.viewer.session
-        laws = [session.displayed.get_setup(pane).controller for pane in session.timeline.panes]
-        labels = law_labels(viewer.laws, {law.name: law.label for law in laws})
-        names, count = {label: name for name, label in labels.items()}, len(laws)
+    def _show_controllers(self, ui: Ui) -> None:
+        viewer = self.viewer
+        session = viewer.session
+        choices = [session.displayed.get_setup(pane).controller for pane in session.timeline.panes]
+        labels = label_controllers(viewer.controllers, {choice.name: choice.label for choice in choices})
+        names = {label: name for name, label in labels.items()}
+        count = len(choices)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
-        # of two there are three in a row, for which the third is small
+        # Two controllers share a row with the button that adds a third; more are two in a row.
         widths = {1: (0, 0), 2: (0, 24, 3, 0, 24, 3, 28)}.get(count, (0, 24, 3, 0, 24))
         ui.row(*widths, height=28, gap=2 if count > 1 else 6, below=4)
-        for k, law in enumerate(laws):
-            if (label := ui.dropdown(f"law:{k}", list(names), labels[law.name])) is not None:
-                viewer.attempt(partial(viewer.set_law, k, names[label]))
-            if count > 1:
-                if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
-                    viewer.active = k
-                    self._do("pane:remove")
-                if count == 2 or k % 2 == 0:
-                    ui.cell()
+        for k, choice in enumerate(choices):
+            label = ui.dropdown(f"controller:{k}", list(names), labels[choice.name])
+            if label is not None:
+                viewer.attempt(partial(viewer.comparison.set_controller, k, names[label]))
+            if count == 1:
+                continue
+            if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
+                viewer.inspection.active_pane = k
+                self._do("pane:remove")
+            if count == 2 or k % 2 == 0:
+                ui.cell()
         if count < MAX_PANES:
-            self._does(ui, "+ compare" if count != 2 else "+", "pane:add")
+            self._show_button(ui, "+ compare" if count != 2 else "+", "pane:add")
         ui.space(4)
 
-    def _run(self, ui: Ui) -> None:
+    def _show_run(self, ui: Ui) -> None:
         session = self.viewer.session
         ui.header("RUN")
         ui.row(0, 0, 0, 0, height=28, below=5)
-        self._does(
+        self._show_button(
             ui,
             "Pause" if session.playback.is_playing else "Play",
             "pause",
-            chosen=not session.playback.is_playing,
+            is_on=not session.playback.is_playing,
         )
-        self._does(ui, "Step", "step")
-        self._does(ui, "Settle", "settle", chosen=session.playback.stop_when_settled)
-        self._does(ui, "Restart", "restart")
+        self._show_button(ui, "Step", "step")
+        self._show_button(ui, "Settle", "settle", is_on=session.playback.stop_when_settled)
+        self._show_button(ui, "Restart", "restart")
         ui.row(46, 0, 42, height=22)
         ui.label("Speed")
-        now = float(find_speed_index(session.playback.clock.speed))
-        if (place := ui.slider("speed", now, 0.0, len(SPEEDS) - 1.0, step=1.0)) is not None:
-            self.viewer.attempt(lambda: self.viewer.set_speed(SPEEDS[round(place)]))
+        index = float(find_speed_index(session.playback.clock.speed))
+        chosen = ui.slider("speed", index, 0.0, len(SPEEDS) - 1.0, step=1.0)
+        if chosen is not None:
+            self.viewer.attempt(partial(self.viewer.playback.set_speed, SPEEDS[round(chosen)]))
         ui.label(format_speed(session.playback.clock.speed), key="speed")
 
-    def _tools(self, ui: Ui) -> None:
-        ui.header("MOUSE")
+    def _show_tools(self, ui: Ui) -> None:
+        toolbox = self.viewer.toolbox
+        ui.header("TOOLS")
         ui.row(0, 0, 0, 0, 0, below=4)
-        for tool in self.viewer.tools.values():
-            self._does(ui, tool.title, f"tool:{tool.name}", chosen=self.viewer.tool is tool, small=True)
+        for tool in toolbox.by_name.values():
+            is_on = tool is toolbox.current
+            text = tool.button_text or tool.title
+            self._show_button(ui, text, f"tool:{tool.name}", is_on=is_on, is_small=True)
         ui.space(6)
 
-    def _parameters(self, ui: Ui) -> None:
-        found, law = (
-            self.viewer.parameters(),
-            self.viewer.session.displayed.get_setup(self.viewer.pane).controller,
-        )
-        team = [each for each in found if each.name.startswith("team.")]
-        gains = [each for each in found if each not in team]
-        groups = {f"GAINS OF {law.label.upper()}": gains, "ROBOTS": team}
-        with ui.scroll(f"parameters:{law.name}"):
+    def _show_parameters(self, ui: Ui) -> None:
+        controller = self.viewer.session.displayed.get_setup(self.viewer.pane).controller
+        parameters = self.viewer.comparison.list_parameters()
+        gains = [parameter for parameter in parameters if not parameter.name.startswith("team.")]
+        limits = [parameter for parameter in parameters if parameter.name.startswith("team.")]
+        groups = {f"GAINS OF {controller.label.upper()}": gains, "ROBOTS": limits}
+        with ui.scroll(f"parameters:{controller.name}"):
             for title, group in groups.items():
-                if not ui.section(title, key=title.split()[0]):
-                    continue
-                if not group:
-                    ui.label("none", style="unit")
-                for each in group:
-                    if isinstance(each, Pick):
-                        self._words(ui, each)
-                    else:
-                        self._slider(ui, each)
-                ui.space(4)
+                if ui.section(title, key=title.split()[0]):
+                    self._show_parameter_group(ui, group)
+
+    def _show_parameter_group(self, ui: Ui, parameters: list[Parameter]) -> None:
+        if not parameters:
+            ui.label("none", style="unit")
+        for parameter in parameters:
+            if isinstance(parameter, OptionParameter):
+                self._show_options(ui, parameter)
+            else:
+                self._show_slider(ui, parameter)
+        ui.space(4)
 
     def _set(self, name: str, value: float | str | None) -> None:
-        self.viewer.attempt(lambda: self.viewer.set_parameter(name, value))
+        self.viewer.attempt(partial(self.viewer.comparison.set_parameter, name, value))
 
-    def _slider(self, ui: Ui, each: Parameter) -> None:
-        ui.row(100, 0, 50, 34, 22, height=24, gap=3, below=3)
-        ui.label(each.label, tip=f"{each.meaning} ({each.unit})" if each.unit else each.meaning)
-        if (place := ui.slider(each.name, each.place(), 0.0, 1.0)) is not None:
-            self._set(each.name, each.at(place))
-        if (text := ui.text_entry(each.name, each.words())) is not None:
-            self.viewer.attempt(lambda: self.viewer.set_parameter(each.name, each.read(text)))
-        ui.label(each.unit, key=f"unit:{each.name}", style="unit")
-        usual = "no limit" if each.default is None else f"{each.default:g} {each.unit}".rstrip()
-        self._reset(ui, each, usual)
+    def _show_slider(self, ui: Ui, parameter: NumberParameter) -> None:
+        name = parameter.name
+        unit = parameter.unit
+        ui.row(_LABEL_PX, 0, 50, 34, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        ui.label(parameter.label, tip=f"{parameter.meaning} ({unit})" if unit else parameter.meaning)
+        position = ui.slider(name, parameter.compute_position(), 0.0, 1.0)
+        if position is not None:
+            self._set(name, parameter.compute_value(position))
+        text = ui.text_entry(name, parameter.format())
+        if text is not None:
+            self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
+        ui.label(unit, key=f"unit:{name}", style="unit")
+        default = "no limit" if parameter.default is None else f"{parameter.default:g} {unit}".rstrip()
+        self._show_reset(ui, parameter, default)
 
-    def _words(self, ui: Ui, each: Pick) -> None:
-        count = len(each.offered)
-        width = (ui.wide - 103 - 25 - 3 * (count - 1)) / count
-        fits = all(shortened(word, round(SMALL), width - 6) == word for word in each.offered)
-        ui.row(100, *([0.0] * (count if fits else 1)), 22, height=24, gap=3, below=3)
-        ui.label(each.label, tip=each.meaning)
-        if not fits and (word := ui.dropdown(each.name, each.offered, each.value, tip=each.meaning)):
-            self._set(each.name, word)
-        for word in each.offered if fits else ():
-            key, chosen = f"{each.name}:{word}", word == each.value
-            if ui.button(word, key=key, tip=each.meaning, chosen=chosen, small=True):
-                self._set(each.name, word)
-        self._reset(ui, each, each.default)
+    def _show_options(self, ui: Ui, parameter: OptionParameter) -> None:
+        """Show the choices next to each other if they fit, else as a menu."""
+        name = parameter.name
+        choices = parameter.choices
+        free = ui.wide - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
+        width = (free - _PARAMETER_GAP_PX * (len(choices) - 1)) / len(choices)
+        fits = all(shortened(choice, round(SMALL), width - 6) == choice for choice in choices)
+        columns = [0.0] * (len(choices) if fits else 1)
+        ui.row(_LABEL_PX, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        ui.label(parameter.label, tip=parameter.meaning)
+        if fits:
+            for choice in choices:
+                is_on = choice == parameter.value
+                key = f"{name}:{choice}"
+                if ui.button(choice, key=key, tip=parameter.meaning, chosen=is_on, small=True):
+                    self._set(name, choice)
+        else:
+            chosen = ui.dropdown(name, choices, parameter.value, tip=parameter.meaning)
+            if chosen:
+                self._set(name, chosen)
+        self._show_reset(ui, parameter, parameter.default)
 
-    def _reset(self, ui: Ui, each: Parameter | Pick, usual: str) -> None:
-        if ui.button("↺", key=f"reset:{each.name}", tip=f"Back to the default: {usual}", small=True):
-            self._set(each.name, each.default)
+    def _show_reset(self, ui: Ui, parameter: Parameter, default: str) -> None:
+        tip = f"Back to the default: {default}"
+        if ui.button("↺", key=f"reset:{parameter.name}", tip=tip, small=True):
+            self._set(parameter.name, parameter.default)
 
-    def _show(self, ui: Ui) -> None:
-        viewer, names = self.viewer, [name for name in self.titles if name not in NOT_OFFERED]
+    def _show_layers(self, ui: Ui) -> None:
+        view = self.viewer.view
+        names = [name for name in self.titles if name not in LAYERS_WITHOUT_CHECK_BOX]
         rows = -(-len(names) // 2)
         with ui.scroll("show"):
             ui.row(0, 0, height=21, below=3)
-            # down the first column, then the second
+            # The order runs down the first column, then down the second.
             for name in chain.from_iterable(zip_longest(names[:rows], names[rows:])):
                 if name is None:
                     ui.cell()
                     continue
-                tip = self._commands[f"layer:{name}"].tip
-                if ui.check(self.titles[name], key=name, now=name in viewer.shown, tip=tip) is not None:
+                tip = self.commands[f"layer:{name}"].tip
+                if ui.check(self.titles[name], key=name, now=name in view.layers, tip=tip) is not None:
                     self._do(f"layer:{name}")
             ui.space(5)
             ui.row(0, 0, 0)
-            self._does(ui, "Fading", "fade", chosen=viewer.fade)
-            self._does(ui, "Dark" if viewer.theme == "light" else "Light", "theme")
-            self._does(ui, "Whole map", "fit")
+            self._show_button(ui, "Fading", "fade", is_on=view.fades_trajectories)
+            self._show_button(ui, "Dark" if view.theme == "light" else "Light", "theme")
+            self._show_button(ui, "Whole map", "fit")
 
-    def _robot(self, ui: Ui) -> None:
-        why = "" if self.viewer.selected is not None else "no robot is chosen: click one first, or press Tab"
+    def _show_robot(self, ui: Ui) -> None:
+        viewer = self.viewer
+        number = viewer.selected_robot
+        why = "" if number is not None else _NO_ROBOT_REASON
+        has_failed = number in viewer.session.displayed.get_setup(viewer.pane).failed
         ui.row(0, 0, 0, 0, below=8)
-        self._does(ui, "◀", "robot:previous")
-        self._does(ui, "▶", "robot:next")
-        failed = self.viewer.selected in self.viewer.session.displayed.get_setup(self.viewer.pane).failed
-        self._does(ui, "Revive" if failed else "Fail", "robot:fail", why=why)
-        self._does(ui, "Remove", "robot:remove", why=why)
-        with ui.scroll(f"robot:{self.viewer.selected}"):
+        self._show_button(ui, "◀", "robot:previous")
+        self._show_button(ui, "▶", "robot:next")
+        self._show_button(ui, "Revive" if has_failed else "Fail", "robot:fail", why=why)
+        self._show_button(ui, "Remove", "robot:remove", why=why)
+        with ui.scroll(f"robot:{number}"):
             if self.report is None:
-                ui.words(_NOBODY, color=ui.theme.faint)
+                ui.words(_NO_ROBOT_TEXT, color=ui.theme.faint)
             else:
                 show_report(ui, self.report)
 
-    def _keep(self, ui: Ui) -> None:
+    def _show_files(self, ui: Ui) -> None:
         ui.row(0, 0, height=28, below=5)
-        for text, action in _KEPT:
-            filming = action == "film" and self.viewer.filming
-            self._does(ui, "End film" if filming else text, action, chosen=filming)
+        for text, command in _FILE_BUTTONS:
+            is_recording = command == "video" and self.viewer.view.is_recording
+            self._show_button(ui, "Stop video" if is_recording else text, command, is_on=is_recording)
 
 
-def show_report(ui: Ui, report: Report) -> None:
+def show_report(ui: Ui, report: RobotReport) -> None:
+    """Show the explanation of a robot, with an arrow for each force."""
     ui.words(report.title, size=14, bold=True)
     ui.space(3)
     ui.words(report.verdict, size=12.5, bold=True, color=ui.theme.final)
     ui.space(4)
-    largest = max((float(np.hypot(*e.vector)) for e in report.lines if e.vector is not None), default=1.0)
-    for each in report.lines:
-        size = 0.0 if each.vector is None else float(np.hypot(*each.vector))
-        if ui.surface is not None and each.vector is not None and size >= NOTHING:
-            length = 13 * ui.scale * (0.35 + 0.65 * size / max(largest, NOTHING))
-            half = np.array(each.vector) / size * (length, -length)
-            middle = np.array(ui.rest.topleft) + np.array([14, 8]) * ui.scale
-            canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
-            color = ui.theme.forces.get(each.kind, ui.theme.ink)
-            canvas.arrow((middle - half).tolist(), (middle + half).tolist(), color, 2 * ui.scale)
-        ui.words(each.text, size=11.5, indent=34.0 if each.vector is not None else 0.0)
+    sizes = [float(np.hypot(*line.vector)) for line in report.lines if line.vector is not None]
+    largest = max(sizes, default=1.0)
+    for line in report.lines:
+        _draw_force(ui, line, largest)
+        ui.words(line.text, size=11.5, indent=_REPORT_INDENT_PX if line.vector is not None else 0.0)
         ui.space(3)
 
 
-def short_names(files: list[str]) -> dict[str, str]:
-    """Return what maps are called in the menu, by what they are: files without their folders.
+def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
+    """Draw the arrow of a force left of its text, longer for larger forces."""
+    if ui.surface is None or line.vector is None:
+        return
+    size = float(np.hypot(*line.vector))
+    if size < MIN_FORCE_N:
+        return
+    fraction = _MIN_ARROW_FRACTION + (1 - _MIN_ARROW_FRACTION) * size / max(largest, MIN_FORCE_N)
+    length = _ARROW_PX * ui.scale * fraction
+    half = np.array(line.vector) / size * (length, -length)
+    center = np.array(ui.rest.topleft) + np.array(_ARROW_CENTER_PX) * ui.scale
+    canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
+    color = ui.theme.forces.get(line.kind, ui.theme.ink)
+    canvas.arrow((center - half).tolist(), (center + half).tolist(), color, 2 * ui.scale)
 
-    >>> short_names(["rooms", "/tmp/a/rooms-1.json", "a/x.json", "b/x.json"])
+
+def shorten_names(files: list[str]) -> dict[str, str]:
+    """Return the labels of maps in the menu: files without their folders, if that is unique.
+
+    >>> shorten_names(["rooms", "/tmp/a/rooms-1.json", "a/x.json", "b/x.json"])
     {'rooms': 'rooms', '/tmp/a/rooms-1.json': 'rooms-1.json', 'a/x.json': 'a/x.json', 'b/x.json': 'b/x.json'}
     """
     names = [Path(file).name for file in files]
-    return {file: name if names.count(name) == 1 else file for file, name in zip(files, names, strict=True)}
+    labels: dict[str, str] = {}
+    for file, name in zip(files, names, strict=True):
+        labels[file] = name if names.count(name) == 1 else file
+    return labels
 
 
-def law_labels(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]:
-    """Return what controllers are called in the menu, by their names; no two are called the same.
+def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]:
+    """Return unique labels of controllers for the menu.
 
-    A user's are loaded for it, but not those in `shown`, which are at work and may be of a saved run.
+    Parameters
+    ----------
+    names : iterable of str
+        Names of the controllers that are offered; files of users are loaded.
+    shown : mapping of str to str
+        Labels of the controllers in use, by name. These are not loaded: they may come from a saved run.
 
-    >>> law_labels(["rapf", "lloyd"], {"theirs.py:Mine": "Mine"})
+    Returns
+    -------
+    dict of str to str
+        Labels by name.
+
+    Examples
+    --------
+    >>> label_controllers(["rapf", "lloyd"], {"theirs.py:Mine": "Mine"})
     {'rapf': 'RAPF', 'lloyd': 'Lloyd', 'theirs.py:Mine': 'Mine'}
     """
-    found: dict[str, str] = {}
+    labels: dict[str, str] = {}
     for name in dict.fromkeys([*names, *shown]):
-        try:
-            label = shown[name] if name in shown else str(load_controller_class(name).label)
-        except ParameterError:  # its file has changed since
-            label = get_controller_label(name)
+        label = shown[name] if name in shown else _load_label(name)
         file = Path(name.rpartition(":")[0]).name
-        tried = (label, f"{label} ({file})", f"{label} ({name})")
-        found[name] = next(each for each in tried if each not in found.values())
-    return found
+        candidates = (label, f"{label} ({file})", f"{label} ({name})")
+        labels[name] = next(candidate for candidate in candidates if candidate not in labels.values())
+    return labels
+
+
+def _load_label(name: str) -> str:
+    try:
+        return str(load_controller_class(name).label)
+    except ParameterError:  # its file has changed since
+        return get_controller_label(name)

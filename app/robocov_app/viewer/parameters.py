@@ -1,133 +1,253 @@
-"""Parameters of the panel's sliders and words: gains of a controller, limits of the team. Knows no pygame."""
+"""Parameters of the panel: gains of a controller and limits of the team, as sliders or choices."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from robocov.controllers.gains import Option
+from robocov.controllers.gains import Gain, Option, Value
 from robocov.errors import ParameterError, quote
 from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, UNITS
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
-SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more
-_END = 0.985  # from here on a slider says "no limit" where there may be none
+SLIDER_SPAN = 30.0  # a slider reaches from 1 / 30 of the default to 30 times the default
+NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"
+NO_LIMIT_TEXTS = ("none", "null", "no limit", "inf", "∞", "")
+
+
+class _LimitSlider(NamedTuple):
+    label: str
+    meaning: str
+    low: float
+    high: float
+
+
 _KINEMATIC = "kinematic limit, the same for every controller"
-_SENSES = "how far the range sensor sees obstacles, from the robot's centre"
-_KINDS = "a point moves in any direction, a unicycle has two driven wheels and has to turn"
-_LIMITS = {  # label, meaning and ends of the slider of each limit
-    "max_speed": ("largest speed", _KINEMATIC, (0.1, 10.0)),
-    "max_acceleration": ("acceleration", _KINEMATIC, (0.1, 20.0)),
-    "viscosity": ("viscosity ν", "ν of (28): what slows robots down", (0.1, 20.0)),
-    "sensing_range": ("sensing", _SENSES, (0.2, 30.0)),
-    "communication_range": ("communication", "how far robots hear each other", (0.5, 50.0)),
-    "radius": ("radius", "radius of a robot", (0.02, 1.0)),
+_LIMITS = {
+    "max_speed": _LimitSlider("max. speed", _KINEMATIC, 0.1, 10.0),
+    "max_acceleration": _LimitSlider("acceleration", _KINEMATIC, 0.1, 20.0),
+    "viscosity": _LimitSlider("viscosity ν", "ν of (28): slows robots down", 0.1, 20.0),
+    "sensing_range": _LimitSlider(
+        "sensing", "range of the obstacle sensor, from the robot's center", 0.2, 30.0
+    ),
+    "communication_range": _LimitSlider(
+        "communication", "distance within which robots receive each other's messages", 0.5, 50.0
+    ),
+    "radius": _LimitSlider("radius", "radius of a robot", 0.02, 1.0),
 }
+_KINEMATICS_MEANING = (
+    "a point moves in any direction; a unicycle has two driven wheels, and has to turn first"
+)
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One slider; where there may be no limit, None is none."""
+class NumberParameter:
+    """A number that has a slider.
 
-    name: str  # a gain, or ``team.`` and a limit
+    Attributes
+    ----------
+    name : str
+        A gain, or ``team.`` and a limit.
+    label : str
+        Name in the panel.
+    unit : str
+        Unit; empty for none.
+    meaning : str
+        Tool tip.
+    value, default : float or None
+        Present and default value; None for no limit.
+    low, high : float
+        Ends of the slider; typed values may lie outside.
+    is_optional : bool
+        Whether there may be no limit.
+    """
+
+    name: str
     label: str
     unit: str
     meaning: str
     value: float | None
     default: float | None
-    low: float  # here the slider ends; typed values may go further
+    low: float
     high: float
-    optional: bool
+    is_optional: bool
 
-    def place(self) -> float:
-        """Return where the slider stands, 0 to 1: logarithmic, so that halves and doubles are as far."""
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Values that can be listed: none."""
+        return ()
+
+    def compute_position(self) -> float:
+        """Return the position of the slider, 0 to 1: logarithmic, unless the range includes 0."""
         if self.value is None or math.isinf(self.value):
             return 1.0
-        part = 0.0
-        if self.low <= 0.0 and self.high > self.low:
-            part = (self.value - self.low) / (self.high - self.low)
-        elif self.value > 0.0 and self.high > self.low:
-            part = math.log(self.value / self.low) / math.log(self.high / self.low)
-        return min(max(part, 0.0), _END if self.optional else 1.0)
+        position = 0.0
+        if self.high > self.low:
+            if self.low <= 0.0:
+                position = (self.value - self.low) / (self.high - self.low)
+            elif self.value > 0.0:
+                position = math.log(self.value / self.low) / math.log(self.high / self.low)
+        highest = NO_LIMIT_POSITION if self.is_optional else 1.0
+        return min(max(position, 0.0), highest)
 
-    def at(self, place: float) -> float | None:
-        if self.optional and place > _END:
+    def compute_value(self, position: float) -> float | None:
+        """Return the value at a position of the slider, rounded to three digits; None for no limit."""
+        if self.is_optional and position > NO_LIMIT_POSITION:
             return None
-        low, high = self.low, self.high
-        value = low + place * (high - low) if low <= 0.0 else low * (high / low) ** place
+        if self.low <= 0.0:
+            value = self.low + position * (self.high - self.low)
+        else:
+            value = self.low * (self.high / self.low) ** position
         return min(max(float(f"{value:.3g}"), self.low), self.high)
 
-    def words(self) -> str:
+    def format(self) -> str:
+        """Return the value as text."""
         return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
 
-    def read(self, text: str) -> float | None:
+    def parse(self, text: str) -> float | None:
+        """Return the value of a typed text; None for no limit.
+
+        Raises
+        ------
+        ParameterError
+            If it is not a number.
+        """
         plain = text.strip().lower().replace(",", ".")
-        if self.optional and plain in ("none", "null", "no limit", "inf", "∞", ""):
+        if self.is_optional and plain in NO_LIMIT_TEXTS:
             return None
         try:
             return float(plain)
         except ValueError:
-            also = ", or none" if self.optional else ""
-            raise ParameterError(f"{self.label}: expected a number{also}, got {quote(text)}") from None
+            alternative = ", or none" if self.is_optional else ""
+            message = f"{self.label}: expected a number{alternative}, got {quote(text)}"
+            raise ParameterError(message) from None
 
 
 @dataclass(frozen=True)
-class Pick:
-    """One of several words, which stand side by side."""
+class OptionParameter:
+    """A value that is one of several words.
+
+    Attributes
+    ----------
+    name, label, meaning : str
+        As of a `NumberParameter`.
+    value, default : str
+        Present and default value.
+    choices : tuple of str
+        All values.
+    """
 
     name: str
     label: str
     meaning: str
     value: str
     default: str
-    offered: tuple[str, ...]
+    choices: tuple[str, ...]
 
-    def words(self) -> str:
+    def format(self) -> str:
+        """Return the value."""
         return self.value
 
-    def read(self, text: str) -> str:
+    def parse(self, text: str) -> str:
+        """Return the choice that a typed text is, or starts.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such choice, or several.
+        """
         plain = text.strip().lower()
-        begun = [word for word in self.offered if plain and word.lower().startswith(plain)]
-        found = [word for word in begun if word.lower() == plain] or begun
-        if len(found) != 1:
-            wanted = f"expected one of {', '.join(self.offered)}"
-            raise ParameterError(f"{self.label}: {wanted}, got {quote(text)}")
-        return found[0]
+        matches = [choice for choice in self.choices if plain and choice.lower().startswith(plain)]
+        exact = [choice for choice in matches if choice.lower() == plain]
+        if exact:
+            return exact[0]
+        if len(matches) == 1:
+            return matches[0]
+        raise ParameterError(f"{self.label}: expected one of {', '.join(self.choices)}, got {quote(text)}")
 
 
-def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
-    for name, gain in law.available_gains.items():
-        value = law.get_value(name)
+Parameter = NumberParameter | OptionParameter
+
+
+def list_gain_parameters(controller: ControllerChoice) -> Iterator[Parameter]:
+    """Yield the gains of a controller."""
+    for name, gain in controller.available_gains.items():
+        value = controller.get_value(name)
         if isinstance(gain, Option):
             word = value if isinstance(value, str) else gain.default
-            yield Pick(name, name, gain.meaning, word, gain.default, gain.choices)
-            continue
-        number = None if isinstance(value, str) else value
-        usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)
-        lowest = usual / SPAN if usual > 0 and gain.low >= 0 else -SPAN * abs(usual)
-        low, high = max(gain.low, lowest), min(gain.high, SPAN * abs(usual))
-        yield Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
+            yield OptionParameter(name, name, gain.meaning, word, gain.default, gain.choices)
+        else:
+            yield _build_gain_parameter(name, gain, value)
 
 
-def limit_parameters(limits: RobotProperties) -> Iterator[Parameter | Pick]:
-    usual, kind = RobotProperties(), KINEMATICS[limits.track_width > 0.0]
-    for name, (label, meaning, ends) in _LIMITS.items():
+def _build_gain_parameter(name: str, gain: Gain, value: Value) -> NumberParameter:
+    usual = min(max(gain.default or 1.0, gain.low), gain.high)
+    if usual > 0 and gain.low >= 0:
+        lowest = usual / SLIDER_SPAN
+    else:
+        lowest = -SLIDER_SPAN * abs(usual)
+    return NumberParameter(
+        name=name,
+        label=name,
+        unit=gain.unit,
+        meaning=gain.meaning,
+        value=None if isinstance(value, str) else value,
+        default=gain.default,
+        low=max(gain.low, lowest),
+        high=min(gain.high, SLIDER_SPAN * abs(usual)),
+        is_optional=gain.optional,
+    )
+
+
+def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
+    """Yield the limits of a team."""
+    defaults = RobotProperties()
+    for name, slider in _LIMITS.items():
+        label = slider.label
+        meaning = slider.meaning
         if name in limits.different:
-            label, meaning = f"{label} ≠", f"{meaning}; robots differ in it until it is set here"
-        values = getattr(limits, name), getattr(usual, name)
-        value, default = (None if math.isinf(each) else each for each in values)
-        ranged = name.endswith("_range")
-        yield Parameter(f"team.{name}", label, UNITS[name], meaning, value, default, *ends, optional=ranged)
-    yield Pick("team.kinematics", "kinematics", _KINDS, kind, KINEMATICS[0], KINEMATICS)
+            label += " ≠"
+            meaning += "; robots differ in it until it is set here"
+        yield NumberParameter(
+            name=f"team.{name}",
+            label=label,
+            unit=UNITS[name],
+            meaning=meaning,
+            value=_drop_infinity(getattr(limits, name)),
+            default=_drop_infinity(getattr(defaults, name)),
+            low=slider.low,
+            high=slider.high,
+            is_optional=name.endswith("_range"),
+        )
+    kinematics = KINEMATICS[limits.track_width > 0.0]
+    yield OptionParameter(
+        "team.kinematics", "kinematics", _KINEMATICS_MEANING, kinematics, KINEMATICS[0], KINEMATICS
+    )
 
 
-def with_limit(limits: RobotProperties, name: str, value: float | str | None) -> RobotProperties:
+def _drop_infinity(value: float) -> float | None:
+    return None if math.isinf(value) else value
+
+
+def replace_limit(limits: RobotProperties, name: str, value: float | str | None) -> RobotProperties:
+    """Return limits with another value of one of them, for all robots.
+
+    Parameters
+    ----------
+    limits : RobotProperties
+        Present limits.
+    name : str
+        The limit, with or without ``team.``; ``kinematics`` for one of `KINEMATICS`.
+    value : float, str or None
+        Its new value; None for no limit.
+    """
     name = name.removeprefix("team.")
     if name == "kinematics":
         is_unicycle = value == KINEMATICS[1]
         name = "track_width"
         value = DEFAULT_TRACK_PER_RADIUS * limits.radius if is_unicycle else 0.0
     number = math.inf if value is None else float(value)
-    # set for all: what robots had of their own is gone
-    different = {each: values for each, values in limits.different.items() if each != name}
+    # The value of single robots is replaced, too.
+    different = {other: values for other, values in limits.different.items() if other != name}
     return replace(limits, **{name: number}, different=different)

@@ -1,69 +1,122 @@
-"""The status line: time, cost, speed, the place under the cursor; and what can be tried next."""
+"""The status line: time, cost, speed, the point under the cursor; and suggestions what to try next."""
 
-from robocov_app.viewer.presenter import Presenter
+import shapely
+
+from robocov.environment import Point
+from robocov_app.viewer.costs import KnownCost
+from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.clock import format_speed
+from robocov_app.viewer.session.pane import Pane
 
 HINT = "Space pause · F1 keys"
-_SLOW = 30.0  # frames per second
-_OFFERED = (  # kinds of touches of the document, and the words for each
-    ("obstacle", "draw a wall in a doorway (W)"),
-    ("hand", "drag a robot"),
-    ("failure", "let one fail (D)"),
-    ("pane", "compare controllers (K)"),
-    ("law", "change the controller (O)"),
-    ("density", "paint where it matters (G)"),
-    ("robot", "let one more join (A)"),
-)
+LOW_FRAME_RATE = 30.0  # frames per second; a lower rate is listed before other facts
+MAX_SUGGESTIONS = 3
+_MAX_COST_LAG_S = 0.05  # an older cost is shown with its time
+_MIN_UNCOVERED_AREA_M2 = 1e-9
+_MAX_SITE_DISTANCE = 1.5  # spacings of the lattice: farther points are not free
+
+_SUGGESTIONS = {
+    "obstacle": "draw a wall in a doorway (W)",
+    "hand": "drag a robot",
+    "failure": "let one fail (D)",
+    "pane": "compare controllers (K)",
+    "law": "change the controller (O)",
+    "density": "paint where it matters (G)",
+    "robot": "let one more join (A)",
+}
+"""What to try, by the kind of edit that it leads to."""
 
 
-def facts(viewer: Presenter, frames: float, steps: float, filmed: float | None) -> list[str]:
-    """Return what the line says, the most important first; `frames` and `steps` a second, `filmed` s."""
-    session, known = viewer.session, viewer.costs.known.get(viewer.pane.number)
-    said = [f"{'' if session.playback.is_playing else 'paused · '}t = {session.displayed.time:.2f} s"]
+def list_facts(
+    viewer: ViewerModel, frame_rate: float, step_rate: float, video_duration: float | None
+) -> list[str]:
+    """Return what the status line says, the most important first.
+
+    Parameters
+    ----------
+    viewer : ViewerModel
+        The viewer.
+    frame_rate, step_rate : float
+        Frames and simulated steps per second.
+    video_duration : float or None
+        Duration of the video that is being recorded, s.
+    """
+    session = viewer.session
+    time = session.displayed.time
+    paused = "" if session.playback.is_playing else "paused · "
+    facts = [f"{paused}t = {time:.2f} s"]
+    known = viewer.costs.known.get(viewer.pane.number)
     if known is not None:
-        when = f" (at {known.time:.1f} s)" if abs(known.time - session.displayed.time) > 0.05 else ""
-        said.append(f"J = {known.result.value:.2f} m³{when}")
-        if known.result.uncovered_area > 1e-9:
-            said.append(f"cut off {known.result.uncovered_area:.1f} m²")
-    if filmed is not None:
-        said.append(f"● film {filmed:.0f} s")
-    speed, rate = format_speed(session.playback.clock.speed), f"{frames:.0f} fps"
+        facts += _list_cost_facts(known, time)
+    if video_duration is not None:
+        facts.append(f"● video {video_duration:.0f} s")
+    rate = f"{frame_rate:.0f} fps"
+    rest = [describe_cursor(viewer), _describe_speed(viewer, step_rate), f"{step_rate:.0f} steps/s"]
+    facts += [rate, *rest] if frame_rate < LOW_FRAME_RATE else [*rest, rate]
+    return [fact for fact in facts if fact]
+
+
+def _list_cost_facts(known: KnownCost, time: float) -> list[str]:
+    age = f" (at {known.time:.1f} s)" if abs(known.time - time) > _MAX_COST_LAG_S else ""
+    facts = [f"J = {known.result.value:.2f} m³{age}"]
+    if known.result.uncovered_area > _MIN_UNCOVERED_AREA_M2:
+        facts.append(f"cut off {known.result.uncovered_area:.1f} m²")
+    return facts
+
+
+def _describe_speed(viewer: ViewerModel, step_rate: float) -> str:
+    session = viewer.session
+    speed = format_speed(session.playback.clock.speed)
     if session.playback.is_playing and session.playback.clock.is_behind:
-        speed += f", really {steps * session.timeline.scenario.dt:.1f}×"
-    rest = [cursor_words(viewer), speed, f"{steps:.0f} steps/s"]
-    said += [rate, *rest] if frames < _SLOW else [*rest, rate]  # the first thing to know if it is low
-    return [each for each in said if each]
+        actual = step_rate * session.timeline.scenario.dt
+        return f"{speed} (running at {actual:.1f}×)"
+    return speed
 
 
-def cursor_words(viewer: Presenter) -> str:
-    if viewer.cursor is None:
+def describe_cursor(viewer: ViewerModel) -> str:
+    """Return the point under the cursor, and its distance to the nearest robot; empty without a cursor."""
+    cursor = viewer.inspection.cursor
+    if cursor is None:
         return ""
-    x, y = viewer.cursor
-    words = f"({x:.2f}, {y:.2f}) m"
-    pane = viewer.session.timeline.panes[min(viewer.cursor_pane, len(viewer.session.timeline.panes) - 1)]
+    panes = viewer.session.timeline.panes
+    pane = panes[min(viewer.inspection.cursor_pane, len(panes) - 1)]
+    position = f"({cursor[0]:.2f}, {cursor[1]:.2f}) m"
     known = viewer.costs.known.get(pane.number)
     if known is None:
-        return words
+        return position
+    return f"{position}: {_describe_point(viewer, pane, known, cursor)}"
+
+
+def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Point) -> str:
+    """Return the distance of a point to the robot that covers it, or why there is none."""
     result = known.result
-    square = (result.points[:, 0] - x) ** 2 + (result.points[:, 1] - y) ** 2
-    site = int(square.argmin())
-    if square[site] > (1.5 * known.lattice().spacing) ** 2:
-        return f"{words}: not free"
-    owner, numbers = int(result.owner[site]), viewer.session.displayed.get_setup(pane).numbers
-    if not 0 <= owner < len(numbers):
-        return f"{words}: no robot can come"
+    squares = (result.points[:, 0] - point[0]) ** 2 + (result.points[:, 1] - point[1]) ** 2
+    site = int(squares.argmin())
+    if squares[site] > (_MAX_SITE_DISTANCE * known.get_lattice().spacing) ** 2:
+        setup = viewer.session.displayed.get_setup(pane)
+        is_in_map = setup.environment.boundary_polygon.intersects(shapely.Point(point))
+        return "inside an obstacle" if is_in_map else "outside the map"
+    row = int(result.owner[site])
+    numbers = viewer.session.displayed.get_setup(pane).numbers
+    if not 0 <= row < len(numbers):
+        return "out of reach of all robots"
     distance = float(result.distances[site])
-    share = distance / result.mean_distance if result.mean_distance > 0 else 0.0
-    return f"{words}: {distance:.2f} m to robot {numbers[owner]}, {share:.1f} × the mean"
+    ratio = distance / result.mean_distance if result.mean_distance > 0 else 0.0
+    return f"{distance:.2f} m to robot {numbers[row]}, {ratio:.1f} × the mean"
 
 
-def suggestion(viewer: Presenter) -> str:
-    session = viewer.session
-    rested = session.timeline.is_settled or viewer.rested is session.timeline.head
-    if not (viewer.suggests and rested and session.timeline.is_live) or session.timeline.drag is not None:
+def suggest_actions(viewer: ViewerModel) -> str:
+    """Return what to try once the team has settled; empty while it moves, or if all was tried."""
+    timeline = viewer.session.timeline
+    has_settled = timeline.is_settled or viewer.settled_change is timeline.head
+    if not viewer.view.has_suggestions or not has_settled:
         return ""
-    tried = {node.kind for node in session.timeline.document.nodes} | (
-        {"pane"} if session.timeline.panes[1:] else set()
-    )
-    new = [words for kind, words in _OFFERED if kind not in tried][:3]
-    return f"The team has settled. Try:\n{' · '.join(new)}" if new else ""
+    if not timeline.is_live or timeline.drag is not None:
+        return ""
+    tried = {node.kind for node in timeline.document.nodes}
+    if len(timeline.panes) > 1:
+        tried.add("pane")
+    suggestions = [text for kind, text in _SUGGESTIONS.items() if kind not in tried]
+    if not suggestions:
+        return ""
+    return f"The team has settled. Try:\n{' · '.join(suggestions[:MAX_SUGGESTIONS])}"

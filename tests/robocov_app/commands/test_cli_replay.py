@@ -14,7 +14,7 @@ from robocov_app.cli import main
 from robocov_app.runs.artifacts import start_comparison
 from robocov_app.terminal.output import write_csv
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 EMPTY = replace(HALL, obstacles=())
 SMALL = ("--size", "480x320", "--fps", "10", "--film-speed", "1")
@@ -23,7 +23,7 @@ SMALL = ("--size", "480x320", "--fps", "10", "--film-speed", "1")
 @pytest.fixture(autouse=True)
 def no_window(monkeypatch: pytest.MonkeyPatch) -> None:
     """No window stays open that should not have opened."""
-    monkeypatch.setattr(Window, "run", Window.close)
+    monkeypatch.setattr(ViewerWindow, "run", ViewerWindow.close)
 
 
 def write_history(folder: Path) -> None:
@@ -148,7 +148,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     """Windows on a display that nobody sees, closed after some frames; the sessions in them."""
     sessions: list[Session] = []
 
-    def run(window: Window) -> None:
+    def run(window: ViewerWindow) -> None:
         for _ in range(10):
             window.frame(1 / 30)
         sessions.append(window.viewer.session)
@@ -156,7 +156,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("ROBOCOV_SETTINGS", "")
-    monkeypatch.setattr(Window, "run", run)
+    monkeypatch.setattr(ViewerWindow, "run", run)
     return sessions
 
 

@@ -19,7 +19,7 @@ from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study_file import read_study
 from robocov_app.viewer.session.missing_controller import MissingController
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 SHORT = ("--duration", "0.5", "--dt", "0.05", "--lattice", "8", "--robots", "2", "--size", "320x240")
 SMALL = ("--size", "320x240", "--fps", "2", "--film-speed", "1")
@@ -82,7 +82,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     """What windows show that nobody sees, after they were used for some seconds."""
     sessions: list[Session] = []
 
-    def run(window: Window) -> None:
+    def run(window: ViewerWindow) -> None:
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
             window.do("robot:next")
@@ -96,7 +96,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("ROBOCOV_SETTINGS", "")
-    monkeypatch.setattr(Window, "run", run)
+    monkeypatch.setattr(ViewerWindow, "run", run)
     return sessions
 
 

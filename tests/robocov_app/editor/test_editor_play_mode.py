@@ -53,9 +53,9 @@ def test_escape_leads_back_but_first_closes_what_is_open(tmp_path: Path) -> None
     with opened_editor(tmp_path, of_map("square")) as hands:
         trial = tried(hands)
         hands.key("f1")
-        assert trial.help
+        assert trial.is_help_open
         hands.key("escape")
-        assert hands.window.trial is trial and not trial.help
+        assert hands.window.trial is trial and not trial.is_help_open
         hands.key("w")
         hands.key("escape")
         assert hands.window.trial is trial
@@ -94,14 +94,17 @@ def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> N
 def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(PILLAR)) as hands:
         trial = tried(hands)
-        trial.viewer.attempt(lambda: trial.viewer.open_map("square"))
-        assert trial.viewer.elsewhere and "Untitled" in trial.viewer.maps()
+        trial.viewer.attempt(lambda: trial.viewer.files.open_map("square"))
+        assert trial.viewer.files.has_left_tried_map and "Untitled" in trial.viewer.files.list_maps()
         hands.key("f5")
         assert hands.shapes == [PILLAR]
         trial = tried(hands)
-        trial.viewer.attempt(lambda: trial.viewer.open_map("rooms"))
-        trial.viewer.attempt(lambda: trial.viewer.open_map("Untitled"))
-        assert not trial.viewer.elsewhere and len(trial.viewer.session.displayed.environment.obstacles) == 1
+        trial.viewer.attempt(lambda: trial.viewer.files.open_map("rooms"))
+        trial.viewer.attempt(lambda: trial.viewer.files.open_map("Untitled"))
+        assert (
+            not trial.viewer.files.has_left_tried_map
+            and len(trial.viewer.session.displayed.environment.obstacles) == 1
+        )
         hands.key("escape")
 
 

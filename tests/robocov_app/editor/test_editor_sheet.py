@@ -24,7 +24,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.camera import Camera
 from robocov_app.toolkit.display import open_display
-from robocov_app.viewer.film import pixels
+from robocov_app.viewer.screen_video import copy_pixels
 
 SIZE = (420, 360)
 BOX = (10.0, 30.0, 400.0, 300.0)
@@ -51,7 +51,7 @@ def view(center: tuple[float, float] = (5.0, 5.0), zoom: float = 28.0, **more: o
 
 def drawn(page: pygame.Surface, at: View) -> np.ndarray:
     left, top, width, height = at.clip
-    return pixels(page)[top : top + height, left : left + width].copy()
+    return copy_pixels(page)[top : top + height, left : left + width].copy()
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

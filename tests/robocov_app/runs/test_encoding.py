@@ -21,7 +21,7 @@ from robocov_app.commands.options import VideoOptions
 from robocov_app.runs.encoding import encode_png, find_encoder, save_frames_and_video, save_video
 from robocov_app.runs.frames import draw_frames, select_frame_rows
 from robocov_app.runs.settings import VideoSettings
-from robocov_app.viewer.film import Film
+from robocov_app.viewer.screen_video import ScreenVideo
 
 
 def plain(count, width=64, height=48):
@@ -183,7 +183,7 @@ class TestSaveFilm:
         monkeypatch.chdir(tmp_path)
         save_video(Path(name) / "run.mp4", plain(3))
         assert len(read(tmp_path / name / "run.mp4")[0]) == 3
-        film = Film(Path(f"{name}.mp4"), (64, 48), patient=True)
+        film = ScreenVideo(Path(f"{name}.mp4"), (64, 48), waits=True)
         film.add(pygame.Surface((64, 48)), 0.1)
         film.close()
         assert len(read(tmp_path / f"{name}.mp4")[0]) == 3

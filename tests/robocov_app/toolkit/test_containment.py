@@ -238,7 +238,7 @@ def test_an_edit_of_a_session_that_raises_is_taken_back(
             raise ZeroDivisionError("half-way")
 
         monkeypatch.setattr(session.timeline.history, "amend", fail)
-        driver.viewer.hand.selected = 1
+        driver.viewer.inspection.selected = 1
         driver.key("delete")
         assert "ZeroDivisionError" in driver.viewer.message
         monkeypatch.setattr(session.timeline.history, "amend", amend)

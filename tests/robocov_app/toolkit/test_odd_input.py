@@ -98,9 +98,9 @@ def test_an_open_list_whose_names_have_changed_chooses_nothing(tmp_path: Path) -
     with opened(tmp_path) as driver:
         driver.click(*driver.widget("menu", "map").rect.center)
         assert driver.window.panel.ui.open_list is not None
-        driver.viewer.open_map("square")
+        driver.viewer.files.open_map("square")
         driver.key("return")
-        assert driver.viewer.map_name == "square"
+        assert driver.viewer.files.map_name == "square"
 
 
 @posix_only

@@ -99,7 +99,7 @@ def test_a_paused_window_is_drawn_when_its_cost_or_words_change_only(tmp_path: P
         drawn.clear()
         driver.frames(20)
         assert window.resting and not drawn
-        viewer.say("something")
+        viewer.show_message("something")
         driver.frames(5)
         assert len(drawn) == 1
         driver.session.playback.is_playing = True

@@ -81,8 +81,8 @@ def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
             session, viewer = driver.session, driver.viewer
             is_large = len(session.displayed.numbers) > 6 or len(session.displayed.environment.obstacles) > 20
             if is_large or session.timeline.scenario.robots > 6:
-                viewer.attempt(lambda: viewer.open_map("square"))
-                viewer.attempt(lambda: viewer.restart(robots=2))
+                viewer.attempt(lambda: viewer.files.open_map("square"))
+                viewer.attempt(lambda: viewer.playback.restart(robots=2))
 
         fuzz.play(events, keep_small)
         leave_everything(driver)

@@ -16,14 +16,16 @@ from robocov.controllers import CONTROLLERS, get_gains
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Command, matching
 from robocov_app.toolkit.input import key_words
-from robocov_app.viewer import panel, window
-from robocov_app.viewer.commands import GROUPS, viewer_commands
-from robocov_app.viewer.tools import toolbox
+from robocov_app.viewer import panel
+from robocov_app.viewer.commands import GROUPS, list_viewer_commands
+from robocov_app.viewer.inspection import Inspection
+from robocov_app.viewer.lesson_guide import COMMANDS_WITHIN_LESSON
+from robocov_app.viewer.tools.toolbox import Toolbox
 
 TITLES = {layer.name: layer.title for layer in standard_layers()}
 TEXTS = [path.read_text() for path in Path(package.__path__[0]).glob("*.py")]
 
-HARMLESS = frozenset({"quit", "film", "screenshot", "save:run", "save:map", "fullscreen"})
+HARMLESS = frozenset({"quit", "video", "screenshot", "save:run", "save:map", "fullscreen"})
 """Left out where each action is done: tested for themselves, or they write files."""
 
 
@@ -51,13 +53,15 @@ def test_everything_has_a_key_or_is_typed_and_is_in_a_group_of_the_help(actions:
 
 
 def test_all_layers_and_all_tools_are_there(shared: Driver) -> None:
-    named = [each.name for each in viewer_commands(shared.viewer, TITLES)]
-    assert [name for name in named if name.startswith("tool:")] == [f"tool:{name}" for name in toolbox()]
+    named = [each.name for each in list_viewer_commands(shared.viewer, TITLES)]
+    assert [name for name in named if name.startswith("tool:")] == [
+        f"tool:{name}" for name in Toolbox(Inspection()).by_name
+    ]
     assert {name for name in named if name.startswith("layer:")} == {f"layer:{name}" for name in TITLES}
 
 
 def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key(shared: Driver) -> None:
-    listed = viewer_commands(shared.viewer, {**TITLES, "dust": "Dust"})
+    listed = list_viewer_commands(shared.viewer, {**TITLES, "dust": "Dust"})
     assert [each.keys for each in listed if each.name == "layer:dust"] == [()]
 
 
@@ -92,7 +96,7 @@ def test_every_key_is_one_that_there_is(actions: list[Command]) -> None:
 def test_what_panel_pages_and_window_name_exists(actions: list[Command]) -> None:
     """Every text that looks like an action's name, and is used where one is wanted, is one."""
     names = {action.name for action in actions}
-    calls = {"does", "do", "_do"}
+    calls = {"_show_button", "do", "_do"}
     for text in TEXTS:
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in calls:
@@ -103,7 +107,7 @@ def test_what_panel_pages_and_window_name_exists(actions: list[Command]) -> None
                         and arg.value[0].islower()
                     ):
                         assert arg.value in names, arg.value
-    assert set(window._GOES_ON_WITH) <= names
+    assert names >= COMMANDS_WITHIN_LESSON
 
 
 def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_panels_own(
@@ -124,17 +128,17 @@ def state_of(driver: Driver) -> list[object]:
     viewer, session, its = driver.viewer, driver.session, driver.window
     camera = its.canvas._painters[0].camera
     told: list[object] = [
-        viewer.shown.copy(),
-        viewer.theme,
-        viewer.fade,
-        viewer.panel,
+        viewer.view.layers.copy(),
+        viewer.view.theme,
+        viewer.view.fades_trajectories,
+        viewer.view.has_panel,
         viewer.tool,
-        viewer.active,
+        viewer.active_pane,
     ]
     told += [
-        viewer.hand.selected,
+        viewer.inspection.selected,
         viewer.message,
-        viewer.map_name,
+        viewer.files.map_name,
         session.playback.is_playing,
         session.displayed.time,
         session.timeline.end_time,
@@ -152,7 +156,7 @@ def state_of(driver: Driver) -> list[object]:
         camera,
     ]
     told += [
-        viewer.tool.preview(session),
+        viewer.tool.build_preview(session),
         session.displayed.get_setup(session.timeline.panes[0]),
         its.help,
         its.dialogs.open,
@@ -198,13 +202,13 @@ def prepared(driver: Driver) -> Driver:
     its.help = False
     its.dialogs.close()
     its._end_tour()
-    viewer.attempt(lambda: viewer.open_map("square"))
+    viewer.attempt(lambda: viewer.files.open_map("square"))
     while len(session.timeline.panes) > 1:
         session.remove_pane(session.timeline.panes[-1])
-    viewer.add_pane()
+    viewer.comparison.add_pane()
     for _ in range(90):
         session.playback.step()
-    viewer.hand.selected = 2
+    viewer.inspection.selected = 2
     session.add_robot((8.0, 8.0))
     session.add_robot((8.0, 2.0))
     session.undo()

@@ -21,7 +21,7 @@ from robocov_app.viewer.session.map_edits import (
     PAINTED_RASTER_CELLS,
     build_paintable_raster,
 )
-from robocov_app.viewer.tools import Brush
+from robocov_app.viewer.tools.brush import BrushTool
 
 REACH = 0.1
 
@@ -40,7 +40,7 @@ def value_at(session, point) -> float:
 
 
 def test_left_raises_and_right_lowers():
-    brush, session = Brush(radius=0.8), start_session()
+    brush, session = BrushTool(radius=0.8), start_session()
     assert stroke(brush, session, (1.0, 1.0), (2.0, 1.0)) == "density raised"
     raised = value_at(session, (1.5, 1.0))
     assert raised > 1.3 and value_at(session, (1.5, 1.5)) > 1.0
@@ -57,7 +57,7 @@ def test_left_raises_and_right_lowers():
 
 
 def test_a_stroke_is_undone_as_a_whole_and_done_again():
-    brush, session = Brush(radius=0.5), advance_session(start_session(), 5)
+    brush, session = BrushTool(radius=0.5), advance_session(start_session(), 5)
     before = session.displayed.environment
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0), (3.0, 2.0))
     painted = session.displayed.environment
@@ -74,7 +74,7 @@ def test_a_stroke_is_undone_as_a_whole_and_done_again():
 
 def test_robots_know_of_it_while_it_is_painted():
     now = [0.0]
-    brush, session = Brush(radius=1.0, clock=lambda: now[0]), start_session(RAPF, LLOYD)
+    brush, session = BrushTool(radius=1.0, clock=lambda: now[0]), start_session(RAPF, LLOYD)
     brush.press(session, (5.0, 3.0), REACH, None)
     for k in range(20):
         now[0] += 0.1
@@ -84,14 +84,14 @@ def test_robots_know_of_it_while_it_is_painted():
             assert pane.simulation.observe_and_decide().seen.density is session.displayed.environment.density
     assert session.displayed.environment.density is not None
     assert session.timeline.head.parent is not None
-    assert brush.painting
+    assert brush.is_painting
     brush.release(session, (4.6, 3.0))
-    assert not brush.painting and session.timeline.head.parent is not None
+    assert not brush.is_painting and session.timeline.head.parent is not None
 
 
 def test_it_does_not_tell_the_robots_more_often_than_is_seen():
     now, told = [0.0], []
-    brush, session = Brush(radius=1.0, clock=lambda: now[0]), start_session()
+    brush, session = BrushTool(radius=1.0, clock=lambda: now[0]), start_session()
     brush.press(session, (1.0, 1.0), REACH, None)
     for k in range(200):
         now[0] += 0.01
@@ -101,19 +101,19 @@ def test_it_does_not_tell_the_robots_more_often_than_is_seen():
 
 
 def test_escape_gives_the_stroke_up():
-    brush, session = Brush(radius=1.0), start_session()
+    brush, session = BrushTool(radius=1.0), start_session()
     before = session.displayed.environment
     brush.press(session, (1.0, 1.0), REACH, None)
     assert session.displayed.environment != before
     assert brush.cancel(session)
     assert session.displayed.environment == before and session.timeline.head.parent is None
     assert brush.release(session, (1.0, 1.0)) is None
-    assert brush.preview(session) is None
+    assert brush.build_preview(session) is None
 
 
 def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
     """Only the density changes: nobody is pushed, and an obstacle of in between stays."""
-    brush, session = Brush(radius=0.5), advance_session(start_session(), 3)
+    brush, session = BrushTool(radius=0.5), advance_session(start_session(), 3)
     places = session.timeline.panes[0].simulation.positions.copy()
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0))
     assert np.array_equal(session.timeline.panes[0].simulation.positions, places)
@@ -131,7 +131,7 @@ def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
 
 
 def test_another_map_in_the_midst_of_a_stroke_ends_it():
-    brush, session = Brush(radius=0.5), start_session()
+    brush, session = BrushTool(radius=0.5), start_session()
     brush.press(session, (1.0, 1.0), REACH, None)
     session.restart(environment=load_map("square"))
     brush.move(session, (2.0, 1.0))
@@ -153,21 +153,21 @@ def test_what_is_painted_on():
 
 
 def test_its_size():
-    brush, session = Brush(), start_session()
-    first = brush.size(session)
+    brush, session = BrushTool(), start_session()
+    first = brush.get_radius(session)
     assert first == pytest.approx(0.1 * HALL.region.diameter, rel=0.05)
-    assert brush.widen(session, 2.0).startswith("the brush has a radius of ")
-    assert brush.size(session) == pytest.approx(2.0 * first, rel=0.01)
+    assert brush.resize(session, 2.0).startswith("the brush has a radius of ")
+    assert brush.get_radius(session) == pytest.approx(2.0 * first, rel=0.01)
     for factor, most in ((100.0, 0.5), (1e-4, 0.005)):
-        brush.widen(session, factor)
-        assert brush.size(session) == pytest.approx(most * HALL.region.diameter, rel=0.01)
+        brush.resize(session, factor)
+        assert brush.get_radius(session) == pytest.approx(most * HALL.region.diameter, rel=0.01)
     brush.move(session, (1.0, 1.0))
-    shown = brush.preview(session)
-    assert shown is not None and shown.words == "φ 1" and not shown.marks
+    shown = brush.build_preview(session)
+    assert shown is not None and shown.label == "φ 1" and not shown.has_marks
 
 
 def test_nothing_is_touched_before_a_press():
-    brush, session = Brush(), start_session()
+    brush, session = BrushTool(), start_session()
     before = describe_state(session)
     brush.move(session, (1.0, 1.0))
     assert brush.release(session, (1.0, 1.0)) is None and not brush.cancel(session)
@@ -195,7 +195,7 @@ def test_in_the_window(tmp_path):
             driver.session.displayed.environment
         }
         driver.key("ctrl+shift+s")
-        assert load_map(driver.viewer.map_name) == driver.session.displayed.environment
+        assert load_map(driver.viewer.files.map_name) == driver.session.displayed.environment
         driver.key("ctrl+z", 2)
         assert driver.session.displayed.environment.density is None
         assert "φ" not in driver.window.canvas._scenes[0].cost
@@ -209,7 +209,7 @@ def test_a_density_alone_needs_no_preparation_of_the_map():
     places, costs = np.array([[1.0, 1.0], [5.0, 3.2]]), Costs(24, direct=True)
     found = []
     for environment in (HALL, HALL.with_density(peak), HALL):
-        costs.environment(environment)
+        costs.set_environment(environment)
         costs.ask(0, 0.0, places)
         ((_, known),) = costs.poll()
         found.append(known.result.mean_distance)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from robocov_app.render.canvas import Canvas
 from robocov_app.viewer.chart import curve_colors, spread, time_axis, value_axis
-from robocov_app.viewer.film import pixels
+from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 
 
@@ -91,7 +91,7 @@ def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> 
     played(driver)
     window = driver.window
     left, top, width, height = window.layout.chart
-    picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
+    picture = copy_pixels(window.screen)[top : top + height, left : left + width].astype(int)
     for pane in driver.session.timeline.panes:
         color = np.array(curve_colors(driver.session.timeline.panes, window.theme)[pane.number])
         assert (np.abs(picture - color).max(axis=2) < 12).sum() > 20, pane.controller.name
@@ -112,10 +112,10 @@ def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
 def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
     played(driver)
     window = driver.window
-    before = pixels(window.screen).copy()
+    before = copy_pixels(window.screen).copy()
     driver.viewer.attempt(lambda: driver.session.fail_robot(1))
     driver.frames(8)
-    after = pixels(window.screen)
+    after = copy_pixels(window.screen)
     column = round(window.chart.column(driver.session.timeline.end_time))
     _, top, _, height = window.layout.chart
     middle = top + height // 2
@@ -139,9 +139,11 @@ def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> N
 def test_what_is_of_the_past_is_shown_at_once_also_at_one_second(driver: Driver) -> None:
     played(driver, 100)
     _, top, width, height = driver.window.layout.chart
-    live = pixels(driver.window.screen)[top : top + height, width - 150 : width].copy()
+    live = copy_pixels(driver.window.screen)[top : top + height, width - 150 : width].copy()
     # one second exactly is as true as true is
     driver.session.show_time(1.0)
     assert driver.session.displayed.time == 1.0 and not driver.session.timeline.is_live
     driver.frames(1)
-    assert not np.array_equal(pixels(driver.window.screen)[top : top + height, width - 150 : width], live)
+    assert not np.array_equal(
+        copy_pixels(driver.window.screen)[top : top + height, width - 150 : width], live
+    )

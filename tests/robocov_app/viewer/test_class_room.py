@@ -45,7 +45,7 @@ def play(driver: Driver) -> None:
 def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     left = tmp_path / "left"
     with opened(tmp_path, RAPF, environment=ROOM, robots=4) as driver:
-        driver.viewer.workspace = SessionWorkspace(driver.session, left)
+        driver.viewer.files.workspace = SessionWorkspace(driver.session, left)
         play(driver)
         driver.key("w")
         driver.click_at((3.0, 0.02))
@@ -57,7 +57,7 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
         driver.key("shift+d")
         play(driver)
         failed = state(driver.session)
-        driver.viewer.look_at(0.3)  # before it failed
+        driver.viewer.playback.look_at(0.3)  # before it failed
         driver.key("b")
         play(driver)
         driver.key("k")  # compare: all begin anew
@@ -83,14 +83,14 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
             driver.key("ctrl+y")
         assert_same(state(driver.session), compared)
         driver.key("ctrl+s")
-        file = driver.viewer.workspace.path
+        file = driver.viewer.files.workspace.path
         assert file is not None
         play(driver)
         driver.click(*driver.robot(1))
         driver.key("shift+d")
         play(driver)
         last = state(driver.session)
-        workspace = driver.viewer.workspace
+        workspace = driver.viewer.files.workspace
         workspace._when = -1e9
         workspace.save_draft({})
         assert workspace._autosaver.flush()

@@ -190,7 +190,7 @@ def test_a_saved_run_is_looked_at_again_and_gone_on_from(tmp_path: Path) -> None
 @pytest.mark.slow
 def test_where_obstacles_move_the_cost_is_told_as_elsewhere() -> None:
     for costs in (Costs(8, direct=True), Costs(8)):
-        costs.environment(HALL)
+        costs.set_environment(HALL)
         costs.ask(0, 0.0, STARTS)
         end = time.monotonic() + 60.0
         while not costs.poll() and time.monotonic() < end:

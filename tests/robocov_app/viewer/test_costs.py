@@ -31,7 +31,7 @@ PATIENCE = 60.0
 """Seconds after which nothing will come any more."""
 
 
-def answered(costs, wanted=1) -> dict[int, module.Known]:
+def answered(costs, wanted=1) -> dict[int, module.KnownCost]:
     """Poll until so many panes have been answered."""
     answers, end = {}, time.monotonic() + PATIENCE
     while time.monotonic() < end:
@@ -78,7 +78,7 @@ def stubbed():
     """Give costs whose worker does what the test says."""
     costs = Costs(16, direct=True)
     costs._worker = StubWorker()
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     return costs, costs._worker
 
 
@@ -95,7 +95,7 @@ def ready(stubbed):
 
 def test_answers_are_those_of_the_cost():
     costs = Costs(32, direct=True)
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     costs.ask(0, 1.5, PLACES)
     costs.ask(3, 1.5, OTHERS, np.array([3.5, 0.5]))
     assert costs.known == {}
@@ -113,7 +113,7 @@ def test_answers_are_those_of_the_cost():
 
 def test_only_the_newest_question_of_a_pane_counts():
     costs = Costs(32, direct=True)
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     for when in (1.0, 2.0, 3.0):
         costs.ask(0, when, PLACES)
     assert [known.time for _, known in costs.poll()] == [3.0]
@@ -121,7 +121,7 @@ def test_only_the_newest_question_of_a_pane_counts():
 
 def test_positions_are_those_when_it_was_asked():
     costs, places = Costs(32, direct=True), PLACES.copy()
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     costs.ask(0, 1.0, places)
     places += 0.5
     ((_, known),) = costs.poll()
@@ -130,7 +130,7 @@ def test_positions_are_those_when_it_was_asked():
 
 def test_what_cannot_be_computed_is_left_out():
     costs = Costs(32, direct=True)
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     costs.ask(0, 1.0, INSIDE)
     costs.ask(1, 1.0, PLACES, INSIDE[0])
     assert [(pane, known.path) for pane, known in costs.poll()] == [(1, None)]
@@ -139,28 +139,28 @@ def test_what_cannot_be_computed_is_left_out():
 
 def test_another_map():
     costs = Costs(16, direct=True)
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     costs.ask(0, 1.0, PLACES)
     costs.poll()
     costs.ask(0, 2.0, PLACES)
-    costs.environment(replace(HALL, obstacles=()))
+    costs.set_environment(replace(HALL, obstacles=()))
     assert costs.known == {}
     # what was asked was asked of the map before
     assert costs.poll() == []
     costs.ask(0, 2.0, INSIDE)
     assert len(costs.poll()) == 1
     costs = Costs(1, direct=True)
-    costs.environment(FULL)
+    costs.set_environment(FULL)
     costs.ask(0, 1.0, PLACES)
     assert costs.poll() == []
     assert costs.state.startswith("no cost: ")
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     assert costs.state == ""
 
 
 def test_what_was_of_another_run_is_forgotten():
     costs = Costs(16, direct=True)
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     costs.ask(0, 1.0, PLACES)
     costs.poll()
     costs.ask(0, 2.0, PLACES)
@@ -171,7 +171,7 @@ def test_what_was_of_another_run_is_forgotten():
 
 def test_obstacles_that_move_stand_where_they_are_at_the_time():
     costs = Costs(32, direct=True)
-    costs.environment(CROSSED)
+    costs.set_environment(CROSSED)
     assert costs.state == ""
     values = []
     for when in (0.0, 2.5, 5.0):
@@ -185,7 +185,7 @@ def test_obstacles_that_move_stand_where_they_are_at_the_time():
 
 def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
     costs = Costs(32, direct=True)
-    costs.environment(CROSSED)
+    costs.set_environment(CROSSED)
     over = np.array([[1.0, 2.0], [5.0, 3.0]])
     costs.ask(0, 0.0, over, np.array([5.5, 3.5]))
     ((_, known),) = costs.poll()
@@ -201,7 +201,7 @@ def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
 def test_the_time_until_the_first_robot_comes():
     speeds = np.array([0.2, 1.0])
     costs = Costs(32, direct=True)
-    costs.environment(HALL)
+    costs.set_environment(HALL)
     costs.ask(0, 1.0, PLACES)
     costs.ask(1, 1.0, PLACES, speeds=speeds)
     without, timed = (known for _, known in costs.poll())
@@ -271,9 +271,9 @@ def test_so_are_those_of_another_map(ready):
     costs, worker = ready
     costs.ask(2, 7.0, PLACES)
     costs.poll()
-    costs.environment(replace(HALL, obstacles=()))
+    costs.set_environment(replace(HALL, obstacles=()))
     costs.ask(2, 8.0, INSIDE)
-    worker._answer = module.Known(7.0, None, None, None)  # while the newest question has no answer
+    worker._answer = module.KnownCost(7.0, None, None, None)  # while the newest question has no answer
     assert costs.poll() == []
     assert costs.known == {}
     for _ in range(2):
@@ -316,7 +316,7 @@ def test_a_process_that_ends_again_and_again_is_said(ready):
 
 
 def test_another_process_says_the_same(worker_costs):
-    worker_costs.environment(HALL)
+    worker_costs.set_environment(HALL)
     point = np.array([3.5, 0.5])
     worker_costs.ask(0, 1.5, PLACES)
     worker_costs.ask(5, 1.5, OTHERS, point)
@@ -337,14 +337,14 @@ def test_another_process_says_the_same(worker_costs):
     worker_costs.forget()
     assert worker_costs.known == {}
     # another map, on which robots are where there was an obstacle
-    worker_costs.environment(replace(HALL, obstacles=()))
+    worker_costs.set_environment(replace(HALL, obstacles=()))
     worker_costs.ask(0, 3.0, INSIDE)
     assert answered(worker_costs)[0].time == 3.0
 
 
 @pytest.mark.slow
 def test_another_process_knows_where_obstacles_are(worker_costs):
-    worker_costs.environment(CROSSED)
+    worker_costs.set_environment(CROSSED)
     speeds = np.array([0.5, 1.0])
     for when in (0.0, 2.5):
         worker_costs.ask(0, when, PLACES, speeds=speeds)
@@ -362,7 +362,7 @@ def test_another_process_knows_where_obstacles_are(worker_costs):
 def test_a_map_without_a_cost_is_said():
     costs = Costs(1)
     try:
-        costs.environment(FULL)
+        costs.set_environment(FULL)
         end = time.monotonic() + PATIENCE
         while not costs.state.startswith("no cost") and time.monotonic() < end:
             costs.poll()
@@ -375,7 +375,7 @@ def test_a_map_without_a_cost_is_said():
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 def test_a_process_that_dies_is_replaced(worker_costs):
-    worker_costs.environment(HALL)
+    worker_costs.set_environment(HALL)
     worker_costs.ask(0, 1.0, PLACES)
     answered(worker_costs)
     os.kill(worker_costs._worker.process.pid, signal.SIGKILL)

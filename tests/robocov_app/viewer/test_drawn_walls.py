@@ -10,7 +10,7 @@ from sample_sessions import HALL, RAPF
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.passages import describe_passage_changes
-from robocov_app.viewer.tools import snapped
+from robocov_app.viewer.tools.snapping import snap_point
 
 
 def room(*walls: WallObstacle) -> Environment:
@@ -70,9 +70,9 @@ def test_a_wall_is_drawn_by_a_drag_too_and_snaps(tmp_path: Path) -> None:
 
 
 def test_corners_come_before_walls() -> None:
-    assert snapped(HALL, (0.03, 0.04), 0.1) == (0.0, 0.0)
-    assert snapped(HALL, (1.3, 0.04), 0.1) == (1.3, 0.0)
-    assert snapped(HALL, (1.3, 0.2), 0.1) == (1.3, 0.2)
+    assert snap_point(HALL, (0.03, 0.04), 0.1) == (0.0, 0.0)
+    assert snap_point(HALL, (1.3, 0.04), 0.1) == (1.3, 0.0)
+    assert snap_point(HALL, (1.3, 0.2), 0.1) == (1.3, 0.2)
 
 
 @pytest.mark.parametrize(("end", "words"), [

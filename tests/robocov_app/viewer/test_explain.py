@@ -12,18 +12,19 @@ from hypothesis import strategies as st
 from robocov import Rapf, Simulation, Team
 from robocov.observation import Decision
 from robocov.voronoi import partition
-from robocov_app.viewer import explain as explaining
-from robocov_app.viewer.explain import REST, explain
+from robocov_app.viewer.explanation.explain import explain
+from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
+from robocov_app.viewer.explanation.text import format_direction, format_force, format_length
 
 # sizes and directions
 
 
 def test_eight_directions():
-    ways = [explaining._compass(complex(np.cos(angle), np.sin(angle))) for angle in np.arange(8) * np.pi / 4]
+    ways = [format_direction(complex(np.cos(angle), np.sin(angle))) for angle in np.arange(8) * np.pi / 4]
     assert ways == "east north-east north north-west west south-west south south-east".split()
-    assert explaining._compass(0j) == ""
-    assert explaining._compass(-1 - 1e-9j) == "west"
-    assert explaining._compass(complex(2.0, 5e-324)) == "east"
+    assert format_direction(0j) == ""
+    assert format_direction(-1 - 1e-9j) == "west"
+    assert format_direction(complex(2.0, 5e-324)) == "east"
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_eight_directions():
     ],
 )
 def test_lengths(meters, words):
-    assert explaining._length(meters) == words
+    assert format_length(meters) == words
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_lengths(meters, words):
     [(0, "0 N"), (4e-4, "0 N"), (0.0042, "4 mN"), (0.314, "0.31 N"), (2, "2.0 N"), (12.3, "12 N")],
 )
 def test_forces(newtons, words):
-    assert explaining._force(newtons) == words
+    assert format_force(newtons) == words
 
 
 # moments made by hand
@@ -78,7 +79,7 @@ def test_each_force_is_told_with_what_causes_it():
         "held back 0.40 N by viscosity",
         "resultant 0.30 N north",
         "32 cm clear of the obstacle south of it",
-        "hears 2 robots, the nearest is robot 7, 80 cm west",
+        "2 robots in communication range, the nearest is robot 7, 80 cm west",
     ]
     assert line(report, "attraction").vector == (0.31, 0.0)
     assert line(report, "viscosity").vector == (-0.4, 0.0)
@@ -120,8 +121,8 @@ def test_an_obstacle_point_is_told_by_what_it_belongs_to(point, name):
 )
 def test_what_hides_a_goal(environment, here, goal, hidden):
     pull = np.array(goal, dtype=float) - here
-    away = explaining._length(float(np.hypot(*pull))) + " away" + hidden
-    size = explaining._force(float(np.hypot(*pull)))
+    away = format_length(float(np.hypot(*pull))) + " away" + hidden
+    size = format_force(float(np.hypot(*pull)))
     report = moment([here], goals=[goal], environment=environment, attraction=[pull])
     assert line(report, "attraction").text == f"pulled {size} to its goal, {away}"
     held = moment([here], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
@@ -259,9 +260,9 @@ def test_who_sways_does_not_set_off_and_who_begins_does():
 
 def test_limits():
     fast = moment([[4, 4]], velocities=[[1, 0]], max_speed=1.0)
-    assert "at its top speed, 1.0 m/s" in texts(fast)
+    assert "at its maximum speed, 1.0 m/s" in texts(fast)
     thrown = moment([[4, 4]], velocities=[[5, 0]], max_speed=1.0)
-    assert "faster than its top speed, 1.0 m/s" in texts(thrown)
+    assert "faster than its maximum speed, 1.0 m/s" in texts(thrown)
     heavy = moment([[4, 4]], forces=[[10, 0]], mass=20.0, max_acceleration=0.6)
     assert not [text for text in texts(heavy) if "limited" in text]
 
@@ -273,12 +274,12 @@ def test_limits():
 def test_what_is_not_sensed(reach, text):
     report = moment([[4, 4]], sensing_range=reach)
     assert text in texts(report)
-    assert "hears no other robot" in texts(report)
+    assert "no robot in communication range" in texts(report)
 
 
 def test_only_those_in_range_are_heard():
     report = moment([[4, 4], [5, 4], [7, 4]], communication_range=1.5)
-    assert "hears 1 robot, the nearest is robot 2, 1.0 m east" in texts(report)
+    assert "1 robot in communication range, the nearest is robot 2, 1.0 m east" in texts(report)
 
 
 def test_the_centroid_is_called_so():
@@ -290,9 +291,9 @@ def test_the_centroid_is_called_so():
 
 def test_forces_that_no_term_explains():
     none = moment([[4, 4]], forces=[[1.0, 0.0]])
-    assert line(none, REST).text == "pushed 1.0 N east by its law"
+    assert line(none, UNEXPLAINED_FORCE).text == "pushed 1.0 N east by its controller"
     some = moment([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
-    assert line(some, REST).text == "pushed 1.1 N south-east by the rest of its law"
+    assert line(some, UNEXPLAINED_FORCE).text == "pushed 1.1 N south-east by other forces of its controller"
     for report in (none, some):
         sums_up(report)
 
@@ -309,13 +310,13 @@ def test_terms_of_users_may_be_anything():
     simulation = Simulation(SQUARE, Rapf(), [[4.0, 4.0]], team)
     decision = Decision(np.array([[1.0, 0.0]]), None, terms)
     report = explain(replace(simulation.observe_and_decide(), decision=decision), team, SQUARE, 0)
-    assert [line.kind for line in report.lines if line.kind] == [REST, "viscosity", "resultant"]
+    assert [line.kind for line in report.lines if line.kind] == [UNEXPLAINED_FORCE, "viscosity", "resultant"]
     sums_up(report)
 
 
 def test_a_force_that_is_no_number():
     report = moment([[4, 4]], velocities=[[0.5, 0]], forces=[[np.nan, 1.0]])
-    assert "its law gives no force that is a number" in texts(report)
+    assert "its controller gives a force that is not a number" in texts(report)
     assert line(report, "resultant").vector == (-1.0, 0.0)
 
 

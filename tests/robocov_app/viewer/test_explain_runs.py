@@ -10,7 +10,8 @@ from explained_moments import line, run, says_no_nonsense, sums_up, texts
 
 from robocov import IndividualControllerAdapter, Lloyd, Rapf, Rpf, Simulation, Team, load_map
 from robocov.controllers import make_controller
-from robocov_app.viewer.explain import REST, explain
+from robocov_app.viewer.explanation.explain import explain
+from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
 
 # runs
 
@@ -65,7 +66,9 @@ def test_a_single_robot_that_senses_nothing():
     assert run(simulation, 2.0)[0].verdict == "moving 0.98 m/s north-east to its centroid"
     (report,) = run(simulation, 60.0)
     assert report.verdict == "arrived: at rest on its centroid"
-    assert {"hears no other robot", "senses nothing within 50 cm", "not pushed by robots"} < {*texts(report)}
+    assert {"no robot in communication range", "senses nothing within 50 cm", "not pushed by robots"} < {
+        *texts(report)
+    }
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ class Home:
 def test_laws_that_tell_no_terms():
     simulation = Simulation(load_map("square"), IndividualControllerAdapter(Home()), [[2.0, 3.0], [7.0, 3.0]])
     report = run(simulation, 1.0)[0]
-    assert line(report, REST).text.endswith("by its law")
+    assert line(report, UNEXPLAINED_FORCE).text.endswith("by its controller")
     assert [text for text in texts(report) if re.fullmatch(r"its centroid is \d\.\d m away", text)]
     sums_up(report)
 

@@ -18,10 +18,10 @@ from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, lo
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.display import open_display
 from robocov_app.viewer import launch as opening
-from robocov_app.viewer.launch import Launcher, Settings
+from robocov_app.viewer.launch import Launcher, WindowSettings
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.workspace import SessionWorkspace, find_recoverable_drafts
-from robocov_app.viewer.status import cursor_words, facts, suggestion
+from robocov_app.viewer.status import describe_cursor, list_facts, suggest_actions
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))
 
@@ -44,7 +44,7 @@ def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, 
     with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session = driver.session
         driver.frames(2)
-        driver.window._ask_costs = lambda: None  # type: ignore[method-assign]  # no answer comes any more
+        driver.window._cost_curves.update = lambda: None  # type: ignore[method-assign]  # no answer comes any more
         for _ in range(90):
             session.playback.step()
         words.clear()
@@ -87,14 +87,14 @@ def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path:
         for pane in (0, 1):
             driver.move(*driver.pixel(MIDDLE, pane))
             driver.frames(2)
-            assert driver.viewer.active == 0
-            said.append(cursor_words(driver.viewer))
+            assert driver.viewer.active_pane == 0
+            said.append(describe_cursor(driver.viewer))
         assert said[0] != said[1]
-        before = driver.viewer.cursor
-        driver.viewer.open_map("square")
+        before = driver.viewer.inspection.cursor
+        driver.viewer.files.open_map("square")
         driver.frames(2)
-        assert driver.viewer.cursor != before  # the same pixel is another place there
-        assert driver.viewer.cursor == driver.window.canvas.to_world(driver.at, 1)
+        assert driver.viewer.inspection.cursor != before  # the same pixel is another place there
+        assert driver.viewer.inspection.cursor == driver.window.canvas.to_world(driver.at, 1)
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])
@@ -140,33 +140,33 @@ def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
 def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.move(*driver.pixel(MIDDLE))
-        slow, fast = facts(driver.viewer, 9.0, 60.0, None), facts(driver.viewer, 60.0, 60.0, None)
-        assert slow.index("9 fps") < slow.index(cursor_words(driver.viewer))
-        assert fast.index("60 fps") > fast.index(cursor_words(driver.viewer))
+        slow, fast = list_facts(driver.viewer, 9.0, 60.0, None), list_facts(driver.viewer, 60.0, 60.0, None)
+        assert slow.index("9 fps") < slow.index(describe_cursor(driver.viewer))
+        assert fast.index("60 fps") > fast.index(describe_cursor(driver.viewer))
 
 
 def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         viewer, session = driver.viewer, driver.session
-        assert suggestion(viewer) == ""
+        assert suggest_actions(viewer) == ""
         session.timeline.is_settled = True
-        assert suggestion(viewer).startswith(
+        assert suggest_actions(viewer).startswith(
             "The team has settled. Try:\ndraw a wall in a doorway (W) · drag a robot"
         )
         before = driver.picture()
-        driver.window._patient = False
+        driver.window.is_unattended = False
         driver.settle()
         assert not driver.same(before)
         session.timeline.is_settled = False
-        assert suggestion(viewer), "it does not blink while somebody sways"
+        assert suggest_actions(viewer), "it does not blink while somebody sways"
         session.fail_robot(2)
-        assert suggestion(viewer) == ""  # something is going on again
+        assert suggest_actions(viewer) == ""  # something is going on again
         session.timeline.is_settled = True
-        assert "fail" not in suggestion(viewer)  # that is known now
+        assert "fail" not in suggest_actions(viewer)  # that is known now
         session.show_time(0.0)
         driver.window.do("suggestions")
         session.show_time(session.timeline.end_time)
-        assert suggestion(viewer) == ""
+        assert suggest_actions(viewer) == ""
 
 
 def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Launcher:
@@ -196,7 +196,7 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
             key = pygame.K_RETURN if chosen == "return" else pygame.K_ESCAPE
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
             window.frame(0.0)
-            assert window.dialogs.asked is None and (window.tour is not None) is lesson
+            assert window.dialogs.asked is None and (window.lesson.player is not None) is lesson
             window.frame(0.5)
             assert window.viewer.session.displayed.time > 0.0
         with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
@@ -245,15 +245,15 @@ def test_a_scale_takes_the_window_that_it_needs_or_says_so(
         assert window.layout.scale == 1.5 and window.screen.get_size() == (1350, 900)
     with opened_for_a_person(monkeypatch, tmp_path, scale=2.0).window() as window:
         assert window.layout.scale == 1.625
-        assert window.viewer.message == "scale 2 needs a window of 1800 × 1200: 1.625 it is"
+        assert window.viewer.message == "scale 2 needs a window of 1800 × 1200; using 1.625"
 
 
 def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         viewer = driver.viewer
         save_map(HALL, tmp_path / "other.json")
-        viewer.save_session(tmp_path / "first.robocov")
-        viewer.save_session(tmp_path / "second.robocov")
+        viewer.files.save_session(tmp_path / "first.robocov")
+        viewer.files.save_session(tmp_path / "second.robocov")
         (tmp_path / "notes.txt").touch()
         driver.key("ctrl+o")
         asked = driver.window.dialogs.asked
@@ -263,12 +263,12 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         assert offered[2:] == ["first.robocov", "other.json", "second.robocov", "../"]
         driver.type("oth")
         driver.key("return")
-        assert not driver.window.dialogs.open and viewer.map_name == str(tmp_path / "other.json")
+        assert not driver.window.dialogs.open and viewer.files.map_name == str(tmp_path / "other.json")
         driver.key("ctrl+o")
         driver.key("down")
         driver.key("return")
-        assert viewer.workspace.path == tmp_path / "first.robocov"
-        assert viewer.recent[0] == str(tmp_path / "first.robocov")
+        assert viewer.files.workspace.path == tmp_path / "first.robocov"
+        assert viewer.files.recent[0] == str(tmp_path / "first.robocov")
         driver.key("ctrl+o")
         driver.type("nothing.robocov")
         driver.key("return")  # an error stays in the dialog, with what was typed
@@ -282,7 +282,7 @@ def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
         viewer = driver.viewer
         save_map(HALL, tmp_path / "other.json")
         viewer.session.fail_robot(2)
-        viewer.save_session(tmp_path / "story.robocov")
+        viewer.files.save_session(tmp_path / "story.robocov")
         (tmp_path / "bad.robocov").write_text("{}")
 
         def dropped(name: str) -> None:
@@ -290,29 +290,35 @@ def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
             driver.settle()
 
         dropped("other.json")
-        assert viewer.map_name == str(tmp_path / "other.json") and viewer.session.displayed.numbers == (
+        assert viewer.files.map_name == str(tmp_path / "other.json") and viewer.session.displayed.numbers == (
             1,
             2,
             3,
         )
         dropped("story.robocov")
         assert (
-            viewer.session.displayed.numbers == (1, 3) and viewer.workspace.path == tmp_path / "story.robocov"
+            viewer.session.displayed.numbers == (1, 3)
+            and viewer.files.workspace.path == tmp_path / "story.robocov"
         )
         dropped("bad.robocov")
         assert (
-            viewer.trouble and "bad.robocov" in viewer.message and viewer.session.displayed.numbers == (1, 3)
+            viewer.has_error_message
+            and "bad.robocov" in viewer.message
+            and viewer.session.displayed.numbers == (1, 3)
         )
 
 
 def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
-        window.viewer.save_session(tmp_path / "mine.robocov")
-        window.viewer.suggests = False
-    settings, _ = load_settings(Settings, find_settings_file())
+        window.viewer.files.save_session(tmp_path / "mine.robocov")
+        window.viewer.view.has_suggestions = False
+    settings, _ = load_settings(WindowSettings, find_settings_file())
     assert settings.recent == (str(tmp_path / "mine.robocov"),) and not settings.suggests
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
-        assert window.viewer.recent == [str(tmp_path / "mine.robocov")] and not window.viewer.suggests
+        assert (
+            window.viewer.files.recent == [str(tmp_path / "mine.robocov")]
+            and not window.viewer.view.has_suggestions
+        )
 
 
 def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> None:
@@ -323,7 +329,7 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         session.fail_robot(2)
         driver.frames(20)
         failed = session.timeline.head
-        viewer.look_at(0.2)
+        viewer.playback.look_at(0.2)
         session.fail_robot(3)
         driver.frames(20)
         driver.key("ctrl+b")

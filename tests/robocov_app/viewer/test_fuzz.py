@@ -15,7 +15,7 @@ from sample_sessions import RAPF, RPF, compute_penetration
 
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.scenario import MAX_PANES
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 EVENTS, BATCH, DRAWN = 5_000, 10, 12
 """Events of one seed, events between two frames, and frames of which one is drawn."""
@@ -23,7 +23,7 @@ EVENTS, BATCH, DRAWN = 5_000, 10, 12
 MOST = {
     "quit": 0,
     "screenshot": 4,
-    "film": 4,
+    "video": 4,
     "save:map": 4,
     "save:run": 1,
     "fullscreen": 2,
@@ -90,8 +90,8 @@ class Monkey:
         session = self.driver.session
         large = session.timeline.scenario.robots > 5 or len(session.displayed.numbers) > 6
         if large or len(session.displayed.environment.obstacles) > 20:
-            self.driver.viewer.attempt(lambda: self.driver.viewer.open_map("square"))
-            self.driver.viewer.attempt(lambda: self.driver.viewer.restart(robots=2))
+            self.driver.viewer.attempt(lambda: self.driver.viewer.files.open_map("square"))
+            self.driver.viewer.attempt(lambda: self.driver.viewer.playback.restart(robots=2))
 
     def one(self) -> None:
         what = self.random.random()
@@ -206,17 +206,17 @@ class Monkey:
 @contextmanager
 def limited(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     left = dict(MOST)
-    do = Window.do
+    do = ViewerWindow.do
 
-    def seldom(window: Window, name: str) -> None:
+    def seldom(window: ViewerWindow, name: str) -> None:
         if name in left:
-            if left[name] == 0 and not (name == "film" and window.film is not None):
+            if left[name] == 0 and not (name == "video" and window.video is not None):
                 return
             left[name] = max(left[name] - 1, 0)
         do(window, name)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Window, "do", seldom)
+        patch.setattr(ViewerWindow, "do", seldom)
         patch.setattr("driven_window.Costs", SomeCosts)
         yield
 
@@ -239,8 +239,8 @@ def check(driver: Driver) -> None:
         ).all() and pane.distance_curve.last_time <= session.timeline.end_time + 1e-6
     assert compute_penetration(session) < 0.01
     assert 0.0 <= session.displayed.time <= session.timeline.end_time + 1e-9
-    assert 0 <= driver.viewer.active < MAX_PANES
-    assert window.panel.tab in ("parameters", "show", "robot", "keep")
+    assert 0 <= driver.viewer.active_pane < MAX_PANES
+    assert window.panel.tab in ("parameters", "show", "robot", "file")
     assert len(window.layout.panes) == len(session.timeline.panes)
 
 
@@ -267,10 +267,10 @@ def usual(driver: Driver) -> None:
     driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
     driver.post(pygame.WINDOWFOCUSLOST)  # so that no key is held any more
     driver.key("escape", 6)
-    viewer.panel, window.scale, viewer.shown = True, 1.0, {"robots", "obstacles", "boundary"}
+    viewer.view.has_panel, window.scale, viewer.view.layers = True, 1.0, {"robots", "obstacles", "boundary"}
     while len(driver.session.timeline.panes) > 1:
         driver.session.remove_pane(driver.session.timeline.panes[-1])
-    viewer.attempt(lambda: viewer.open_map("square"))
+    viewer.attempt(lambda: viewer.files.open_map("square"))
     typed(viewer, "robots 2")
     for name in ("radius 0.1", "max_speed 1", "speed 1", "controller rapf"):
         typed(viewer, name)

@@ -198,12 +198,12 @@ def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> 
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     kept = tmp_path / "window.json"
     kept.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
-    asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "also": frozenset({"scan"})}
-    asked["without"] = frozenset({"cells"})
+    asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "shown_layers": frozenset({"scan"})}
+    asked["hidden_layers"] = frozenset({"cells"})
     with Launcher(start_session(), "hall", tmp_path, lattice=4, **asked).window() as window:
-        assert window.viewer.shown == {"robots", "scan"} and window.viewer.theme == "dark"
+        assert window.viewer.view.layers == {"robots", "scan"} and window.viewer.view.theme == "dark"
         assert window.viewer.session.playback.clock.budget == FRAME_BUDGET_S, "people look at it"
-        window.viewer.shown.add("trails")
+        window.viewer.view.layers.add("trails")
     settings = json.loads(kept.read_text())
     assert [settings[name] for name in ("theme", "width", "height", "scale")] == ["light", 1000, 700, None]
     assert settings["shown"] == ["cells", "robots", "trails"]
@@ -216,10 +216,10 @@ def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
         tmp_path,
         headless=True,
         lattice=4,
-        also=frozenset({"scan"}),
-        without=frozenset({"cells"}),
+        shown_layers=frozenset({"scan"}),
+        hidden_layers=frozenset({"cells"}),
     )
     with asked.window() as window:
-        assert "scan" in window.viewer.shown and "cells" not in window.viewer.shown
+        assert "scan" in window.viewer.view.layers and "cells" not in window.viewer.view.layers
         assert math.isinf(window.viewer.session.playback.clock.budget), "nobody does"
         window.close()

@@ -16,7 +16,7 @@ from robocov.errors import MapError
 from robocov_app.cli import main
 from robocov_app.render.picture import pane_layers, standard_layers
 from robocov_app.viewer import lessons
-from robocov_app.viewer.lessons import PLAIN, checked, load_lesson
+from robocov_app.viewer.lessons import BASE_LAYERS, check_lesson, load_lesson
 from robocov_app.viewer.session.file import build_session_content, format_session
 from robocov_app.viewer.session.session import Session
 
@@ -50,7 +50,7 @@ def short(tmp_path: Path, **changes: object) -> Path:
 
 @pytest.mark.parametrize("chapter", LESSON.chapters, ids=lambda chapter: chapter.title)
 def test_what_a_chapter_says_is_short_and_what_it_names_exists(chapter) -> None:
-    assert set(chapter.show) <= LAYERS and LAYERS >= PLAIN
+    assert set(chapter.show) <= LAYERS and LAYERS >= BASE_LAYERS
     assert len(re.findall(r"[.!?](?= |$)", chapter.text)) in (2, 3)
     assert len(chapter.title) <= 44 and "  " not in chapter.text
     # so fast do people read, and they are to watch too
@@ -61,16 +61,16 @@ def test_what_a_chapter_says_is_short_and_what_it_names_exists(chapter) -> None:
 
 @pytest.mark.slow
 def test_every_chapter_of_the_lesson_ends() -> None:
-    assert all(ended for *_, ended in checked(load_lesson()))
+    assert all(chapter.ends for chapter in check_lesson(load_lesson()))
 
 
 def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, capsys) -> None:
     with opened(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(3)
         before = driver.viewer.session
-        driver.window._patient = False
-        driver.window.start_lesson(short(tmp_path))
-        lesson, viewer = driver.window.tour, driver.viewer
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(short(tmp_path))
+        lesson, viewer = driver.window.lesson.player, driver.viewer
         assert lesson is not None and lesson.chapter.title == "Failure" and viewer.session is not before
         driver.frames(6)
         assert viewer.session.displayed.numbers == (1, 2, 3)
@@ -78,55 +78,59 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         assert viewer.session.displayed.numbers == (1, 3), "at its step, however long frames take"
         assert lesson.state == "ended" and not viewer.session.playback.is_playing
         lesson.skip(1)
-        assert lesson.state == "asks" and lesson.asks == ["What now?", "1  Nothing", "2  Much"]
+        assert lesson.state == "asking" and lesson.lines == ["What now?", "1  Nothing", "2  Much"]
         driver.frames(10)
         assert viewer.session.displayed.time == 0.0, "it waits for an answer"
         driver.key("1")
-        assert lesson.state == "plays" and lesson.answer == 1
+        assert lesson.state == "playing" and lesson.answer == 1
         driver.frames(30)
-        assert lesson.state == "task" and lesson.asks == ["Now you: drag robot 1."]
+        assert lesson.state == "task" and lesson.lines == ["Now you: drag robot 1."]
         viewer.session.place_robot(1, (1.0, 1.0))
         driver.frames(2)
         assert lesson.state == "ended"
-        assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
-        lesson.advance(lessons.READING)
-        assert lesson.state == "ended" and not lesson.done, "there is something to read"
+        assert lesson.lines == ["✗ Not quite. Correct: Much", "So it is.", "Well done."]
+        lesson.advance(lessons.READING_S)
+        assert lesson.state == "ended" and not lesson.is_done, "there is something to read"
         driver.key("space")
         lesson.advance(100.0)
         assert lesson.state == "ended" and not viewer.session.playback.is_playing, (
             "it is paused between chapters too"
         )
         driver.key("space")
-        assert not lesson.held
+        assert not lesson.is_held
         driver.key("escape")
-        assert driver.window.tour is None and viewer.session is before and before.displayed.numbers == (1, 2)
+        assert (
+            driver.window.lesson.player is None
+            and viewer.session is before
+            and before.displayed.numbers == (1, 2)
+        )
 
 
 def test_its_end_is_told_and_nobody_is_asked_who_was_not(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        driver.window._patient = False
-        driver.window.start_lesson(short(tmp_path, robot=1))
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(short(tmp_path, robot=1))
         driver.key("right")
-        assert driver.viewer.selected == 1
+        assert driver.viewer.selected_robot == 1
         driver.key("right")
         driver.frames(1)
-        assert driver.window.tour is None and driver.viewer.selected is None
+        assert driver.window.lesson.player is None and driver.viewer.selected_robot is None
         assert driver.viewer.message.startswith("the lesson has ended")
 
 
 def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        driver.window._patient = False
-        driver.window.start_lesson(short(tmp_path))
-        lesson = driver.window.tour
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(short(tmp_path))
+        lesson = driver.window.lesson.player
         driver.key("space")
-        assert lesson.state == "plays" and not driver.viewer.session.playback.is_playing
+        assert lesson.state == "playing" and not driver.viewer.session.playback.is_playing
         driver.frames(60)
         assert lesson.number == 0 and driver.viewer.session.displayed.time < 0.1
         driver.key("n")
-        assert lesson.state == "left" and driver.window.tour is lesson
+        assert lesson.state == "left" and driver.window.lesson.player is lesson
         driver.key("f2")
-        assert lesson.state == "plays" and driver.viewer.session.displayed.time == 0.0
+        assert lesson.state == "playing" and driver.viewer.session.displayed.time == 0.0
         driver.key("right")
         assert lesson.number == 1
         driver.key("left")
@@ -135,36 +139,36 @@ def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
 
 def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        driver.window._patient = False
-        driver.window.start_lesson(short(tmp_path))
-        lesson = driver.window.tour
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(short(tmp_path))
+        lesson = driver.window.lesson.player
         assert lesson is not None
         driver.settle()
-        driver.click(*driver.window._spots[1][0].center)
-        assert (lesson.number, lesson.state) == (1, "asks")
+        driver.click(*driver.window.lesson.click_areas[1][0].center)
+        assert (lesson.number, lesson.state) == (1, "asking")
         driver.key("space")
         driver.frames(10)
-        assert driver.session.displayed.time == 0.0 and "what you expect" in driver.viewer.message
-        driver.click(*driver.window._spots[1][0].center)
-        assert (lesson.answer, lesson.state) == (2, "plays")
+        assert driver.session.displayed.time == 0.0 and "answer first" in driver.viewer.message
+        driver.click(*driver.window.lesson.click_areas[1][0].center)
+        assert (lesson.answer, lesson.state) == (2, "playing")
         driver.frames(30)
         assert lesson.state == "task"
         driver.key("f2")
-        assert lesson.state == "left" and not driver.window._spots
+        assert lesson.state == "left" and not driver.window.lesson.click_areas
         driver.key("f2")
-        assert lesson.state == "asks"
+        assert lesson.state == "asking"
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
 def test_all_of_every_chapter_has_room_on_its_page(tmp_path: Path, size: tuple[int, int]) -> None:
     with opened(tmp_path, size=size) as driver:
-        driver.window._patient = False
+        driver.window.lesson.is_unattended = False
         driver.key("f2")
-        lesson = driver.window.tour
+        lesson = driver.window.lesson.player
         assert lesson is not None
         for _ in LESSON.chapters:
             driver.settle()
-            boxes = [box for box, _ in driver.window._spots]
+            boxes = [box for box, _ in driver.window.lesson.click_areas]
             assert all(above.bottom <= below.top + 1 for above, below in itertools.pairwise(boxes))
             assert boxes[-1].bottom <= size[1] - 46
             driver.key("right")
@@ -172,11 +176,15 @@ def test_all_of_every_chapter_has_room_on_its_page(tmp_path: Path, size: tuple[i
 
 def test_closing_ends_it_and_what_was_before_is_what_is_kept(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        session, shown = driver.session, set(driver.viewer.shown)
-        driver.window.start_lesson(short(tmp_path, show=["distances"]))
+        session, shown = driver.session, set(driver.viewer.view.layers)
+        driver.window.lesson.start(short(tmp_path, show=["distances"]))
         driver.key("right")
         driver.window.close()
-        assert driver.window.tour is None and driver.session is session and driver.viewer.shown == shown
+        assert (
+            driver.window.lesson.player is None
+            and driver.session is session
+            and driver.viewer.view.layers == shown
+        )
 
 
 def test_controllers_have_the_names_of_the_window_in_the_lesson() -> None:
@@ -185,15 +193,15 @@ def test_controllers_have_the_names_of_the_window_in_the_lesson() -> None:
 
 
 def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lessons, "READING", 0.1)
+    monkeypatch.setattr(lessons, "READING_S", 0.1)
     with opened(tmp_path) as driver:
-        driver.window._patient = True
-        driver.window.start_lesson(short(tmp_path))
+        driver.window.lesson.is_unattended = True
+        driver.window.lesson.start(short(tmp_path))
         for _ in range(120):
             driver.frames(1)
-            if driver.window.tour is None:
+            if driver.window.lesson.player is None:
                 break
-        assert driver.window.tour is None
+        assert driver.window.lesson.player is None
 
 
 def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

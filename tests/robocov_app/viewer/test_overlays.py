@@ -15,7 +15,7 @@ from robocov_app.render.fonts import text_width
 from robocov_app.toolkit import command as keys_page
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.viewer.commands import GROUPS
-from robocov_app.viewer.film import pixels
+from robocov_app.viewer.screen_video import copy_pixels
 
 
 @given(st.text(st.characters(whitelist_categories=("Ll", "Zs")), max_size=80), st.integers(60, 300))
@@ -61,15 +61,15 @@ def test_the_keys_are_all_on_one_card(
         # nothing sticks out
         for picture in (paler, window.screen):
             picture.fill((0, 0, 0), box)
-        assert np.array_equal(pixels(paler), pixels(window.screen))
+        assert np.array_equal(copy_pixels(paler), copy_pixels(window.screen))
 
 
 def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        before = pixels(driver.window.screen).copy()
-        driver.viewer.say("many words " * 40, trouble=True)
+        before = copy_pixels(driver.window.screen).copy()
+        driver.viewer.show_message("many words " * 40, is_error=True)
         driver.frames(1)
-        after = pixels(driver.window.screen)
+        after = copy_pixels(driver.window.screen)
         rows, columns = np.nonzero((after != before).any(axis=2))
         _, _, width, height = driver.window.layout.arena
         assert columns.max() < width and columns.min() > 0
@@ -79,7 +79,7 @@ def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Pa
 def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         window = driver.window
-        driver.viewer.hand.selected = 1
+        driver.viewer.inspection.selected = 1
         window.panel.show_tab("robot")
         driver.session.playback.is_playing = True
         driver.frames(30)
@@ -87,11 +87,11 @@ def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_
         driver.frames(15)
         left, top, width, height = window.layout.panel
         driver.move(left + width // 2, top + height - 40)
-        seen = [pixels(window.screen)[top:, left:].copy()]
+        seen = [copy_pixels(window.screen)[top:, left:].copy()]
         for notches in (-2, -100, -1, 200):
             window.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=notches))
             window.draw()
-            seen.append(pixels(window.screen)[top:, left:].copy())
+            seen.append(copy_pixels(window.screen)[top:, left:].copy())
         assert not np.array_equal(seen[0], seen[1])
         assert np.array_equal(seen[2], seen[3])  # it ends there
         assert np.array_equal(seen[0], seen[4])

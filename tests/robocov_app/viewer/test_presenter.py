@@ -82,12 +82,12 @@ def test_another_seed_gives_other_starts_and_another_start_too() -> None:
 
 def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_on() -> None:
     viewer = build_presenter(start="far")
-    viewer.tools["circle"].press(viewer.session, (5.2, 3.2), 0.1, None)
-    viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (5.2, 3.75)))
-    assert viewer.message.endswith("it covers the start far") and "far" not in viewer.starts()
+    viewer.toolbox.by_name["circle"].press(viewer.session, (5.2, 3.2), 0.1, None)
+    viewer.attempt(lambda: viewer.toolbox.by_name["circle"].release(viewer.session, (5.2, 3.75)))
+    assert viewer.message.endswith("it covers the start far") and "far" not in viewer.playback.list_starts()
     assert viewer.session.timeline.scenario.start_name == "far"
     do(viewer, "start:next")
-    assert not viewer.trouble and viewer.session.timeline.scenario.start_name == "corner"
+    assert not viewer.has_error_message and viewer.session.timeline.scenario.start_name == "corner"
 
 
 def test_more_and_fewer_robots() -> None:
@@ -96,7 +96,7 @@ def test_more_and_fewer_robots() -> None:
     assert viewer.session.timeline.scenario.robots == 3 and len(viewer.session.displayed.numbers) == 3
     for _ in range(3):
         do(viewer, "fewer")
-    assert viewer.session.timeline.scenario.robots == 1 and viewer.trouble
+    assert viewer.session.timeline.scenario.robots == 1 and viewer.has_error_message
     assert viewer.message == f"robots: expected a whole number from 1 to {MAX_ROBOTS}, got 0"
 
 
@@ -104,7 +104,7 @@ def test_robots_without_room_are_told_and_nothing_changes() -> None:
     viewer = build_presenter()
     before = describe_state(viewer.session)
     viewer.attempt(lambda: typed(viewer, "robots 900"))
-    assert viewer.trouble and "room" in viewer.message
+    assert viewer.has_error_message and "room" in viewer.message
     assert describe_state(viewer.session) == before
 
 
@@ -117,38 +117,38 @@ def test_maps_are_turned_through_both_ways() -> None:
     names = list(list_bundled_maps())
     do(viewer, "map:next")
     assert (
-        viewer.map_name == names[names.index("rooms") + 1]
+        viewer.files.map_name == names[names.index("rooms") + 1]
         and viewer.session.displayed.environment.name != HALL.name
     )
     do(viewer, "map:previous")
-    assert viewer.map_name == "rooms" and viewer.session.timeline.scenario.start_name == "corridor"
+    assert viewer.files.map_name == "rooms" and viewer.session.timeline.scenario.start_name == "corridor"
 
 
 def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> None:
     viewer = build_presenter()
     (tmp_path / "x.json").write_text("{")
     for name in ("nowhere", str(tmp_path / "x.json"), str(tmp_path)):
-        viewer.attempt(lambda name=name: viewer.open_map(name))
-        assert viewer.trouble and viewer.message and viewer.map_name == "hall"
+        viewer.attempt(lambda name=name: viewer.files.open_map(name))
+        assert viewer.has_error_message and viewer.message and viewer.files.map_name == "hall"
         assert viewer.session.displayed.environment is HALL
-        viewer.trouble = False
+        viewer.has_error_message = False
 
 
 def test_an_own_map_is_offered_beside_the_bundled_ones() -> None:
     viewer = build_presenter()
-    assert viewer.maps() == [*list_bundled_maps(), "hall"]
+    assert viewer.files.list_maps() == [*list_bundled_maps(), "hall"]
     typed(viewer, "map square")
-    assert viewer.maps() == list(list_bundled_maps())
+    assert viewer.files.list_maps() == list(list_bundled_maps())
 
 
 def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path)
-    viewer.tools["circle"].press(viewer.session, (1.0, 3.0), 0.1, None)
-    viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (1.3, 3.0)))
+    viewer.toolbox.by_name["circle"].press(viewer.session, (1.0, 3.0), 0.1, None)
+    viewer.attempt(lambda: viewer.toolbox.by_name["circle"].release(viewer.session, (1.3, 3.0)))
     assert viewer.message.startswith("circle drawn")
     do(viewer, "save:map")
     first = tmp_path / "hall-1.json"
-    assert viewer.message == f"map saved: {first}" and viewer.map_name == str(first)
+    assert viewer.message == f"map saved: {first}" and viewer.files.map_name == str(first)
     assert load_map(str(first)).obstacles == viewer.session.displayed.environment.obstacles
     do(viewer, "save:map")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hall-1.json", "hall-2.json"]
@@ -158,7 +158,7 @@ def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     viewer = build_presenter(folder=tmp_path / "file")
     do(viewer, "save:map")
-    assert viewer.trouble and viewer.map_name == "hall"
+    assert viewer.has_error_message and viewer.files.map_name == "hall"
 
 
 # time
@@ -204,44 +204,44 @@ def test_panes_come_with_controllers_that_are_not_there_yet_and_go() -> None:
     viewer = build_presenter(RPF)
     for count in (2, 3, 4):
         do(viewer, "pane:add")
-        assert len(viewer.session.timeline.panes) == count and viewer.active == count - 1
+        assert len(viewer.session.timeline.panes) == count and viewer.active_pane == count - 1
     names = [pane.controller.name for pane in viewer.session.timeline.panes]
     assert names[0] == "rpf" and len(set(names)) == 4
     do(viewer, "pane:add")
-    assert viewer.trouble and "4" in viewer.message
+    assert viewer.has_error_message and "4" in viewer.message
     do(viewer, "pane:next")
-    assert viewer.active == 0
+    assert viewer.active_pane == 0
     for count in (3, 2, 1):
         do(viewer, "pane:remove")
         assert len(viewer.session.timeline.panes) == count
-    viewer.trouble = False
+    viewer.has_error_message = False
     do(viewer, "pane:remove")
-    assert viewer.trouble and len(viewer.session.timeline.panes) == 1
+    assert viewer.has_error_message and len(viewer.session.timeline.panes) == 1
 
 
 def test_the_chosen_pane_is_one_that_there_is() -> None:
     viewer = build_presenter(RAPF, RPF)
-    viewer.active = 1
+    viewer.inspection.active_pane = 1
     viewer.session.remove_pane(viewer.session.timeline.panes[1])
-    assert viewer.pane is viewer.session.timeline.panes[0] and viewer.active == 0
+    assert viewer.pane is viewer.session.timeline.panes[0] and viewer.active_pane == 0
 
 
 def test_controllers_take_turns() -> None:
     viewer = build_presenter()
     seen = []
-    for _ in range(len(viewer.laws)):
+    for _ in range(len(viewer.controllers)):
         seen.append(viewer.pane.controller.name)
-        do(viewer, "law")
-    assert sorted(seen) == sorted(viewer.laws) and viewer.pane.controller.name == seen[0]
+        do(viewer, "controller:next")
+    assert sorted(seen) == sorted(viewer.controllers) and viewer.pane.controller.name == seen[0]
 
 
 def test_choosing_the_controller_that_is_there_keeps_its_gains() -> None:
     viewer = build_presenter(RAPF, RPF)
     typed(viewer, "k_rep 2")
-    viewer.set_law(0, "rapf")
+    viewer.comparison.set_controller(0, "rapf")
     assert viewer.session.timeline.panes[0].controller.get_value("k_rep") == 2.0
-    viewer.set_law(1, "lloyd")
-    assert viewer.active == 1 and viewer.pane.controller == LLOYD
+    viewer.comparison.set_controller(1, "lloyd")
+    assert viewer.active_pane == 1 and viewer.pane.controller == LLOYD
 
 
 # robots
@@ -253,43 +253,43 @@ def test_asking_goes_round_all_robots_also_those_that_failed() -> None:
     seen = []
     for _ in range(4):
         do(viewer, "robot:next")
-        seen.append(viewer.selected)
+        seen.append(viewer.selected_robot)
     assert seen == [1, 2, 3, 1]
     do(viewer, "robot:previous")
-    assert viewer.selected == 3
+    assert viewer.selected_robot == 3
 
 
 def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
     viewer = build_presenter()
     for action in ("robot:fail", "robot:remove"):
-        viewer.trouble = False
+        viewer.has_error_message = False
         do(viewer, action)
-        assert viewer.trouble and "no robot is chosen" in viewer.message
-    viewer.hand.selected = 2
+        assert viewer.has_error_message and "no robot is selected" in viewer.message
+    viewer.inspection.selected = 2
     do(viewer, "robot:fail")
-    assert viewer.session.displayed.numbers == (1, 3) and viewer.selected == 2
+    assert viewer.session.displayed.numbers == (1, 3) and viewer.selected_robot == 2
     do(viewer, "robot:fail")
     assert viewer.session.displayed.numbers == (1, 2, 3)
     do(viewer, "robot:remove")
-    assert viewer.session.displayed.numbers == (1, 3) and viewer.selected is None
+    assert viewer.session.displayed.numbers == (1, 3) and viewer.selected_robot is None
 
 
 def test_undo_says_what_began_anew_and_the_map_has_its_name_again() -> None:
     viewer = build_presenter()
     do(viewer, "more")
-    viewer.open_map("square")
-    viewer.add_pane()
-    assert viewer.map_name == "square"
+    viewer.files.open_map("square")
+    viewer.comparison.add_pane()
+    assert viewer.files.map_name == "square"
     for words, name in (
         ("RPF compared", "square"),
         ("map Square", "hall"),
         ("4 robots", "hall"),
     ):
         do(viewer, "undo")
-        assert viewer.message == f"undone: {words}; back at 0.0 s" and viewer.map_name == name
+        assert viewer.message == f"undone: {words}; back at 0.0 s" and viewer.files.map_name == name
     do(viewer, "redo")
     do(viewer, "redo")
-    assert viewer.message == "done again: map Square" and viewer.map_name == "square"
+    assert viewer.message == "redone: map Square" and viewer.files.map_name == "square"
 
 
 def test_undo_and_redo_say_what_they_did() -> None:
@@ -308,7 +308,7 @@ def test_undo_and_redo_say_what_they_did() -> None:
     do(viewer, "undo")
     assert viewer.message == "nothing to undo; Alt ← leads to other branches"
     do(viewer, "redo")
-    assert viewer.message == "done again: robot 4 joined" and viewer.session.displayed.numbers == (1, 2, 3, 4)
+    assert viewer.message == "redone: robot 4 joined" and viewer.session.displayed.numbers == (1, 2, 3, 4)
 
 
 # tools
@@ -319,11 +319,11 @@ def test_another_tool_gives_up_what_was_begun_and_says_how_it_works() -> None:
     do(viewer, "tool:polygon")
     assert viewer.message == f"Polygon: {viewer.tool.hint}"
     viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
-    assert viewer.tool.preview(viewer.session) is not None
+    assert viewer.tool.build_preview(viewer.session) is not None
     do(viewer, "tool:wall")
-    assert viewer.tools["polygon"].preview(viewer.session) is None
+    assert viewer.toolbox.by_name["polygon"].build_preview(viewer.session) is None
     do(viewer, "cancel")
-    assert viewer.tool is viewer.hand
+    assert viewer.tool is viewer.toolbox.hand
 
 
 def test_cancelling_first_gives_up_then_puts_the_tool_away() -> None:
@@ -331,14 +331,14 @@ def test_cancelling_first_gives_up_then_puts_the_tool_away() -> None:
     do(viewer, "tool:wall")
     viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
     do(viewer, "cancel")
-    assert viewer.tool.name == "wall" and viewer.tool.preview(viewer.session) is None
+    assert viewer.tool.name == "wall" and viewer.tool.build_preview(viewer.session) is None
     do(viewer, "cancel")
-    assert viewer.tool is viewer.hand
+    assert viewer.tool is viewer.toolbox.hand
 
 
 def test_walls_become_wider_and_narrower() -> None:
     viewer = build_presenter()
     do(viewer, "wider")
-    assert viewer.message == "walls are 0.125 m wide"
+    assert viewer.message == "new walls are 0.125 m wide"
     do(viewer, "narrower")
-    assert viewer.message == "walls are 0.1 m wide"
+    assert viewer.message == "new walls are 0.1 m wide"

@@ -14,7 +14,8 @@ from sample_sessions import RAPF, RPF, build_presenter, describe_state, start_se
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.presenter import SAID_FOR, Presenter, plain
+from robocov_app.viewer.model import MESSAGE_S, simplify_message
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import MAX_ROBOTS
 
 # what is shown
@@ -24,23 +25,23 @@ def test_layers_theme_fading_and_panel_are_switched() -> None:
     viewer = build_presenter()
     do(viewer, "layer:cells")
     do(viewer, "layer:scan")
-    assert viewer.shown == {"robots", "scan"}
+    assert viewer.view.layers == {"robots", "scan"}
     for action, what, values in (
         ("theme", "theme", ("light", "dark")),
-        ("fade", "fade", (False, True)),
-        ("panel", "panel", (True, False)),
+        ("fade", "fades_trajectories", (False, True)),
+        ("panel", "has_panel", (True, False)),
     ):
-        assert getattr(viewer, what) == values[0]
+        assert getattr(viewer.view, what) == values[0]
         do(viewer, action)
-        assert getattr(viewer, what) == values[1]
+        assert getattr(viewer.view, what) == values[1]
         do(viewer, action)
-        assert getattr(viewer, what) == values[0]
+        assert getattr(viewer.view, what) == values[0]
 
 
 def test_messages_stay_for_a_while() -> None:
     viewer = build_presenter()
-    viewer.say("hello")
-    viewer.pass_time(SAID_FOR - 0.1)
+    viewer.show_message("hello")
+    viewer.pass_time(MESSAGE_S - 0.1)
     assert viewer.message == "hello"
     viewer.pass_time(0.2)
     assert viewer.message == ""
@@ -48,18 +49,18 @@ def test_messages_stay_for_a_while() -> None:
 
 def test_trouble_is_told_without_the_places_in_files() -> None:
     viewer = build_presenter()
-    viewer.attempt(lambda: viewer.set_parameter("team.radius", -1.0))
-    assert viewer.trouble and viewer.message.startswith("radius: ")
-    assert plain("obstacles: too many") == "too many"
+    viewer.attempt(lambda: viewer.comparison.set_parameter("team.radius", -1.0))
+    assert viewer.has_error_message and viewer.message.startswith("radius: ")
+    assert simplify_message("obstacles: too many") == "too many"
 
 
 def test_a_new_map_is_told_to_the_cost() -> None:
     viewer = build_presenter()
     told = []
-    viewer.costs.environment = told.append  # type: ignore[method-assign]
+    viewer.costs.set_environment = told.append  # type: ignore[method-assign]
     do(viewer, "step")
     assert told == []
-    viewer.attempt(lambda: viewer.open_map("square"))
+    viewer.attempt(lambda: viewer.files.open_map("square"))
     assert told == [viewer.session.displayed.environment]
 
 
@@ -68,15 +69,15 @@ def test_a_new_map_is_told_to_the_cost() -> None:
 
 def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
     viewer = build_presenter(RAPF, RPF)
-    viewer.active = 1
-    viewer.set_parameter("k_rep", 1.5)
-    viewer.set_parameter("team.max_speed", 0.7)
+    viewer.inspection.active_pane = 1
+    viewer.comparison.set_parameter("k_rep", 1.5)
+    viewer.comparison.set_parameter("team.max_speed", 0.7)
     assert [pane.controller.get_value("k_rep") for pane in viewer.session.timeline.panes] == [
         RAPF.get_value("k_rep"),
         1.5,
     ]
     assert all(pane.setup.properties.max_speed == 0.7 for pane in viewer.session.timeline.panes)
-    names = [each.name for each in viewer.parameters()]
+    names = [each.name for each in viewer.comparison.list_parameters()]
     assert "k_att" not in names and "team.radius" in names
 
 
@@ -116,13 +117,13 @@ def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
     typed(viewer, "time 0.5")
     assert viewer.session.displayed.time == pytest.approx(0.5)
     typed(viewer, "robot 3")
-    assert viewer.selected == 3
+    assert viewer.selected_robot == 3
     typed(viewer, "branch 1")
     typed(viewer, f"save {tmp_path / 'story.robocov'}")
     typed(viewer, f"open {tmp_path / 'story.robocov'}")
     assert viewer.message.startswith("session opened: ")
     typed(viewer, "map square")
-    assert viewer.map_name == "square"
+    assert viewer.files.map_name == "square"
     words = "robots seed start controller speed time robot map open save branch"
     assert set(words.split()) == {each.name for each in listed(viewer).listed if each.takes is not None}
 
@@ -139,10 +140,10 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
     )
     viewer = build_presenter()
     typed(viewer, f"controller {mine}:Still")
-    assert viewer.laws[-1] == f"{mine}:Still" == viewer.pane.controller.name
+    assert viewer.controllers[-1] == f"{mine}:Still" == viewer.pane.controller.name
     viewer.session.playback.step()
-    do(viewer, "law")
-    assert viewer.pane.controller.name == viewer.laws[0]
+    do(viewer, "controller:next")
+    assert viewer.pane.controller.name == viewer.controllers[0]
 
 
 @pytest.mark.parametrize(
@@ -196,15 +197,20 @@ def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> 
     viewer = build_presenter()
     for _ in range(3):
         viewer.session.playback.step()
-    before = describe_state(viewer.session), viewer.map_name, viewer.hand.selected, list(viewer.laws)
+    before = (
+        describe_state(viewer.session),
+        viewer.files.map_name,
+        viewer.inspection.selected,
+        list(viewer.controllers),
+    )
     viewer.attempt(lambda: typed(viewer, text))
-    assert viewer.trouble, text
+    assert viewer.has_error_message, text
     assert viewer.message and "\n" not in viewer.message and "Traceback" not in viewer.message
     assert (
         describe_state(viewer.session),
-        viewer.map_name,
-        viewer.hand.selected,
-        list(viewer.laws),
+        viewer.files.map_name,
+        viewer.inspection.selected,
+        list(viewer.controllers),
     ) == before
 
 

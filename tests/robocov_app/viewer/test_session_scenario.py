@@ -12,7 +12,7 @@ from sample_sessions import HALL, LLOYD, RAPF, RPF
 from robocov.controllers import make_controller
 from robocov.errors import ParameterError, StartError
 from robocov.team import Team
-from robocov_app.viewer.parameters import limit_parameters, with_limit
+from robocov_app.viewer.parameters import list_limit_parameters, replace_limit
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import MAX_PANES, MAX_ROBOTS, SessionScenario
@@ -109,9 +109,9 @@ class TestRobotProperties:
     def test_a_common_value_replaces_different_ones(self):
         team = replace(Team.homogeneous(3), radius=np.array([0.1, 0.1, 0.3]))
         properties = RobotProperties.from_team(team)
-        labels = [parameter.label for parameter in limit_parameters(properties)]
+        labels = [parameter.label for parameter in list_limit_parameters(properties)]
         assert [label for label in labels if "≠" in label] == ["radius ≠"]
-        equal = with_limit(properties, "team.radius", 0.2)
+        equal = replace_limit(properties, "team.radius", 0.2)
         assert equal.build_team((1, 2, 3)).radius.tolist() == [0.2] * 3
 
     def test_the_defaults_are_those_of_the_paper(self):

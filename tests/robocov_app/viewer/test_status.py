@@ -12,7 +12,7 @@ from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.status import cursor_words, facts
+from robocov_app.viewer.status import describe_cursor, list_facts
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def viewer() -> Presenter:
 
 
 def test_it_tells_time_cost_and_speed(viewer: Presenter) -> None:
-    said = facts(viewer, 60.0, 60.0, None)
+    said = list_facts(viewer, 60.0, 60.0, None)
     assert said[0] == "t = 0.00 s"
     assert said[1].startswith("J = ") and said[1].endswith(" m³")
     assert said[-3:] == ["1×", "60 steps/s", "60 fps"]
@@ -34,34 +34,34 @@ def test_it_tells_time_cost_and_speed(viewer: Presenter) -> None:
 def test_an_old_cost_tells_its_time(viewer: Presenter) -> None:
     for _ in range(60):
         viewer.session.playback.step()
-    assert facts(viewer, 60.0, 60.0, None)[1].endswith("(at 0.0 s)")
+    assert list_facts(viewer, 60.0, 60.0, None)[1].endswith("(at 0.0 s)")
 
 
 def test_it_tells_of_pausing_filming_and_being_behind(viewer: Presenter) -> None:
     viewer.session.playback.is_playing = False
-    said = facts(viewer, 60.0, 0.0, 12.4)
+    said = list_facts(viewer, 60.0, 0.0, 12.4)
     assert said[0].startswith("paused · ")
-    assert "● film 12 s" in said
+    assert "● video 12 s" in said
     viewer.session.playback.is_playing = True
     viewer.session.playback.clock.is_behind = True
-    assert "1×, really 0.5×" in facts(viewer, 60.0, 30.0, None)
+    assert "1× (running at 0.5×)" in list_facts(viewer, 60.0, 30.0, None)
 
 
 def test_the_cursor_tells_distance_robot_and_share(viewer: Presenter) -> None:
     place = viewer.session.timeline.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
-    viewer.cursor = float(place[0]), float(place[1])
-    words = cursor_words(viewer)
+    viewer.inspection.cursor = float(place[0]), float(place[1])
+    words = describe_cursor(viewer)
     assert words.startswith(f"({place[0]:.2f}, {place[1]:.2f}) m: ")
     assert "robot 4" in words and words.endswith("× the mean")
 
 
 def test_the_cursor_in_a_wall_or_outside_says_so(viewer: Presenter) -> None:
-    viewer.cursor = 1.0, 8.5  # in the block of the upper left corner
-    assert cursor_words(viewer).endswith(": not free")
-    viewer.cursor = -3.0, -3.0
-    assert cursor_words(viewer).endswith(": not free")
-    viewer.cursor = None
-    assert cursor_words(viewer) == ""
+    viewer.inspection.cursor = 1.0, 8.5  # in the block of the upper left corner
+    assert describe_cursor(viewer).endswith(": inside an obstacle")
+    viewer.inspection.cursor = -3.0, -3.0
+    assert describe_cursor(viewer).endswith(": outside the map")
+    viewer.inspection.cursor = None
+    assert describe_cursor(viewer) == ""
 
 
 def test_a_closed_room_is_told() -> None:
@@ -72,6 +72,6 @@ def test_a_closed_room_is_told() -> None:
     viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "two")
     viewer.costs.ask(0, 0.0, session.timeline.panes[0].simulation.positions)
     viewer.costs.poll()
-    viewer.cursor = 3.0, 1.0
-    assert cursor_words(viewer).endswith(": no robot can come")
-    assert any(fact.startswith("cut off ") for fact in facts(viewer, 60.0, 60.0, None))
+    viewer.inspection.cursor = 3.0, 1.0
+    assert describe_cursor(viewer).endswith(": out of reach of all robots")
+    assert any(fact.startswith("cut off ") for fact in list_facts(viewer, 60.0, 60.0, None))

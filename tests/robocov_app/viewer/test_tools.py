@@ -18,7 +18,18 @@ from sample_sessions import (
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov_app.viewer.tools import WALL_WIDTH, Circle, Hand, Polygon, Ruler, Tool, Wall, toolbox
+from robocov_app.viewer.inspection import Inspection
+from robocov_app.viewer.tools.hand import HandTool
+from robocov_app.viewer.tools.outlines import DEFAULT_WALL_WIDTH_M, AddPolygonTool, AddWallTool
+from robocov_app.viewer.tools.segments import AddCircleTool, RulerTool
+from robocov_app.viewer.tools.tool import Tool
+from robocov_app.viewer.tools.toolbox import Toolbox
+
+
+def build_tools() -> dict[str, Tool]:
+    """Return the tools by their names."""
+    return Toolbox(Inspection()).by_name
+
 
 REACH = 0.1
 """Meters that a finger is wide."""
@@ -48,7 +59,7 @@ def place_of(session, number) -> list[float]:
 
 
 def test_the_box_has_every_tool_once():
-    tools = toolbox()
+    tools = build_tools()
     assert list(tools) == [
         *("hand", "polygon", "wall", "circle", "brush", "eraser", "robot", "failure", "ruler")
     ]
@@ -58,36 +69,36 @@ def test_the_box_has_every_tool_once():
         assert tool.hint
 
 
-@pytest.mark.parametrize("name", [*toolbox(), ""])
+@pytest.mark.parametrize("name", [*build_tools(), ""])
 def test_a_tool_that_was_not_used_does_nothing(name):
-    tool, session = toolbox().get(name, Tool()), start_session()
+    tool, session = build_tools().get(name, Tool()), start_session()
     before = describe_state(session)
     tool.move(session, (1.0, 1.0))
     assert tool.release(session, (1.0, 1.0)) is None
     assert tool.finish(session) is None
     assert not tool.cancel(session)
-    assert tool.preview(session) is None
+    assert tool.build_preview(session) is None
     assert describe_state(session) == before
 
 
 class TestHand:
     def test_a_click_chooses_a_robot_and_moves_nothing(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         before = describe_state(session)
         x, y = place_of(session, 2)
         assert dragged(hand, session, (x, y), (x + 0.01, y), number=2) is None
-        assert hand.selected == 2
-        assert not hand.holds
+        assert hand.inspection.selected == 2
+        assert not hand.is_holding
         assert describe_state(session) == before
         assert hand.cancel(session)
-        assert hand.selected is None
+        assert hand.inspection.selected is None
         assert not hand.cancel(session)
 
     def test_it_drags_robots(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         x, y = place_of(session, 2)
         hand.press(session, (x, y), REACH, 2)
-        assert hand.holds
+        assert hand.is_holding
         hand.move(session, (3.0, 3.0))
         assert place_of(session, 2) == [3.0, 3.0]
         # back to where it was taken
@@ -96,7 +107,7 @@ class TestHand:
         assert hand.release(session, (x, y)) is None
 
     def test_it_throws_robots(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
@@ -109,18 +120,18 @@ class TestHand:
         assert session.timeline.events[-1].text == "robot 2 was dragged"
 
     def test_who_gives_up_lets_go(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
         assert hand.cancel(session)
         assert session.timeline.drag is None
-        assert not hand.holds
+        assert not hand.is_holding
         hand.move(session, (1.0, 1.0))
         assert session.timeline.drag is None
 
     def test_it_drags_robots_that_failed(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         session.fail_robot(2)
         session.playback.is_playing = True
         failed = session.timeline.panes[0].setup.failed
@@ -128,7 +139,7 @@ class TestHand:
         assert session.timeline.panes[0].setup.failed == {2: (3.0, 3.2)}
 
     def test_a_robot_that_is_gone_meanwhile(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         session.playback.is_playing = True
         hand.press(session, tuple(place_of(session, 2)), REACH, 2)
         hand.move(session, (3.0, 3.2))
@@ -138,45 +149,45 @@ class TestHand:
         assert session.timeline.drag is None
 
     def test_it_moves_obstacles(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         hand.press(session, (4.2, 1.2), REACH, None)
         assert hand.obstacle == 0
-        assert hand.preview(session) is None
+        assert hand.build_preview(session) is None
         hand.move(session, (4.5, 2.2))
-        preview = hand.preview(session)
+        preview = hand.build_preview(session)
         assert preview.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
-        assert (preview.line, preview.words) == (((4.2, 1.2), (4.5, 2.2)), "1.04 m")
+        assert (preview.line, preview.label) == (((4.2, 1.2), (4.5, 2.2)), "1.04 m")
         assert session.displayed.environment is HALL
         assert hand.release(session, (4.5, 2.2)) == "circle “pillar” moved"
         assert session.displayed.environment.obstacles == (preview.obstacle, HALL.obstacles[1])
-        assert hand.preview(session) is None
+        assert hand.build_preview(session) is None
         assert session.undo() == "circle “pillar” moved"
         assert session.displayed.environment == HALL
 
     def test_a_click_on_an_obstacle_or_the_floor_moves_nothing(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         before = describe_state(session)
         assert clicked(hand, session, (4.2, 1.2), (5.5, 3.5)) is None
         hand.press(session, (5.5, 3.5), REACH, None)
-        assert not hand.holds
+        assert not hand.is_holding
         assert describe_state(session) == before
 
     def test_another_map_meanwhile(self):
-        hand, session = Hand(), start_session()
+        hand, session = HandTool(Inspection()), start_session()
         hand.press(session, (4.2, 1.2), REACH, None)
         hand.move(session, (4.5, 2.2))
         session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "turned round")
-        assert hand.preview(session) is None
+        assert hand.build_preview(session) is None
         assert hand.release(session, (4.5, 2.2)) is None
         hand.press(session, (4.2, 1.2), REACH, None)
         hand.move(session, (4.5, 2.2))
         session.edit_map(replace(HALL, obstacles=()), "emptied")
-        assert hand.preview(session) is None
+        assert hand.build_preview(session) is None
         assert hand.release(session, (4.5, 2.2)) is None
         assert session.displayed.environment.obstacles == ()
 
     def test_from_the_past(self):
-        hand, session = Hand(), advance_session(start_session(), 20)
+        hand, session = HandTool(Inspection()), advance_session(start_session(), 20)
         session.fail_robot(2)
         session.show_time(0.1)
         dragged(hand, session, place_of(session, 1), (3.0, 3.0), number=2)
@@ -189,38 +200,38 @@ class TestPolygon:
     CORNERS = ((3.2, 3.2), (4.2, 3.2), (4.2, 3.8))
 
     def test_enter_closes_it(self):
-        tool, session = Polygon(), start_session()
+        tool, session = AddPolygonTool(), start_session()
         assert clicked(tool, session, *self.CORNERS) is None
         assert session.displayed.environment is HALL
         assert tool.finish(session) == "polygon drawn"
         assert session.displayed.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
-        assert tool.preview(session) is None
+        assert tool.build_preview(session) is None
         assert tool.finish(session) is None
 
     def test_a_click_on_the_first_corner_closes_it(self):
-        tool, session = Polygon(), start_session()
+        tool, session = AddPolygonTool(), start_session()
         assert clicked(tool, session, *self.CORNERS, (3.25, 3.2)) == "polygon drawn"
         assert session.displayed.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
 
     def test_it_shows_what_it_would_be(self):
-        tool, session = Polygon(), start_session()
+        tool, session = AddPolygonTool(), start_session()
         clicked(tool, session, self.CORNERS[0])
         tool.move(session, (3.2, 3.7))
-        preview = tool.preview(session)
-        assert (preview.line, preview.closed, preview.words) == (((3.2, 3.2), (3.2, 3.7)), False, "0.50 m")
+        preview = tool.build_preview(session)
+        assert (preview.line, preview.is_closed, preview.label) == (((3.2, 3.2), (3.2, 3.7)), False, "0.50 m")
         clicked(tool, session, self.CORNERS[1])
-        assert tool.preview(session).closed
+        assert tool.build_preview(session).is_closed
         assert tool.cancel(session)
         assert not tool.cancel(session)
-        assert tool.preview(session) is None
+        assert tool.build_preview(session) is None
 
     def test_a_double_click_closes_it_and_is_one_corner(self):
-        tool, session = Polygon(), start_session()
+        tool, session = AddPolygonTool(), start_session()
         assert clicked(tool, session, *self.CORNERS, self.CORNERS[-1]) == "polygon drawn"
         assert len(session.displayed.environment.obstacles[-1].vertices) == 3
 
     def test_what_is_none_is_refused(self):
-        tool, session = Polygon(), start_session()
+        tool, session = AddPolygonTool(), start_session()
         before = describe_state(session)
         clicked(tool, session, *self.CORNERS[:2])
         with pytest.raises(MapError, match="three corners"):
@@ -233,24 +244,24 @@ class TestPolygon:
 
 class TestWall:
     def test_enter_ends_it(self):
-        tool, session = Wall(), start_session()
+        tool, session = AddWallTool(), start_session()
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
         tool.move(session, (3.8, 3.8))
-        preview = tool.preview(session)
-        assert preview.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), WALL_WIDTH)
-        assert preview.words == "0.60 m, 0.1 m wide"
+        preview = tool.build_preview(session)
+        assert preview.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M)
+        assert preview.label == "0.60 m, 0.1 m wide"
         assert tool.finish(session) == "wall drawn"
         assert session.displayed.environment.obstacles[-1] == WallObstacle(
-            ((3.2, 3.2), (3.2, 3.8)), WALL_WIDTH
+            ((3.2, 3.2), (3.2, 3.8)), DEFAULT_WALL_WIDTH_M
         )
         assert tool.finish(session) is None
 
     def test_a_click_on_the_last_point_ends_it(self):
-        tool, session = Wall(), start_session()
+        tool, session = AddWallTool(), start_session()
         assert clicked(tool, session, (3.2, 3.2), (3.2, 3.8), (3.21, 3.8)) == "wall drawn"
 
     def test_a_wall_may_come_round_to_its_first_point(self):
-        tool, session = Wall(), start_session()
+        tool, session = AddWallTool(), start_session()
         clicked(tool, session, (3.2, 3.0), (4.0, 3.0), (4.0, 3.8), (3.2, 3.8), (3.2, 3.0))
         assert tool.finish(session) == (
             "wall drawn; 0.5 m² cut off; a gap of 15 cm, too narrow for a robot"  # to the wall above
@@ -258,21 +269,21 @@ class TestWall:
         assert len(session.displayed.environment.obstacles[-1].points) == 5
 
     def test_wider_and_narrower(self):
-        tool, session = Wall(), start_session()
-        tool.widen(session, 1.25)
+        tool, session = AddWallTool(), start_session()
+        tool.resize(session, 1.25)
         assert tool.width == 0.125
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
         tool.finish(session)
         assert session.displayed.environment.obstacles[-1].width == 0.125
         for factor, end in ((0.8, 0.02), (1.25, 5.0)):
             for _ in range(60):
-                tool.widen(session, factor)
+                tool.resize(session, factor)
             assert tool.width == end
 
     def test_a_point_is_no_wall(self):
-        tool, session = Wall(), start_session()
+        tool, session = AddWallTool(), start_session()
         clicked(tool, session, (3.2, 3.2))
-        assert tool.preview(session).obstacle is None
+        assert tool.build_preview(session).obstacle is None
         with pytest.raises(MapError, match="two points that are apart"):
             tool.finish(session)
         assert session.displayed.environment is HALL
@@ -280,18 +291,18 @@ class TestWall:
 
 class TestCircle:
     def test_it_is_drawn_from_its_middle(self):
-        tool, session = Circle(), start_session()
+        tool, session = AddCircleTool(), start_session()
         tool.press(session, (3.5, 3.2), REACH, None)
-        assert tool.preview(session).obstacle is None
+        assert tool.build_preview(session).obstacle is None
         tool.move(session, (3.5, 3.5))
-        assert tool.preview(session).words == "radius 0.30 m"
-        assert tool.preview(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
+        assert tool.build_preview(session).label == "radius 0.30 m"
+        assert tool.build_preview(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
         assert tool.release(session, (3.5, 3.5)) == "circle drawn"
         assert session.displayed.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
         assert tool.release(session, (3.5, 3.5)) is None
 
     def test_a_click_is_no_circle(self):
-        tool, session = Circle(), start_session()
+        tool, session = AddCircleTool(), start_session()
         with pytest.raises(MapError, match="drag from its middle"):
             clicked(tool, session, (3.5, 3.2))
         tool.press(session, (3.5, 3.2), REACH, None)
@@ -303,34 +314,34 @@ class TestCircle:
 class TestEraser:
     def test_it_deletes_obstacles(self):
         session = start_session()
-        assert clicked(toolbox()["eraser"], session, (2.53, 3.0)) == "wall deleted"
-        assert clicked(toolbox()["eraser"], session, (4.2, 1.73)) == "circle “pillar” deleted"
+        assert clicked(build_tools()["eraser"], session, (2.53, 3.0)) == "wall deleted"
+        assert clicked(build_tools()["eraser"], session, (4.2, 1.73)) == "circle “pillar” deleted"
         assert session.displayed.environment.obstacles == ()
-        assert clicked(toolbox()["eraser"], session, (4.2, 1.2)) is None
+        assert clicked(build_tools()["eraser"], session, (4.2, 1.2)) is None
 
     def test_a_robot_before_an_obstacle(self):
         session = start_session()
-        assert clicked(toolbox()["eraser"], session, (4.2, 1.2), number=2) == "robot 2 taken out"
+        assert clicked(build_tools()["eraser"], session, (4.2, 1.2), number=2) == "robot 2 removed"
         assert get_robot_numbers(session) == ((1, 3), ())
         assert session.displayed.environment is HALL
 
     def test_the_last_robot_stays(self):
         session = start_session(robots=1)
-        with pytest.raises(ParameterError, match="cannot remove the last working robot"):
-            clicked(toolbox()["eraser"], session, (1.0, 1.0), number=1)
+        with pytest.raises(ParameterError, match="last working robot"):
+            clicked(build_tools()["eraser"], session, (1.0, 1.0), number=1)
 
 
 def test_robots_join_where_it_is_clicked():
     session = start_session()
-    assert clicked(toolbox()["robot"], session, (3.5, 3.2)) == "robot 4 joined"
+    assert clicked(build_tools()["robot"], session, (3.5, 3.2)) == "robot 4 joined"
     assert place_of(session, 4) == [3.5, 3.2]
     # in an obstacle it is as near as there is room
-    assert clicked(toolbox()["robot"], session, (4.2, 1.2)) == "robot 5 joined"
+    assert clicked(build_tools()["robot"], session, (4.2, 1.2)) == "robot 5 joined"
     assert compute_penetration(session) <= 0.0
 
 
 def test_robots_fail_and_work_again():
-    tool, session = toolbox()["failure"], advance_session(start_session(RAPF, LLOYD), 5)
+    tool, session = build_tools()["failure"], advance_session(start_session(RAPF, LLOYD), 5)
     assert clicked(tool, session, (1.0, 1.0)) is None
     assert clicked(tool, session, (1.0, 1.0), number=2) == "robot 2 failed"
     assert get_robot_numbers(session) == ((1, 3), (2,))
@@ -345,18 +356,18 @@ def test_robots_fail_and_work_again():
 
 class TestRuler:
     def test_it_measures(self):
-        tool, session = Ruler(), start_session()
+        tool, session = RulerTool(), start_session()
         before = describe_state(session)
         tool.press(session, (1.0, 1.0), REACH, None)
         tool.move(session, (4.0, 5.0))
-        assert tool.preview(session).line == ((1.0, 1.0), (4.0, 5.0))
-        assert tool.preview(session).words == "5.00 m  (Δx 3.00, Δy 4.00)"
+        assert tool.build_preview(session).line == ((1.0, 1.0), (4.0, 5.0))
+        assert tool.build_preview(session).label == "5.00 m  (Δx 3.00, Δy 4.00)"
         tool.release(session, (4.0, 5.0))
         # and stays there
         tool.move(session, (2.0, 2.0))
-        assert tool.preview(session).line == ((1.0, 1.0), (4.0, 5.0))
+        assert tool.build_preview(session).line == ((1.0, 1.0), (4.0, 5.0))
         assert tool.cancel(session)
-        assert tool.preview(session) is None
+        assert tool.build_preview(session) is None
         assert not tool.cancel(session)
         assert describe_state(session) == before
 
@@ -364,18 +375,17 @@ class TestRuler:
 def test_it_is_told_who_was_pushed_and_which_starts_are_covered():
     session = start_session(start="spread")
     session.place_robot(1, (5.2, 3.2))
-    said = dragged(Circle(), session, (5.2, 3.2), (5.2, 3.75))
+    said = dragged(AddCircleTool(), session, (5.2, 3.2), (5.2, 3.75))
     assert said == "circle drawn; 1 robot pushed out of the way; it covers the start far"
     session.place_robot(1, (1.0, 2.5))
     session.place_robot(2, (1.5, 2.5))
-    assert (
-        dragged(Circle(), session, (1.2, 2.5), (1.2, 2.9)) == "circle drawn; 2 robots pushed out of the way"
-    )
+    said = dragged(AddCircleTool(), session, (1.2, 2.5), (1.2, 2.9))
+    assert said == "circle drawn; 2 robots pushed out of the way"
 
 
 points = st.tuples(st.floats(-1, 7), st.floats(-1, 5))
 uses = st.tuples(
-    st.sampled_from(list(toolbox())),
+    st.sampled_from(list(build_tools())),
     st.sampled_from(["press", "move", "release", "finish", "cancel", "undo", "step"]),
     points,
     st.none() | st.integers(1, 4),
@@ -385,7 +395,7 @@ uses = st.tuples(
 @given(st.lists(uses, max_size=30))
 @settings(max_examples=60)
 def test_however_tools_are_used_nothing_breaks(actions):
-    session, tools = start_session(), toolbox()
+    session, tools = start_session(), build_tools()
     session.playback.is_playing = True
     for name, action, point, number in actions:
         tool = tools[name]
@@ -408,6 +418,6 @@ def test_however_tools_are_used_nothing_breaks(actions):
             said = str(error)
         assert said is None or said == " ".join(said.split()) != ""
         for each in tools.values():
-            preview = each.preview(session)
+            preview = each.build_preview(session)
             assert preview is None or len(preview.line) >= 2
     assert compute_penetration(session) < 2e-3

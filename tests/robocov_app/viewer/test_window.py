@@ -16,7 +16,7 @@ from sample_sessions import RAPF, start_session
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.input import shown_cursor
 from robocov_app.viewer.launch import Launcher
-from robocov_app.viewer.status import cursor_words
+from robocov_app.viewer.status import describe_cursor
 
 # playing
 
@@ -71,12 +71,12 @@ def test_the_status_line_tells_of_the_place_under_the_cursor(tmp_path: Path) -> 
     with opened(tmp_path, lattice=48) as driver:
         driver.frames(3)
         driver.move(*driver.robot(2))
-        assert "robot 2" in cursor_words(driver.viewer)
+        assert "robot 2" in describe_cursor(driver.viewer)
         driver.move(*driver.pixel((4.2, 1.2)))
-        assert "not free" in cursor_words(driver.viewer)
+        assert "inside an obstacle" in describe_cursor(driver.viewer)
         driver.post(pygame.WINDOWLEAVE)
         driver.settle()
-        assert cursor_words(driver.viewer) == ""
+        assert describe_cursor(driver.viewer) == ""
 
 
 def test_over_the_panel_the_cursor_is_an_arrow(driver: Driver) -> None:
@@ -95,7 +95,7 @@ def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -
     driver.key("f12")
     with Image.open(tmp_path / "robocov-1.png") as saved:
         assert np.array_equal(np.asarray(saved.convert("RGB")).astype(int), picture)
-    driver.turn("keep")
+    driver.turn("file")
     driver.push("screenshot")
     assert (tmp_path / "robocov-2.png").exists()
 
@@ -105,9 +105,9 @@ def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> Non
     for _ in range(30):
         driver.session.playback.step()
     driver.key("ctrl+e")
-    driver.window.keeper.finish()
+    driver.window.run_saver.finish()
     driver.frames(2)
-    assert not driver.viewer.trouble and "saved" in driver.viewer.message
+    assert not driver.viewer.has_error_message and "saved" in driver.viewer.message
     (record,) = tmp_path.rglob("record.npz")
     assert record.parent != tmp_path
 
@@ -116,13 +116,13 @@ def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> Non
 def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> None:
     driver.key("space")
     driver.key("f9")
-    assert driver.viewer.filming
+    assert driver.viewer.view.is_recording
     driver.frames(60)
     resized(driver, (1000, 640))
     driver.frames(15)
     driver.key("f9")
     path = tmp_path / "robocov-1.mp4"
-    assert driver.viewer.message.startswith(f"film saved: {path}") and not driver.viewer.filming
+    assert driver.viewer.message.startswith(f"film saved: {path}") and not driver.viewer.view.is_recording
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert seconds == pytest.approx(75 * FRAME, abs=0.15) and count == pytest.approx(45, abs=4)
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
@@ -142,10 +142,10 @@ def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with opened(tmp_path / "file") as driver:
         for key in ("f12", "f9", "ctrl+s"):
-            driver.viewer.trouble = False
+            driver.viewer.has_error_message = False
             driver.key(key)
-            assert driver.viewer.trouble and driver.viewer.message, key
-        assert driver.window.film is None and not driver.viewer.filming
+            assert driver.viewer.has_error_message and driver.viewer.message, key
+        assert driver.window.video is None and not driver.viewer.view.is_recording
 
 
 # help, palette, theme, size
@@ -155,12 +155,12 @@ def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
 def test_the_keys_are_shown_and_go_with_a_key_or_a_click(key: str, driver: Driver) -> None:
     plain = driver.picture()
     driver.key(key)
-    assert driver.window.help and not driver.same(plain)
+    assert driver.window.is_help_open and not driver.same(plain)
     driver.key("escape")
-    assert not driver.window.help
+    assert not driver.window.is_help_open
     driver.key(key)
     driver.click(300, 300)
-    assert not driver.window.help and driver.viewer.selected is None
+    assert not driver.window.is_help_open and driver.viewer.selected_robot is None
 
 
 @pytest.mark.parametrize("key", ["/", "ctrl+k"])
@@ -244,9 +244,9 @@ def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int,
         driver.frames(2)
         driver.push("pause")
         assert not driver.session.playback.is_playing
-        driver.turn("keep")
+        driver.turn("file")
         driver.click(*driver.robot(1))
-        assert driver.viewer.selected == 1
+        assert driver.viewer.selected_robot == 1
         if size[0] >= 900:
             driver.turn("parameters")
             driver.push("reset:k_rep")
@@ -271,17 +271,17 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
 
 
 def test_the_lesson_is_played_and_ends_on_a_key(driver: Driver) -> None:
-    shown = set(driver.viewer.shown)
+    shown = set(driver.viewer.view.layers)
     driver.key("f2")
-    assert driver.window.tour is not None and driver.viewer.session.playback.is_playing
+    assert driver.window.lesson.player is not None and driver.viewer.session.playback.is_playing
     driver.frames(5)
     driver.key("f12")
     driver.key("t")
-    assert driver.window.tour is not None
+    assert driver.window.lesson.player is not None
     driver.key("escape")
-    assert driver.window.tour is None and driver.viewer.shown == shown
+    assert driver.window.lesson.player is None and driver.viewer.view.layers == shown
     assert driver.viewer.session is driver.session
-    assert driver.viewer.message == "the lesson has ended; what was before it is there again"
+    assert driver.viewer.message == "the lesson has ended; your session from before is back"
 
 
 def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
@@ -289,9 +289,9 @@ def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
     driver.frames(3)
     driver.click(*driver.window.layout.arena[2:])
     driver.click(200, 200)
-    assert driver.window.tour is not None and driver.window.tour.state == "left"
+    assert driver.window.lesson.player is not None and driver.window.lesson.player.state == "left"
     driver.key("f2")
-    assert driver.window.tour.state == "plays"
+    assert driver.window.lesson.player.state == "playing"
 
 
 # settings
@@ -319,6 +319,10 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
     assert "cells" not in kept["shown"] and (kept["width"], kept["height"]) == (1000, 640)
     with window() as second:
         assert second.screen.get_size() == (1000, 640)
-        assert second.viewer.theme == "dark" and second.viewer.fade and second.panel.tab == "show"
-        assert "cells" not in second.viewer.shown and "robots" in second.viewer.shown
+        assert (
+            second.viewer.view.theme == "dark"
+            and second.viewer.view.fades_trajectories
+            and second.panel.tab == "show"
+        )
+        assert "cells" not in second.viewer.view.layers and "robots" in second.viewer.view.layers
         second.close()

@@ -24,7 +24,7 @@ def test_a_robot_that_is_dragged_follows_the_mouse(driver: Driver) -> None:
     assert driver.session.timeline.drag is not None and driver.session.timeline.drag[0] == 2
     driver.release()
     assert driver.session.timeline.drag is None
-    assert driver.viewer.selected == 2 and driver.window.panel.tab == "robot"
+    assert driver.viewer.selected_robot == 2 and driver.window.panel.tab == "robot"
 
 
 def test_a_robot_that_is_let_go_of_in_swing_flies_on(driver: Driver) -> None:
@@ -51,13 +51,13 @@ def test_while_paused_a_robot_is_put_where_the_mouse_is(driver: Driver) -> None:
 
 def test_a_click_on_the_floor_forgets_the_robot_and_a_drag_pans(driver: Driver) -> None:
     driver.click(*driver.robot(1))
-    assert driver.viewer.selected == 1
+    assert driver.viewer.selected_robot == 1
     x, y = driver.pixel(MIDDLE)
     driver.drag((x, y), (x + 40, y + 30))
-    assert driver.viewer.selected == 1
+    assert driver.viewer.selected_robot == 1
     assert np.allclose(driver.pixel(MIDDLE), (x + 40, y + 30), atol=2)
     driver.click(*driver.pixel(MIDDLE))
-    assert driver.viewer.selected is None
+    assert driver.viewer.selected_robot is None
 
 
 def test_an_obstacle_is_moved_and_that_can_be_undone_and_done_again(driver: Driver) -> None:
@@ -181,7 +181,7 @@ def test_an_obstacle_that_cannot_be_is_refused_with_the_reason(corners, why: str
     for corner in corners:
         driver.click_at(corner)
     driver.key("return")
-    assert why in driver.viewer.message and driver.viewer.trouble
+    assert why in driver.viewer.message and driver.viewer.has_error_message
     assert driver.session.displayed.environment is before
 
 
@@ -191,21 +191,21 @@ def test_an_obstacle_over_all_of_the_floor_is_refused(driver: Driver) -> None:
     for corner in ((0.01, 0.01), (5.99, 0.01), (5.99, 3.99), (0.01, 3.99)):
         driver.click_at(corner)
     driver.key("return")
-    assert driver.viewer.trouble and driver.viewer.message
+    assert driver.viewer.has_error_message and driver.viewer.message
     assert driver.session.displayed.environment is before
 
 
 def test_the_ruler_measures(driver: Driver) -> None:
     driver.key("m")
     driver.drag_at((1.0, 3.0), (3.0, 3.0))
-    preview = driver.viewer.tool.preview(driver.session)
-    assert preview is not None and preview.words.startswith("2.0")
+    preview = driver.viewer.tool.build_preview(driver.session)
+    assert preview is not None and preview.label.startswith("2.0")
 
 
 def test_what_is_drawn_is_in_the_pane_under_the_mouse(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, RPF) as driver:
         driver.key("c")
         driver.drag(driver.pixel((1.0, 3.2), 1), driver.pixel((1.4, 3.2), 1))
-        assert driver.viewer.active == 1
+        assert driver.viewer.active_pane == 1
         for pane in driver.session.timeline.panes:
             assert pane.setup.environment.obstacles[-1].center == pytest.approx((1.0, 3.2), abs=0.05)

@@ -15,16 +15,16 @@ from sample_sessions import RAPF, RPF
 from robocov.controllers import CONTROLLERS
 from robocov_app.toolkit.input import DOUBLE, KEY_REPEAT
 from robocov_app.toolkit.ui import TIP_AFTER
-from robocov_app.viewer.panel import TABS, law_labels
+from robocov_app.viewer.panel import TABS, label_controllers
 
 # the panel
 
 
 def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
-    driver.choose("law:0", "RPF")
+    driver.choose("controller:0", "RPF")
     assert driver.session.timeline.panes[0].controller.name == "rpf"
     assert driver.find("entry", "k_att") is None
-    driver.choose("law:0", "Lloyd")
+    driver.choose("controller:0", "Lloyd")
     assert driver.session.timeline.panes[0].controller.name == "lloyd"
 
 
@@ -35,7 +35,7 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
     (tmp_path / "also").mkdir()
     (tmp_path / "also/mine.py").write_text(own)
     names = [f"{tmp_path / 'mine.py'}:Mine", f"{tmp_path / 'also/mine.py'}:Mine"]
-    assert law_labels(["rapf", *names], {}) == {
+    assert label_controllers(["rapf", *names], {}) == {
         "rapf": "RAPF",
         names[0]: "RAPF (mine.py)",
         names[1]: f"RAPF ({names[1]})",
@@ -43,19 +43,19 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
     with opened(tmp_path, RAPF, RPF, RPF, RPF) as driver:
         for name in names:
             driver.viewer.attempt(lambda name=name: driver.window.commands.typed(f"controller {name}"))
-        driver.viewer.attempt(lambda: driver.viewer.set_law(0, "rapf"))
+        driver.viewer.attempt(lambda: driver.viewer.comparison.set_controller(0, "rapf"))
         driver.settle()
-        driver.click(*driver.widget("menu", "law:1").rect.center)
+        driver.click(*driver.widget("menu", "controller:1").rect.center)
         items = driver.window.panel.ui.open_list.options
         assert len(set(items)) == len(items) == len(CONTROLLERS) + 2
         driver.key("escape")
-        driver.choose("law:1", items[-1])
+        driver.choose("controller:1", items[-1])
         assert driver.session.timeline.panes[1].controller.name == names[1]
 
 
 def test_a_map_and_a_start_are_chosen_from_their_menus(driver: Driver) -> None:
     driver.choose("map", "trap")
-    assert driver.viewer.map_name == "trap" and driver.session.displayed.environment.name == "Trap"
+    assert driver.viewer.files.map_name == "trap" and driver.session.displayed.environment.name == "Trap"
     driver.choose("start", "inside")
     assert driver.session.timeline.scenario.start_name == "inside"
 
@@ -80,7 +80,7 @@ def test_a_menu_is_closed_by_a_click_elsewhere_and_that_click_does_nothing_else(
     driver.click_at(MIDDLE)
     driver.settle()
     assert driver.window.panel.ui.open_list is None
-    assert driver.window.canvas._painters[0].camera == camera and driver.viewer.map_name == "hall"
+    assert driver.window.canvas._painters[0].camera == camera and driver.viewer.files.map_name == "hall"
 
 
 def test_escape_closes_a_menu_and_nothing_else(driver: Driver) -> None:
@@ -98,7 +98,7 @@ def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
     found = driver.window.panel.ui.open_list
     name = found.options[found.at((driver.at[0], step.centery))]
     driver.click(driver.at[0], step.centery)
-    assert driver.session.timeline.end_time == 0.0 and driver.viewer.map_name == name
+    assert driver.session.timeline.end_time == 0.0 and driver.viewer.files.map_name == name
 
 
 def test_a_slider_that_is_dragged_sets_its_gain_as_it_moves(driver: Driver) -> None:
@@ -156,7 +156,7 @@ def test_a_wrong_value_is_told_and_the_field_shows_the_old_one_again(
     driver.write(field, text)
     assert driver.widget("entry", field).text == text
     driver.key("return")
-    assert driver.viewer.trouble and driver.viewer.message
+    assert driver.viewer.has_error_message and driver.viewer.message
     assert driver.widget("entry", field).text == before
 
 
@@ -175,18 +175,18 @@ def test_what_was_typed_without_enter_is_forgotten(how: str, driver: Driver) -> 
 
 
 def test_keys_that_are_typed_into_a_field_are_no_shortcuts(driver: Driver) -> None:
-    shown = set(driver.viewer.shown)
+    shown = set(driver.viewer.view.layers)
     driver.write("k_rep", "1r t")
     driver.key("space")
     driver.key("home")
     driver.key("delete")
     assert (
-        driver.viewer.shown == shown
-        and driver.viewer.theme == "light"
+        driver.viewer.view.layers == shown
+        and driver.viewer.view.theme == "light"
         and not driver.session.playback.is_playing
     )
     driver.key("f1")
-    assert driver.window.help
+    assert driver.window.is_help_open
 
 
 def test_keys_repeat_as_before_after_something_was_typed(driver: Driver) -> None:
@@ -237,15 +237,15 @@ def test_tabs_turn_pages_and_check_boxes_switch_layers(driver: Driver) -> None:
         assert driver.widget("button", f"tab:{tab}").value
     driver.turn("show")
     for name in ("cells", "grid"):
-        assert name in driver.viewer.shown
+        assert name in driver.viewer.view.layers
         driver.tick(name)
-        assert name not in driver.viewer.shown and not driver.widget("check", name).value
+        assert name not in driver.viewer.view.layers and not driver.widget("check", name).value
     box = driver.widget("check", "cells").rect
     driver.click(box.left + 40, box.centery)  # on the words
-    assert "cells" in driver.viewer.shown
+    assert "cells" in driver.viewer.view.layers
     driver.key("1")
     driver.frames(3)
-    assert "cells" not in driver.viewer.shown and not driver.widget("check", "cells").value
+    assert "cells" not in driver.viewer.view.layers and not driver.widget("check", "cells").value
     driver.key("ctrl+tab")
     assert driver.window.panel.tab == "robot"
 
@@ -270,7 +270,7 @@ def test_the_page_is_of_the_pane_that_was_clicked(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, RPF) as driver:
         assert driver.find("entry", "k_att") is not None
         driver.click(*driver.pixel(MIDDLE, 1))
-        assert driver.viewer.active == 1
+        assert driver.viewer.active_pane == 1
         assert driver.find("entry", "k_att") is None
         driver.write("k_rep", "5")
         driver.key("return")
@@ -311,12 +311,12 @@ def test_pages_that_were_turned_to_before_look_as_they_did(tmp_path: Path) -> No
             if tab in pictures:
                 assert driver.same(pictures[tab]), tab
             pictures[tab] = driver.picture()
-        driver.viewer.active = 1
+        driver.viewer.inspection.active_pane = 1
         driver.window.panel.show_tab("parameters")
         driver.frames(2, 0.3)
         assert not driver.same(pictures["parameters"])
-        driver.viewer.active = 0
-        driver.viewer.version += 1
+        driver.viewer.inspection.active_pane = 0
+        driver.viewer.revision += 1
         driver.frames(2, 0.3)
         assert driver.same(pictures["parameters"])
 

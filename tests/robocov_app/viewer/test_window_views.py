@@ -15,7 +15,7 @@ from sample_sessions import RAPF, RPF
 def played(driver: Driver, steps: int) -> Driver:
     for _ in range(steps):
         driver.session.playback.step()
-        driver.window._ask_costs()
+        driver.window._cost_curves.update()
     driver.frames(2, 0.2)
     return driver
 
@@ -108,7 +108,7 @@ def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Drive
     before = driver.pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (260, 180), button=button)
     assert np.allclose(driver.pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
-    assert driver.viewer.tool.preview(driver.session) is None
+    assert driver.viewer.tool.build_preview(driver.session) is None
 
 
 def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:

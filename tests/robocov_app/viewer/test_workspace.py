@@ -115,7 +115,7 @@ def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
     (tmp_path / "no.robocov").write_text("{}")
     before = viewer.session
     with pytest.raises(MapError, match="format: missing"):
-        viewer.open_session(tmp_path / "no.robocov")
+        viewer.files.open_session(tmp_path / "no.robocov")
     assert viewer.session is before
 
 

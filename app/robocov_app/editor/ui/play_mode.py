@@ -16,49 +16,59 @@ from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.file_actions import FileActions
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import Window
+from robocov_app.viewer.window import ViewerWindow
 
 DRAFT_PAUSE_S = 1.0  # between two drafts of a map that is tried
 FIRST_UPDATE_S = 0.01
 
 
-class PlayPresenter(Presenter):
-    """The viewer's presenter, which knows whether it still shows the map that is tried.
+class PlayFiles(FileActions):
+    """The viewer's files, among which the map that is tried is offered by its title.
 
     Attributes
     ----------
     tried : Environment
         The map as it was in the editor.
-    elsewhere : bool
+    has_left_tried_map : bool
         Whether another map was opened meanwhile.
     """
 
-    elsewhere = False
-
-    def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
-        self.tried = session.displayed.environment
+    def __init__(self, viewer: Presenter, folder: Path, title: str) -> None:
+        super().__init__(viewer, folder, map_name=title)
+        self.tried = viewer.session.displayed.environment
+        self.has_left_tried_map = False
         self._title = title
-        super().__init__(session, costs, shown, folder, title, list_controller_classes())
 
     def open_map(self, name: str) -> None:
         """Open a map, or the one that is tried by its title."""
         if name == self._title:
-            self.session.restart(environment=self.tried)
+            self._viewer.session.restart(environment=self.tried)
             self.map_name = name
         else:
             super().open_map(name)
-        self.elsewhere = name != self._title
+        self.has_left_tried_map = name != self._title
 
-    def maps(self) -> list[str]:
+    def list_maps(self) -> list[str]:
         """Return the names of the maps that can be opened."""
-        return list(dict.fromkeys([self._title, *super().maps()]))
+        return list(dict.fromkeys([self._title, *super().list_maps()]))
 
 
-class PlayWindow(Window):
+class PlayPresenter(Presenter):
+    """The viewer's presenter with the files of a trial."""
+
+    files: PlayFiles
+
+    def __init__(self, session: Session, costs: Costs, layers: set[str], folder: Path, title: str) -> None:
+        super().__init__(session, costs, layers, folder, title, controllers=list_controller_classes())
+        self.files = PlayFiles(self, folder, title)
+
+
+class PlayWindow(ViewerWindow):
     """The viewer's window, from which F5 and Escape lead back to the editor.
 
     Attributes
@@ -72,10 +82,12 @@ class PlayWindow(Window):
     viewer: PlayPresenter
     hint = "F5 back to the editor · F1 keys"
 
-    def __init__(self, viewer: PlayPresenter, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
+    def __init__(
+        self, viewer: PlayPresenter, screen: pygame.Surface, scale: float, *, is_unattended: bool
+    ) -> None:
         self.ended = False
         self.held: int | None = None
-        super().__init__(viewer, screen.get_size(), scale, patient=patient, screen=screen)
+        super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
 
     def take(self, event: pygame.event.Event) -> None:
         """Handle an event; F5 leads back."""
@@ -91,11 +103,12 @@ class PlayWindow(Window):
 
     def do(self, name: str) -> None:
         """Run a command; Escape leads back where it would do nothing."""
-        is_open = self.help or self.dialogs.open or self.tour is not None
+        is_open = self.is_help_open or self.dialogs.open or self.lesson.player is not None
         viewer = self.viewer
-        is_idle = not is_open and viewer.tool is viewer.hand and viewer.selected is None
+        hand = viewer.toolbox.hand
+        is_idle = not is_open and viewer.tool is hand and viewer.selected_robot is None
         if name == "cancel" and is_idle:
-            self.ended = not viewer.hand.cancel(viewer.session)
+            self.ended = not hand.cancel(viewer.session)
         else:
             super().do(name)
 
@@ -163,14 +176,14 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
         viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
-        viewer.theme = editor.theme
-        trial = PlayWindow(viewer, screen, scale, patient=patient)
+        viewer.view.theme = editor.theme
+        trial = PlayWindow(viewer, screen, scale, is_unattended=patient)
     except BaseException:
         costs.close()
         raise
     # Without an update the first frame would have no panel.
     trial.panel.update(FIRST_UPDATE_S)
-    viewer.say(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
+    viewer.show_message(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
     return trial
 
 

@@ -325,7 +325,7 @@ class EditorWindow(BaseWindow):
             self.editor.selector.cancel(self.editor)
         trial = start_trial(self.editor, self.screen, self.scale, patient=self._patient)
         trial.windowed = self.windowed
-        self._trial_drafts = TrialDrafts(self.editor.document, trial.viewer.tried)
+        self._trial_drafts = TrialDrafts(self.editor.document, trial.viewer.files.tried)
         self.trial = trial
         self.inner = trial
 
@@ -342,7 +342,7 @@ class EditorWindow(BaseWindow):
     def _end_trial(self, trial: PlayWindow) -> None:
         """Return to the editor with what was changed in the viewer."""
         trial.close()
-        trial.keeper.finish()
+        trial.run_saver.finish()
         self.trial = None
         self.inner = None
         self._trial_drafts = None
@@ -350,9 +350,9 @@ class EditorWindow(BaseWindow):
         self.windowed = trial.windowed
         editor = self.editor
         viewer = trial.viewer
-        editor.theme = viewer.theme
-        change = build_trial_change(editor.sketch, viewer.tried, viewer.session.displayed.environment)
-        if change is not None and not viewer.elsewhere:
+        editor.theme = viewer.view.theme
+        change = build_trial_change(editor.sketch, viewer.files.tried, viewer.session.displayed.environment)
+        if change is not None and not viewer.files.has_left_tried_map:
             editor.apply(change)
         editor.document.update_draft()
         # A key that is still held down repeats, and must not start the next trial.
@@ -369,7 +369,7 @@ class EditorWindow(BaseWindow):
 
     def _keep_trial_draft(self, trial: PlayWindow, *, at_once: bool = False) -> None:
         viewer = trial.viewer
-        if self._trial_drafts is not None and not viewer.elsewhere:
+        if self._trial_drafts is not None and not viewer.files.has_left_tried_map:
             self._trial_drafts.update(viewer.session.displayed.environment, at_once=at_once)
 
     def take(self, event: pygame.event.Event) -> None:

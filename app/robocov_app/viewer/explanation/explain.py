@@ -1,0 +1,102 @@
+"""The report on a robot: why it moves, or why it does not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov.observation import Snapshot
+from robocov.team import Team
+from robocov_app.viewer.explanation.lines import (
+    ReportLine,
+    build_position_line,
+    list_force_lines,
+    list_reasons,
+    list_surroundings,
+)
+from robocov_app.viewer.explanation.motion import classify_motion
+from robocov_app.viewer.explanation.situation import RobotSituation
+from robocov_app.viewer.explanation.verdict import describe_motion
+from robocov_app.viewer.presenter import Presenter
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """Report on a robot.
+
+    Attributes
+    ----------
+    title : str
+        Name of the robot.
+    verdict : str
+        What it does, in one sentence.
+    lines : tuple of ReportLine
+        Position, forces, reasons and surroundings.
+    """
+
+    title: str
+    verdict: str
+    lines: tuple[ReportLine, ...]
+
+
+def explain_robot(viewer: Presenter, number: int) -> RobotReport:
+    """Explain a robot of the active pane at the displayed step, by its number."""
+    displayed = viewer.session.displayed
+    pane = viewer.pane
+    setup = displayed.get_setup(pane)
+    if number in setup.failed:
+        x, y = setup.failed[number]
+        verdict = f"failed: it stays at ({x:.2f}, {y:.2f}) m, and the others sense it as an obstacle"
+        return RobotReport(f"Robot {number}", verdict, ())
+    return explain(
+        displayed.get_snapshot(pane),
+        setup.team,
+        setup.sensed_environment,
+        setup.numbers.index(number),
+        numbers=setup.numbers,
+        recent=displayed.get_recent_positions(pane, number),
+    )
+
+
+def explain(
+    snapshot: Snapshot,
+    team: Team,
+    environment: Environment,
+    robot: int,
+    *,
+    numbers: Sequence[int] | None = None,
+    recent: Array | None = None,
+) -> RobotReport:
+    """Explain why a robot moves, or why it does not.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        What all robots observed and decided.
+    team : Team
+        The team.
+    environment : Environment
+        The map, with failed robots as obstacles.
+    robot : int
+        Row of the robot.
+    numbers : sequence of int, optional
+        Numbers of the robots; by default 1, 2, ...
+    recent : (k, 2) array, m, optional
+        Positions of the robot during the last `SETTLED_WINDOW_S` seconds, oldest first. Without them its
+        speed alone decides whether it is at rest.
+
+    Returns
+    -------
+    RobotReport
+    """
+    if numbers is None:
+        numbers = range(1, len(team) + 1)
+    situation = RobotSituation(snapshot, team, environment, robot, numbers)
+    motion = classify_motion(situation, recent)
+    sentences = [*list_reasons(situation, motion), *list_surroundings(situation)]
+    lines = (
+        build_position_line(situation),
+        *list_force_lines(situation),
+        *map(ReportLine, sentences),
+    )
+    return RobotReport(f"Robot {situation.number}", describe_motion(situation, motion), lines)

@@ -1,0 +1,71 @@
+"""How a robot moves: steadily, to and fro, not at all, or from now on."""
+
+from enum import Enum
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.metrics import SETTLED_DISTANCE_M
+from robocov_app.viewer.explanation.situation import RobotSituation, compute_alignment
+
+MAX_REST_SPEED_M_S = 0.05
+"""Slower robots seem to be at rest."""
+
+_MIN_STEADY_SPEED_M_S = 0.1 * MAX_REST_SPEED_M_S  # of a robot that has covered some distance
+_MIN_SWAY_M = 0.02  # a robot that moves to and fro by less seems to stand still
+_TREMBLING_RATIO = 3.0  # path length by extent, from which on a robot trembles
+_STRAIGHT_RATIO = 1.5  # path length by distance covered, below which a path is straight
+
+
+class Motion(Enum):
+    """Motion of a robot."""
+
+    MOVING = "moving"
+    TREMBLING = "trembling"
+    AT_REST = "at rest"
+    STARTING = "starting"
+
+
+def classify_motion(situation: RobotSituation, recent: Array | None) -> Motion:
+    """Classify the motion of a robot.
+
+    Parameters
+    ----------
+    situation : RobotSituation
+        The robot.
+    recent : (k, 2) array, m, or None
+        Its positions of the last seconds, oldest first. Without them its speed decides.
+    """
+    path = np.empty((0, 2)) if recent is None else recent[np.isfinite(recent).all(axis=1)]
+    path_length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    if len(path) < 2:
+        if situation.speed > MAX_REST_SPEED_M_S:
+            return Motion.MOVING
+        return _classify_rest(situation, path_length)
+    extent = float(np.hypot(*np.ptp(path, axis=0)))
+    if path_length > _TREMBLING_RATIO * max(_MIN_SWAY_M, extent):
+        return Motion.TREMBLING
+    covered = complex(*(path[-1] - path[0]))
+    if abs(covered) >= SETTLED_DISTANCE_M:
+        if situation.speed > _MIN_STEADY_SPEED_M_S:
+            return Motion.MOVING
+        return _classify_rest(situation, path_length)
+    if situation.speed <= MAX_REST_SPEED_M_S:
+        return _classify_rest(situation, path_length)
+    if _has_set_off(situation, covered, path_length):
+        return Motion.MOVING
+    return Motion.TREMBLING
+
+
+def _classify_rest(situation: RobotSituation, path_length: float) -> Motion:
+    """Return whether a robot at rest is about to move."""
+    is_pushed = not situation.is_balanced and not situation.holding_names
+    return Motion.STARTING if is_pushed and path_length < _MIN_SWAY_M else Motion.AT_REST
+
+
+def _has_set_off(situation: RobotSituation, covered: complex, path_length: float) -> bool:
+    """Return whether a fast robot has covered so little because it has just started, straight ahead."""
+    is_straight = path_length < _STRAIGHT_RATIO * abs(covered)
+    if not is_straight or compute_alignment(covered, situation.velocity) <= 0.7:
+        return False
+    return abs(covered) > 0.25 * situation.speed**2 / situation.max_acceleration

@@ -1,0 +1,263 @@
+"""The situation of one robot: its forces, its goal, and what is near it.
+
+Plane vectors are complex numbers, x + i y. Distances to goals, obstacle points and other robots are measured
+from the robot's center, as controllers do; gaps are measured from its rim.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from robocov.environment import Environment, WallObstacle
+from robocov.metrics import MAX_CONTACT_GAP_M
+from robocov.observation import Decision, Snapshot
+from robocov.team import Team
+from robocov_app.viewer.explanation.text import MIN_FORCE_N, format_direction, format_length
+
+UNEXPLAINED_FORCE = "law"
+"""Kind of the force that a controller's terms do not explain."""
+MIN_SHORTFALL_M = 0.3
+"""A robot at rest farther from its goal than this has not arrived."""
+
+_BALANCE_FRACTION = 0.1  # a resultant below this fraction of the largest force counts as zero,
+_BALANCE_ACCELERATION = 0.1  # and so does one that accelerates the robot by less, m/s²
+_MAX_VALUE = 1e100  # numbers above this cannot be computed with
+_RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant"})
+
+
+@dataclass(frozen=True)
+class NearbyObject:
+    """Something near the robot.
+
+    Attributes
+    ----------
+    name : str
+        Its name in a sentence.
+    offset : complex
+        From the robot's center, m.
+    gap : float
+        From the robot's rim, m.
+    obstruction : str
+        What is between the robot and it; empty for nothing.
+    """
+
+    name: str
+    offset: complex
+    gap: float = math.inf
+    obstruction: str = ""
+
+    @property
+    def distance_text(self) -> str:
+        """Its distance, such as ``3.0 m away, behind an obstacle``."""
+        text = f"{format_length(abs(self.offset))} away"
+        return f"{text}, {self.obstruction}" if self.obstruction else text
+
+    @property
+    def position_text(self) -> str:
+        """Its name and relative position, such as ``robot 7, 80 cm west``."""
+        distance = format_length(abs(self.offset))
+        return f"{self.name}, {distance} {format_direction(self.offset)}".rstrip()
+
+    @property
+    def side_text(self) -> str:
+        """Its name and direction, such as ``the wall south of it``."""
+        return f"{self.name} {format_direction(self.offset)} of it" if self.offset else self.name
+
+
+class RobotSituation:
+    """Everything that the report on a robot is about; SI units.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        What all robots observed and decided.
+    team : Team
+        The team.
+    environment : Environment
+        The map, with failed robots as obstacles. The robot does not know it.
+    robot : int
+        Row of the robot.
+    numbers : sequence of int
+        Numbers of the robots.
+
+    Attributes
+    ----------
+    number : int
+        Number of the robot.
+    mass, radius, max_speed, max_acceleration, viscosity, sensing_range : float
+        Its properties.
+    position, velocity : complex
+        Position, m, and velocity, m/s.
+    goal : NearbyObject or None
+        Where it wants to go.
+    senses_obstacle : bool
+        Whether there is an obstacle in sensing range.
+    obstacle : NearbyObject or None
+        The obstacle that it senses, or touches.
+    neighbors : list of NearbyObject
+        Robots in communication range, the nearest first.
+    forces : dict of str to complex
+        Terms of the controller's force, N, and what they do not explain of it; empty if it is not finite.
+    drag : complex
+        Viscous force, N.
+    resultant : complex
+        Sum of all forces, N, without limits and contacts.
+    is_balanced : bool
+        Whether the resultant is too small to move the robot visibly from rest.
+    touched : list of NearbyObject
+        What it touches.
+    holding_names : str
+        Names of what it is pressed against; empty for nothing.
+    is_stuck : bool
+        Whether it is far from its goal, and something is in between.
+    """
+
+    def __init__(
+        self, snapshot: Snapshot, team: Team, environment: Environment, robot: int, numbers: Sequence[int]
+    ) -> None:
+        self.number = numbers[robot]
+        self.mass = float(team.mass[robot])
+        self.radius = float(team.radius[robot])
+        self.max_speed = float(team.max_speed[robot])
+        self.max_acceleration = float(team.max_acceleration[robot])
+        self.viscosity = float(team.viscosity[robot])
+        self.sensing_range = float(team.sensing_range[robot])
+        self.position = _get_vector(snapshot.positions, robot) or 0j
+        self.velocity = _get_vector(snapshot.velocities, robot) or 0j
+        self.goal = _build_goal(snapshot.decision, environment, self.position, robot)
+        sensed_point = _get_vector(snapshot.seen.obstacle_points, robot)
+        self.senses_obstacle = sensed_point is not None
+        self.obstacle = _build_obstacle(environment, self.position, sensed_point, self.radius)
+        self.neighbors = self._list_neighbors(snapshot, team, robot, numbers)
+        self.forces = _split_force(snapshot.decision, robot)
+        self.drag = -self.viscosity * self.velocity
+        self.resultant = sum(self.forces.values(), self.drag)
+        self.is_balanced = self._is_balanced()
+        self.touched = self._list_touched()
+        self.holding_names = "" if self.is_balanced else self._name_pressed_objects()
+        self.is_stuck = (
+            self.goal is not None and abs(self.goal.offset) > MIN_SHORTFALL_M and self.goal.obstruction != ""
+        )
+
+    @property
+    def speed(self) -> float:
+        """Speed, m/s."""
+        return abs(self.velocity)
+
+    def _list_neighbors(
+        self, snapshot: Snapshot, team: Team, robot: int, numbers: Sequence[int]
+    ) -> list[NearbyObject]:
+        neighbors: list[NearbyObject] = []
+        for other in snapshot.seen.neighbors.list_neighbors(robot).tolist():
+            offset = (_get_vector(snapshot.positions, other) or 0j) - self.position
+            gap = abs(offset) - self.radius - float(team.radius[other])
+            neighbors.append(NearbyObject(f"robot {numbers[other]}", offset, gap))
+        return sorted(neighbors, key=lambda neighbor: abs(neighbor.offset))
+
+    def _is_balanced(self) -> bool:
+        largest = max(map(abs, self.forces.values()), default=0.0)
+        negligible = max(_BALANCE_FRACTION * largest, _BALANCE_ACCELERATION * self.mass, MIN_FORCE_N)
+        return abs(self.resultant) <= negligible
+
+    def _list_touched(self) -> list[NearbyObject]:
+        nearby = [*([self.obstacle] if self.obstacle is not None else []), *self.neighbors]
+        return [item for item in nearby if item.gap <= MAX_CONTACT_GAP_M]
+
+    def _name_pressed_objects(self) -> str:
+        pressed = [item for item in self.touched if compute_alignment(self.resultant, item.offset) > 0.1]
+        return " and ".join(item.name for item in pressed)
+
+
+def compute_alignment(first: complex, second: complex) -> float:
+    """Return the cosine of the angle between two vectors; 0 if one of them is zero."""
+    size = abs(first) * abs(second)
+    return (first * second.conjugate()).real / size if size > 0.0 else 0.0
+
+
+def _get_vector(values: object, row: int) -> complex | None:
+    """Return one row of an array (n, 2); None if there is none, or it is not finite.
+
+    Controllers of users may give anything as a term.
+    """
+    try:
+        x, y = np.asarray(values, dtype=np.float64)[row].tolist()
+        is_usable = abs(x) < _MAX_VALUE and abs(y) < _MAX_VALUE
+    except (TypeError, ValueError, IndexError):
+        return None
+    return complex(x, y) if is_usable else None
+
+
+def _split_force(decision: Decision, robot: int) -> dict[str, complex]:
+    """Return the force of a controller by term, N; empty if it is not finite."""
+    total = _get_vector(decision.forces, robot)
+    if total is None:
+        return {}
+    terms: dict[str, complex] = {}
+    for name, values in decision.terms.items():
+        term = _get_vector(values, robot)
+        if term is not None and name not in _RESERVED_KINDS:
+            terms[name] = term
+    unexplained = total - sum(terms.values())
+    tolerance = 1e-6 + 1e-9 * max(map(abs, (total, *terms.values())))
+    if not terms or abs(unexplained) > tolerance:
+        terms[UNEXPLAINED_FORCE] = unexplained
+    return terms
+
+
+def _build_goal(
+    decision: Decision, environment: Environment, position: complex, robot: int
+) -> NearbyObject | None:
+    goal = _get_vector(decision.goals, robot)
+    if goal is None:
+        return None
+    is_centroid = decision.cells is not None and goal == _get_vector(decision.cells.centroid, robot)
+    name = "its centroid" if is_centroid else "its goal"
+    return NearbyObject(name, goal - position, obstruction=_find_obstruction(environment, position, goal))
+
+
+def _find_obstruction(environment: Environment, position: complex, goal: complex) -> str:
+    """Return what prevents a robot from going straight to its goal; empty for nothing."""
+    point = shapely.Point(goal.real, goal.imag)
+    if not environment.boundary_polygon.intersects(point):
+        return "outside the map"
+    if not environment.free.intersects(point):
+        return "inside an obstacle"
+    route = shapely.LineString([(position.real, position.imag), (goal.real, goal.imag)])
+    if shapely.difference(route, environment.free).length <= MAX_CONTACT_GAP_M:
+        return ""
+    if shapely.difference(route, environment.boundary_polygon).length > MAX_CONTACT_GAP_M:
+        return "behind the outer wall"
+    return "behind an obstacle"
+
+
+def _build_obstacle(
+    environment: Environment, position: complex, sensed_point: complex | None, radius: float
+) -> NearbyObject | None:
+    """Return the obstacle that a robot senses, else the one that it touches without sensing it."""
+    point = sensed_point
+    if point is None:
+        center = shapely.Point(position.real, position.imag)
+        shortest = shapely.shortest_line(center, environment.free.boundary)
+        if shortest is None or shortest.length > radius + MAX_CONTACT_GAP_M:
+            return None
+        point = _get_vector(shapely.get_coordinates(shortest), 1) or position
+    name = _name_obstacle(environment, point)
+    return NearbyObject(name, point - position, abs(point - position) - radius)
+
+
+def _name_obstacle(environment: Environment, position: complex) -> str:
+    """Return the name of what has a point on its rim."""
+    point = shapely.Point(position.real, position.imag)
+    name = "the obstacle"
+    nearest = MAX_CONTACT_GAP_M
+    for obstacle in environment.obstacles:
+        distance = float(obstacle.polygon.distance(point))
+        if distance < nearest:
+            nearest = distance
+            name = "the wall" if isinstance(obstacle, WallObstacle) else "the obstacle"
+    if environment.boundary_polygon.exterior.distance(point) < nearest:
+        return "the outer wall"
+    return name

@@ -1,0 +1,63 @@
+"""Lengths, forces, speeds and directions as text."""
+
+import math
+
+MIN_FORCE_N = 5e-4
+"""Smaller forces are written as 0 N, and have no arrow."""
+
+_DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+
+
+def format_direction(vector: complex) -> str:
+    """Return the nearest of eight directions of a plane vector, x + i y; empty for a zero vector.
+
+    >>> format_direction(1 + 1j)
+    'north-east'
+    """
+    if not vector:
+        return ""
+    return _DIRECTIONS[round(math.atan2(vector.imag, vector.real) / (math.pi / 4)) % 8]
+
+
+def format_number(value: float) -> str:
+    """Return a number that is not negative with about two digits.
+
+    >>> [format_number(value) for value in (0.001, 0.314, 2.44, 12.3, 1e9)]
+    ['0', '0.31', '2.4', '12', 'over a million']
+    """
+    if value >= 1e6:
+        return "over a million"
+    if value >= 9.95:
+        return f"{value:.0f}"
+    if value >= 0.995:
+        return f"{value:.1f}"
+    return f"{value:.2f}" if value >= 0.005 else "0"
+
+
+def format_length(meters: float) -> str:
+    """Return a length with a unit that suits it.
+
+    >>> [format_length(length) for length in (0.0042, 0.42, 2.44)]
+    ['4 mm', '42 cm', '2.4 m']
+    """
+    if meters < 0.00995:
+        return f"{1000 * max(meters, 0.0):.0f} mm"
+    if meters < 0.995:
+        return f"{100 * meters:.0f} cm"
+    return f"{format_number(meters)} m"
+
+
+def format_force(newtons: float) -> str:
+    """Return the magnitude of a force with a unit that suits it.
+
+    >>> [format_force(force) for force in (0.0042, 0.314)]
+    ['4 mN', '0.31 N']
+    """
+    if MIN_FORCE_N <= newtons < 0.00995:
+        return f"{1000 * newtons:.0f} mN"
+    return f"{format_number(newtons)} N"
+
+
+def format_robot_count(count: int) -> str:
+    """Return a number of robots."""
+    return f"{count} robot" if count == 1 else f"{count} robots"

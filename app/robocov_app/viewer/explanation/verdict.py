@@ -1,0 +1,115 @@
+"""The first sentence of the report on a robot, by its motion."""
+
+from robocov.metrics import SETTLED_DISTANCE_M
+from robocov_app.viewer.explanation.motion import Motion
+from robocov_app.viewer.explanation.situation import (
+    MIN_SHORTFALL_M,
+    NearbyObject,
+    RobotSituation,
+    compute_alignment,
+)
+from robocov_app.viewer.explanation.text import (
+    MIN_FORCE_N,
+    format_direction,
+    format_force,
+    format_length,
+    format_number,
+)
+
+MIN_AHEAD_ALIGNMENT = 0.7
+"""A robot heads for its goal if the cosine of the angle between the two is greater."""
+
+_SLIDING_ALIGNMENT = 0.95  # below it the force points away from the direction of motion
+_BRAKING_ALIGNMENT = -0.5
+
+
+def describe_motion(situation: RobotSituation, motion: Motion) -> str:
+    """Return what a robot does, and with respect to its goal, in one sentence."""
+    return _DESCRIPTIONS[motion](situation)
+
+
+def _describe_trembling(situation: RobotSituation) -> str:
+    text = "trembling in place"
+    return f"{text}, stuck: {_describe_goal(situation)}" if situation.is_stuck else text
+
+
+def _describe_moving(situation: RobotSituation) -> str:
+    pace = f"{format_number(situation.speed)} m/s {format_direction(situation.velocity)}"
+    alignment = compute_alignment(situation.velocity, situation.resultant)
+    if situation.holding_names and abs(alignment) < _SLIDING_ALIGNMENT:
+        return f"sliding {pace} along {situation.holding_names}"
+    if not situation.is_balanced and alignment < _BRAKING_ALIGNMENT:
+        return _append_goal(f"braking from {pace}", situation)
+    if _is_ahead(situation.goal, situation.velocity):
+        return f"moving {pace} to {_name(situation.goal)}"
+    return _append_goal(f"moving {pace}", situation)
+
+
+def _describe_starting(situation: RobotSituation) -> str:
+    text = f"setting off {format_direction(situation.resultant)}"
+    if _is_ahead(situation.goal, situation.resultant):
+        return f"{text} to {_name(situation.goal)}"
+    return text
+
+
+def _describe_rest(situation: RobotSituation) -> str:
+    goal = situation.goal
+    if situation.is_stuck:
+        return f"at rest, stuck: {_describe_goal(situation)}"
+    if not situation.is_balanced and not situation.holding_names:
+        return _describe_pushed(situation)
+    if goal is None:
+        return f"at rest, {_explain_rest(situation)}"
+    if abs(goal.offset) <= MIN_SHORTFALL_M:
+        return _describe_arrival(goal)
+    return f"at rest {format_length(abs(goal.offset))} short of {goal.name}: {_explain_rest(situation)}"
+
+
+def _describe_pushed(situation: RobotSituation) -> str:
+    """Return the sentence on a robot that has swayed too much to be setting off."""
+    size = format_force(abs(situation.resultant))
+    push = f"a force of {size} {format_direction(situation.resultant)} acts on it"
+    goal = situation.goal
+    if goal is None:
+        return push
+    return f"{format_length(abs(goal.offset))} from {goal.name}, not at rest: {push}"
+
+
+def _describe_arrival(goal: NearbyObject) -> str:
+    distance = abs(goal.offset)
+    place = "on" if distance <= SETTLED_DISTANCE_M else f"{format_length(distance)} from"
+    text = f"arrived: at rest {place} {goal.name}"
+    return f"{text}, which is {goal.obstruction}" if goal.obstruction else text
+
+
+def _explain_rest(situation: RobotSituation) -> str:
+    if situation.holding_names:
+        return f"held by {situation.holding_names}"
+    has_force = any(abs(force) >= MIN_FORCE_N for force in situation.forces.values())
+    return "the forces balance" if has_force else "no force acts on it"
+
+
+_DESCRIPTIONS = {
+    Motion.TREMBLING: _describe_trembling,
+    Motion.MOVING: _describe_moving,
+    Motion.STARTING: _describe_starting,
+    Motion.AT_REST: _describe_rest,
+}
+
+
+def _is_ahead(goal: NearbyObject | None, direction: complex) -> bool:
+    """Return whether the goal lies in a direction."""
+    return goal is not None and compute_alignment(direction, goal.offset) > MIN_AHEAD_ALIGNMENT
+
+
+def _name(goal: NearbyObject | None) -> str:
+    return "" if goal is None else goal.name
+
+
+def _describe_goal(situation: RobotSituation) -> str:
+    goal = situation.goal
+    return "" if goal is None else f"{goal.name} is {goal.distance_text}"
+
+
+def _append_goal(text: str, situation: RobotSituation) -> str:
+    return text if situation.goal is None else f"{text}, {_describe_goal(situation)}"

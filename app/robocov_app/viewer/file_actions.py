@@ -1,0 +1,177 @@
+"""Actions on files: maps, sessions and drafts of the viewer."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from robocov.errors import InputError
+from robocov.mapfile import list_bundled_maps, load_map, save_map
+from robocov_app.storage.autosave import Draft
+from robocov_app.storage.regular_files import require_regular_file
+from robocov_app.terminal.output import find_free_path
+from robocov_app.viewer.model import ViewerModel
+from robocov_app.viewer.session.file import SUFFIX, load_session
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.workspace import (
+    SessionWorkspace,
+    describe_draft,
+    find_recoverable_drafts,
+    recover_draft,
+)
+
+MAX_RECENT_FILES = 9
+
+
+class FileActions:
+    """Opens and saves maps and sessions.
+
+    Parameters
+    ----------
+    viewer : ViewerModel
+        The viewer.
+    folder : Path
+        Folder in which files are saved.
+    map_name : str
+        Bundled name or path of the open map.
+    draft_folder : Path or None
+        Folder for unsaved work; None to keep none.
+    file : Path or None
+        File of the open session.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder in which files are saved.
+    recent : list of str
+        Paths of the sessions used last, the newest first.
+    workspace : SessionWorkspace
+        File and drafts of the open session.
+    """
+
+    def __init__(
+        self,
+        viewer: ViewerModel,
+        folder: Path,
+        *,
+        map_name: str = "",
+        draft_folder: Path | None = None,
+        file: Path | None = None,
+    ) -> None:
+        self.folder = folder
+        self.recent: list[str] = []
+        self.workspace = SessionWorkspace(viewer.session, draft_folder, file)
+        self._viewer = viewer
+        self._draft_folder = draft_folder
+        self._map_names = {viewer.session.displayed.environment.name: map_name}
+
+    @property
+    def map_name(self) -> str:
+        """Bundled name or path of the present map, also after undo has led to another one."""
+        name = self._viewer.session.displayed.environment.name
+        return self._map_names.get(name, name)
+
+    @map_name.setter
+    def map_name(self, name: str) -> None:
+        self._map_names[self._viewer.session.displayed.environment.name] = name
+
+    @property
+    def view(self) -> dict[str, object]:
+        """What a session file says about the window."""
+        view = self._viewer.view
+        return {"shown": sorted(view.layers), "theme": view.theme, "map": self.map_name}
+
+    def list_maps(self) -> list[str]:
+        """Return the names of the maps that are offered."""
+        own = [self.map_name] if self.map_name else []
+        return list(dict.fromkeys([*list_bundled_maps(), *own]))
+
+    def open_map(self, name: str) -> None:
+        """Restart on another map.
+
+        Raises
+        ------
+        MapError
+            If it cannot be read.
+        StartError
+            If it has no space for the team.
+        """
+        self._viewer.session.restart(environment=load_map(name))
+        self.map_name = name
+
+    def open_next_map(self, steps: int) -> None:
+        """Restart on the next map that has space for the team, or on the previous one."""
+        names = self.list_maps()
+        index = names.index(self.map_name) if self.map_name in names else 0
+        too_small: list[str] = []
+        for k in range(1, len(names) + 1):
+            name = names[(index + steps * k) % len(names)]
+            with suppress(InputError):
+                self.open_map(name)
+                break
+            too_small.append(name)
+        else:
+            return
+        if too_small:
+            robots = self._viewer.session.timeline.scenario.robots
+            self._viewer.show_message(f"no space for {robots} robots: {', '.join(too_small)}")
+
+    def save_map(self) -> None:
+        """Save the map to a new file."""
+        target = find_free_path(self.folder, Path(self.map_name).stem or "map", ".json")
+        save_map(self._viewer.session.displayed.environment, target)
+        self.map_name = str(target)
+        self._viewer.show_message(f"map saved: {target}")
+
+    def list_sessions(self) -> list[str]:
+        """Return the paths of the session files in the folder."""
+        return sorted(str(path) for path in self.folder.glob(f"*{SUFFIX}"))
+
+    def save_session(self, path: Path | None = None) -> None:
+        """Save the session to a file, by default to its own or to a new one."""
+        saved = self.workspace.save(self.folder, self.view, path)
+        self._add_recent(saved)
+        self._viewer.show_message(f"session saved: {saved}")
+
+    def open_file(self, path: Path) -> None:
+        """Open a session or a map, whichever the file is."""
+        require_regular_file(path)
+        if path.suffix == SUFFIX:
+            self.open_session(path)
+        else:
+            self.open_map(str(path))
+            self._viewer.show_message(f"map opened: {path}")
+
+    def open_session(self, path: Path) -> None:
+        """Open a session file in place of the present session."""
+        saved = load_session(path, self._viewer.controllers)
+        workspace = SessionWorkspace(Session.open(saved), self._draft_folder, path)
+        self._replace_workspace(workspace, saved.view)
+        self._add_recent(path)
+        self._viewer.show_message(f"session opened: {path}")
+
+    def recover(self, draft: Draft | None = None) -> str:
+        """Resume unsaved work of an earlier window, by default the newest; return a message."""
+        if draft is None:
+            drafts = find_recoverable_drafts(self._draft_folder)
+            if not drafts:
+                return "no unsaved work was found"
+            draft = drafts[0]
+        workspace, view = recover_draft(draft, self._viewer.controllers, self._draft_folder)
+        self._replace_workspace(workspace, view)
+        return f"recovered: {describe_draft(draft)}"
+
+    def _add_recent(self, path: Path) -> None:
+        name = str(path.absolute())
+        others = [recent for recent in self.recent if recent != name]
+        self.recent = [name, *others][:MAX_RECENT_FILES]
+
+    def _replace_workspace(self, workspace: SessionWorkspace, view: Mapping[str, Any]) -> None:
+        self.workspace.close()
+        self.workspace = workspace
+        self._viewer.inspection.selected = None
+        self._viewer.show_session(workspace.session)
+        self.map_name = str(view.get("map") or self._viewer.session.displayed.environment.name)
+        layers = view.get("shown")
+        if isinstance(layers, list):
+            self._viewer.view.layers = set(map(str, layers))

@@ -1,0 +1,157 @@
+"""State that all actions of the viewer share: session, view, inspection, tools and the status message."""
+
+from collections.abc import Callable, Iterable
+
+from robocov.controllers import CONTROLLERS
+from robocov.environment import Environment
+from robocov.errors import RobocovError
+from robocov_app.toolkit.faults import describe_os_error
+from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.inspection import Inspection
+from robocov_app.viewer.session.document import Node
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.tools.tool import Tool
+from robocov_app.viewer.tools.toolbox import Toolbox
+from robocov_app.viewer.view import ViewState
+
+MESSAGE_S = 5.0  # a status message disappears after this time
+
+
+class ViewerModel:
+    """State of the viewer; knows no pygame.
+
+    Parameters
+    ----------
+    session : Session
+        The open session.
+    costs : Costs
+        Computes the coverage cost of its panes.
+    layers : set of str
+        Names of the visible layers.
+    controllers : iterable of str
+        Names of controllers to offer in addition to the built-in ones.
+
+    Attributes
+    ----------
+    view : ViewState
+        What the window shows.
+    inspection : Inspection
+        What the user inspects.
+    toolbox : Toolbox
+        The tools, and the one in use.
+    controllers : list of str
+        Names of the controllers that are offered.
+    revision : int
+        Grows whenever panel and canvas have to be drawn again.
+    message : str
+        Status message; empty after a few seconds.
+    has_error_message : bool
+        Whether the message reports an error.
+    now : float
+        Time since the window was opened, s.
+    settled_change : Node or None
+        Change after which the team has settled, even if it moves a little again.
+    """
+
+    def __init__(
+        self, session: Session, costs: Costs, layers: set[str], controllers: Iterable[str] = ()
+    ) -> None:
+        self.session = session
+        self.costs = costs
+        self.view = ViewState(layers)
+        self.inspection = Inspection()
+        self.toolbox = Toolbox(self.inspection)
+        self.controllers = list(dict.fromkeys([*CONTROLLERS, *controllers]))
+        self.revision = 0
+        self.message = ""
+        self.has_error_message = False
+        self.now = 0.0
+        self.settled_change: Node | None = None
+        self._message_time = 0.0
+        self._cost_map: Environment | None = None
+        self.update_cost_map()
+
+    @property
+    def tool(self) -> Tool:
+        """The tool in use."""
+        return self.toolbox.current
+
+    @property
+    def active_pane(self) -> int:
+        """Index of the pane whose controller and gains are edited."""
+        return min(self.inspection.active_pane, len(self.session.timeline.panes) - 1)
+
+    @property
+    def pane(self) -> Pane:
+        """The pane whose controller and gains are edited."""
+        return self.session.timeline.panes[self.active_pane]
+
+    @property
+    def robot_numbers(self) -> list[int]:
+        """Numbers of all robots, including those that failed."""
+        return self.session.displayed.get_setup(self.pane).all_numbers
+
+    @property
+    def selected_robot(self) -> int | None:
+        """Number of the selected robot, if it is still in the team."""
+        selected = self.inspection.selected
+        return selected if selected in self.robot_numbers else None
+
+    def show_message(self, text: str, *, is_error: bool = False) -> None:
+        """Show a status message; an empty one leaves the present message."""
+        if text:
+            self.message = text
+            self.has_error_message = is_error
+            self._message_time = self.now
+
+    def clear_message(self) -> None:
+        """Remove the status message."""
+        self.message = ""
+
+    def pass_time(self, seconds: float) -> None:
+        """Remove the status message once it has been shown long enough."""
+        self.now += seconds
+        if self.message and self.now - self._message_time > MESSAGE_S:
+            self.clear_message()
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Run an action; show the message that it returns, or its error."""
+        try:
+            message = action()
+        except RobocovError as error:
+            self.show_message(simplify_message(str(error)), is_error=True)
+        except OSError as error:
+            self.show_message(describe_os_error(error), is_error=True)
+        else:
+            if isinstance(message, str):
+                self.show_message(message)
+        self.revision += 1
+        self.update_cost_map()
+
+    def update_cost_map(self) -> None:
+        """Prepare the cost for the map if it has changed."""
+        environment = self.session.displayed.environment
+        # While the density is painted the cost would never be ready.
+        if environment is not self._cost_map and not self.tool.is_painting:
+            self._cost_map = environment
+            self.costs.set_environment(environment)
+
+    def show_session(self, session: Session) -> None:
+        """Replace the session that is shown."""
+        session.playback.clock.budget = self.session.playback.clock.budget
+        session.timeline.past_version = (
+            max(session.timeline.past_version, self.session.timeline.past_version) + 1
+        )
+        self.session = session
+        self.revision += 1
+        self.update_cost_map()
+
+
+def simplify_message(message: str) -> str:
+    """Return a message without the names of places in files, which mean nothing in a window.
+
+    >>> simplify_message("team.max_speed: expected a number, got 0 m/s")
+    'max_speed: expected a number, got 0 m/s'
+    """
+    return message.removeprefix("team.").removeprefix("obstacles: ")

@@ -1,0 +1,150 @@
+"""Actions on time: play, speed, restart, looking back, branches."""
+
+from robocov_app.viewer.model import ViewerModel
+from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
+
+
+class PlaybackActions:
+    """Plays the session, restarts it and goes to other times.
+
+    Parameters
+    ----------
+    viewer : ViewerModel
+        The viewer.
+    """
+
+    def __init__(self, viewer: ViewerModel) -> None:
+        self._viewer = viewer
+
+    def toggle_pause(self) -> None:
+        """Play or pause."""
+        session = self._viewer.session
+        session.playback.is_playing = not session.playback.is_playing
+        session.playback.stop_when_settled = False
+
+    def step(self) -> None:
+        """Simulate a single step."""
+        self._viewer.session.playback.step()
+
+    def toggle_settling(self) -> None:
+        """Play until the team has settled; a second call plays on."""
+        session = self._viewer.session
+        session.playback.stop_when_settled = not session.playback.stop_when_settled
+        if session.playback.stop_when_settled:
+            session.playback.is_playing = True
+            session.timeline.is_settled = False
+            self._viewer.show_message("plays until the team has settled")
+
+    def restart(
+        self, *, robots: int | None = None, start: str | None = None, seed: int | None = None
+    ) -> None:
+        """Restart at time 0, with another number of robots, start or seed if they are given."""
+        self._viewer.session.restart(robots=robots, start=start, seed=seed)
+
+    def restart_with_next_seed(self) -> None:
+        """Restart from other starting positions."""
+        self.restart(seed=self._viewer.session.timeline.scenario.seed + 1)
+
+    def restart_with_more_robots(self, count: int) -> None:
+        """Restart with more robots, or with fewer if `count` is negative."""
+        self.restart(robots=len(self._viewer.robot_numbers) + count)
+
+    def list_starts(self) -> list[str]:
+        """Return the names of the starts of the map."""
+        return list(dict.fromkeys([*self._viewer.session.displayed.environment.starts, "uniform"]))
+
+    def restart_at_next_start(self) -> None:
+        """Restart from the next start of the map."""
+        # An obstacle may have covered the present one.
+        self.restart(start=find_next(self.list_starts(), self._viewer.session.timeline.scenario.start_name))
+
+    def change_speed(self, steps: int) -> None:
+        """Choose a faster or a slower speed of the list."""
+        index = find_speed_index(self._viewer.session.playback.clock.speed) + steps
+        self.set_speed(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
+
+    def set_speed(self, speed: float) -> None:
+        """Set the speed as a multiple of real time; infinite for as fast as possible."""
+        self._viewer.session.playback.clock.speed = speed
+        self._viewer.show_message(f"speed {format_speed(speed)}")
+
+    def look_by(self, steps: int) -> None:
+        """Pause, and show an earlier or a later step."""
+        self._viewer.session.playback.is_playing = False
+        self._viewer.session.show_offset(steps)
+
+    def look_at(self, time: float) -> None:
+        """Pause, and show a time, s."""
+        self._viewer.session.playback.is_playing = False
+        self._viewer.session.show_time(time)
+
+    def look_by_seconds(self, seconds: float) -> None:
+        """Pause, and show an earlier or a later time."""
+        self.look_at(self._viewer.session.displayed.time + seconds)
+
+    def look_at_present(self) -> None:
+        """Show the present."""
+        session = self._viewer.session
+        session.show_time(session.timeline.end_time)
+
+    def branch(self) -> None:
+        """Continue from the displayed step; what came after it stays as a branch."""
+        session = self._viewer.session
+        if session.branch():
+            session.playback.is_playing = True
+            self._viewer.show_message("continues from here; what came after stays as a ghost curve")
+        else:
+            self._viewer.show_message("this is the present: go back first (←, or drag the time line)")
+
+    def list_branch_names(self) -> list[str]:
+        """Return the numbers of the branches as text, from 1."""
+        return [
+            str(number + 1) for number in range(len(self._viewer.session.timeline.document.list_branches()))
+        ]
+
+    def enter_branch(self, name: str) -> None:
+        """Go to the end of a branch, by its number as text."""
+        session = self._viewer.session
+        session.seek(session.timeline.document.find_branch(name).node)
+
+    def enter_next_branch(self, steps: int) -> None:
+        """Go to the end of the next branch, or of another one in the list."""
+        session = self._viewer.session
+        ends = [branch.node for branch in session.timeline.document.list_branches()]
+        index = ends.index(session.timeline.head) if session.timeline.head in ends else -1
+        self.enter_node(ends[(index + steps) % len(ends)].number)
+
+    def enter_node(self, number: int) -> None:
+        """Go to the end of the branch that ends at a node of the session's history."""
+        session = self._viewer.session
+        branches = session.timeline.document.list_branches()
+        index = [branch.node.number for branch in branches].index(number)
+        session.seek(branches[index].node)
+        self._viewer.show_message(f"branch {index + 1} of {len(branches)}: {branches[index].description}")
+
+    def undo(self) -> None:
+        """Undo the last change."""
+        session = self._viewer.session
+        description = session.undo()
+        if description:
+            self._viewer.show_message(f"undone: {description}; back at {session.displayed.time:.1f} s")
+        elif session.timeline.document.nodes[1:]:
+            self._viewer.show_message("nothing to undo; Alt ← leads to other branches")
+        else:
+            self._viewer.show_message("nothing to undo")
+
+    def redo(self) -> None:
+        """Redo the change undone last."""
+        description = self._viewer.session.redo()
+        self._viewer.show_message(f"redone: {description}" if description else "nothing to redo")
+
+
+def find_next(names: list[str], name: str) -> str:
+    """Return the name that follows another one in a list, or the first.
+
+    >>> find_next(["a", "b"], "b")
+    'a'
+    """
+    if name not in names:
+        return names[0]
+    return names[(names.index(name) + 1) % len(names)]

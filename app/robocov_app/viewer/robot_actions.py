@@ -1,0 +1,54 @@
+"""Actions on single robots: select, fail, revive, remove."""
+
+from robocov.errors import ParameterError
+from robocov_app.viewer.model import ViewerModel
+from robocov_app.viewer.session.session import toggle_failure
+
+
+class RobotActions:
+    """Selects robots and changes the selected one.
+
+    Parameters
+    ----------
+    viewer : ViewerModel
+        The viewer.
+    """
+
+    def __init__(self, viewer: ViewerModel) -> None:
+        self._viewer = viewer
+
+    def select(self, number: int) -> None:
+        """Select a robot to inspect it.
+
+        Raises
+        ------
+        ParameterError
+            If there is no robot with that number.
+        """
+        if number not in self._viewer.robot_numbers:
+            raise ParameterError(f"there is no robot {number}")
+        self._viewer.inspection.selected = number
+
+    def select_next(self, steps: int) -> None:
+        """Select the next robot, or another one in the order of their numbers."""
+        numbers = self._viewer.robot_numbers
+        selected = self._viewer.selected_robot
+        if selected is not None:
+            index = numbers.index(selected)
+        else:
+            index = -1 if steps > 0 else 0
+        self._viewer.inspection.selected = numbers[(index + steps) % len(numbers)]
+
+    def fail_or_revive(self) -> None:
+        """Let the selected robot fail, or revive it."""
+        toggle_failure(self._viewer.session, self._require_selected())
+
+    def remove(self) -> None:
+        """Remove the selected robot from the team."""
+        self._viewer.session.remove_robot(self._require_selected())
+
+    def _require_selected(self) -> int:
+        selected = self._viewer.selected_robot
+        if selected is None:
+            raise ParameterError("no robot is selected: click one first, or press Tab")
+        return selected

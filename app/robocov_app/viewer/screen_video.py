@@ -1,0 +1,132 @@
+"""A video of the window while it is used: encoded in another process, and readable even after a crash."""
+
+import queue
+import threading
+from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
+
+import numpy as np
+import pygame
+
+from robocov.errors import OutputError
+from robocov_app.runs.encoding import Frame, build_encoder_command
+
+VIDEO_FPS = 30
+MAX_WAITING_FRAMES = 45  # while more wait for the encoder, new frames are left out
+
+
+class ScreenVideo:
+    """Writes what a window shows to an MP4 video.
+
+    The encoder is a process of its own, which completes the video when its input ends, for whatever reason.
+
+    Parameters
+    ----------
+    path : Path
+        The video; it must not exist.
+    size : tuple of int
+        Width and height of the window, px. Frames of other sizes are fitted in.
+    waits : bool
+        Whether to wait for the encoder instead of leaving frames out.
+
+    Attributes
+    ----------
+    path : Path
+        The video.
+    frame_count : int
+        Number of frames written.
+    skipped_count : int
+        Number of frames left out.
+
+    Raises
+    ------
+    OutputError
+        If there is no encoder, the folder cannot be made, or the file exists.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int], *, waits: bool = False) -> None:
+        self.path = path
+        self.frame_count = 0
+        self.skipped_count = 0
+        self._waits = waits
+        self._size = (_make_even(size[0]), _make_even(size[1]))
+        self._due_frames = 0.0
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            command = build_encoder_command(path, self._size, VIDEO_FPS, streamed=True)
+            # Create a new file, so that nothing is written through a link.
+            path.open("xb").close()
+            self._process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        self._queue: queue.Queue[bytes | None] = queue.Queue(MAX_WAITING_FRAMES)
+        self._thread = threading.Thread(target=self._write, daemon=True)
+        self._thread.start()
+
+    @property
+    def duration(self) -> float:
+        """Duration of the video, s."""
+        return self.frame_count / VIDEO_FPS
+
+    def add(self, screen: pygame.Surface, seconds: float) -> None:
+        """Add what the window has shown for some time, s."""
+        self._due_frames += seconds * VIDEO_FPS
+        count = int(self._due_frames + 1e-6)
+        self._due_frames -= count
+        if count <= 0:
+            return
+        data = self._fit(screen)
+        for _ in range(min(count, VIDEO_FPS)):
+            try:
+                self._queue.put(data, block=self._waits)
+                self.frame_count += 1
+            except queue.Full:
+                self.skipped_count += 1
+
+    def close(self) -> None:
+        """Complete the video.
+
+        Raises
+        ------
+        OutputError
+            If the encoder has failed.
+        """
+        self._queue.put(None)
+        self._thread.join()
+        if self._process.wait() != 0:
+            raise OutputError(f"{self.path}: the video encoder failed")
+
+    def _fit(self, screen: pygame.Surface) -> bytes:
+        """Return the pixels of a window, scaled to the size of the video if it has been resized."""
+        width, height = screen.get_size()
+        if (_make_even(width), _make_even(height)) == self._size:
+            screen = screen.subsurface(pygame.Rect(0, 0, *self._size))
+        else:
+            factor = min(self._size[0] / width, self._size[1] / height)
+            small = pygame.transform.smoothscale(screen, (int(width * factor), int(height * factor)))
+            screen = pygame.Surface(self._size, 0, 32)
+            screen.blit(small, small.get_rect(center=screen.get_rect().center))
+        return pygame.image.tobytes(screen, "RGB")
+
+    def _write(self) -> None:
+        assert self._process.stdin is not None
+        try:
+            while (data := self._queue.get()) is not None:
+                self._process.stdin.write(data)
+            self._process.stdin.close()
+        except OSError:
+            # The encoder is gone. Empty the queue, so that `add` and `close` do not wait forever.
+            while self._queue.get() is not None:
+                pass
+
+
+def _make_even(length: int) -> int:
+    """Return a length that encoders accept."""
+    return length // 2 * 2
+
+
+def copy_pixels(screen: pygame.Surface) -> Frame:
+    """Return the pixels of a surface, (height, width, 3)."""
+    width, height = screen.get_size()
+    data = pygame.image.tobytes(screen, "RGB")
+    return np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)

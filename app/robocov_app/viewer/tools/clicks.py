@@ -1,0 +1,58 @@
+"""Tools that act on what is clicked: delete, add a robot, let a robot fail."""
+
+from robocov.environment import Point
+from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.session import Session, toggle_failure
+from robocov_app.viewer.tools.tool import Tool, change_map
+
+ERASE_REACH_FRACTION = 0.5  # of a finger's width: obstacles this close to the cursor are deleted
+
+
+class EraserTool(Tool):
+    """Deletes robots and obstacles."""
+
+    name = "eraser"
+    title = "Delete"
+    key = "x"
+    hint = "click an obstacle or a robot to delete it"
+    takes_robots = True
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Delete the robot, else the obstacle under the cursor."""
+        if number is not None:
+            session.remove_robot(number)
+            return f"robot {number} removed"
+        index = map_edits.find_obstacle(session.displayed.environment, point, ERASE_REACH_FRACTION * reach)
+        if index is None:
+            return None
+        obstacle = session.displayed.environment.obstacles[index]
+        environment = map_edits.replace_obstacles(session.displayed.environment, index, 1)
+        return change_map(session, environment, f"{map_edits.describe_obstacle(obstacle)} deleted")
+
+
+class AddRobotTool(Tool):
+    """Adds robots to the team."""
+
+    name = "robot"
+    title = "Add robot"
+    button_text = "Add"
+    key = "a"
+    hint = "click where a robot should join"
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Add a robot at the cursor, or as close to it as there is space."""
+        return f"robot {session.add_robot(point)} joined"
+
+
+class FailureTool(Tool):
+    """Lets robots fail, and revives them."""
+
+    name = "failure"
+    title = "Failure"
+    key = "d"
+    hint = "click a robot to make it fail; click it again to revive it"
+    takes_robots = True
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Let the robot under the cursor fail, or revive it."""
+        return None if number is None else toggle_failure(session, number)

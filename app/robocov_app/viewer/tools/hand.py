@@ -1,0 +1,122 @@
+"""The hand: drags and throws robots, moves obstacles, selects robots to inspect."""
+
+from dataclasses import dataclass
+from math import dist
+
+import numpy as np
+
+from robocov.environment import Obstacle, Point
+from robocov_app.viewer.inspection import Inspection
+from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.tools.tool import Preview, Tool, change_map
+
+MIN_DRAG_M = 0.02  # a shorter move is part of a click
+_MIN_SHIFT_M = 1e-3  # an obstacle that moves less stays where it is
+
+
+@dataclass
+class HandTool(Tool):
+    """Drags and throws robots, and moves obstacles.
+
+    Attributes
+    ----------
+    inspection : Inspection
+        What is selected: a press on a robot selects it.
+    robot : int or None
+        Number of the robot that is held.
+    obstacle : int or None
+        Index of the obstacle that is held.
+    """
+
+    name = "hand"
+    title = "Hand"
+    key = "v"
+    hint = "drag a robot or an obstacle; click a robot to inspect it; drag the floor to pan"
+    takes_robots = True
+
+    inspection: Inspection
+    robot: int | None = None
+    obstacle: int | None = None
+    _pressed_at: Point = (0.0, 0.0)
+    _cursor: Point = (0.0, 0.0)
+    _obstacles: tuple[Obstacle, ...] = ()  # of the map when the button was pressed
+    _drags: bool = False
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Take hold of the robot or the obstacle under the cursor."""
+        self._pressed_at = point
+        self._cursor = point
+        self._drags = False
+        self._obstacles = session.displayed.environment.obstacles
+        self.robot = number
+        self.obstacle = None
+        if number is None:
+            self.obstacle = map_edits.find_obstacle(session.displayed.environment, point)
+        else:
+            self.inspection.selected = number
+        return None
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether a robot or an obstacle is held."""
+        return self.robot is not None or self.obstacle is not None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Drag the robot that is held; obstacles follow when the button is released."""
+        self._cursor = point
+        if dist(self._pressed_at, point) > MIN_DRAG_M:
+            self._drags = True
+        if self.robot is None or not self._drags:
+            return
+        # The robot may have been removed since it was pressed.
+        if self.robot in session.displayed.get_setup(session.timeline.panes[0]).all_numbers:
+            session.drag_robot(self.robot, point)
+
+    def release(self, session: Session, point: Point) -> str | None:
+        """Let go of the robot or the obstacle."""
+        self._cursor = point
+        index = self.obstacle
+        moved = self._move_obstacle(session)
+        if self.robot is not None:
+            session.release()
+        self.robot = None
+        self.obstacle = None
+        if moved is None or index is None:
+            return None
+        environment = map_edits.replace_obstacles(session.displayed.environment, index, 1, [moved])
+        return change_map(session, environment, f"{map_edits.describe_obstacle(moved)} moved")
+
+    def cancel(self, session: Session) -> bool:
+        """Let go of what is held, else clear the selection."""
+        if not self.is_holding:
+            had_selection = self.inspection.selected is not None
+            self.inspection.selected = None
+            return had_selection
+        self.robot = None
+        self.obstacle = None
+        session.release()
+        return True
+
+    def build_preview(self, session: Session) -> Preview | None:
+        """Return the obstacle that is held, at its new position."""
+        moved = self._move_obstacle(session)
+        if moved is None:
+            return None
+        line = (self._pressed_at, self._cursor)
+        return Preview(line, obstacle=moved, label=f"{dist(*line):.2f} m")
+
+    def _move_obstacle(self, session: Session) -> Obstacle | None:
+        """Return the obstacle that is held, moved with the cursor; None if it stays where it is."""
+        index = self.obstacle
+        if index is None:
+            return None
+        present = session.displayed.environment.obstacles
+        # The map may have been changed since the press.
+        if present[index : index + 1] != self._obstacles[index : index + 1]:
+            return None
+        dx = self._cursor[0] - self._pressed_at[0]
+        dy = self._cursor[1] - self._pressed_at[1]
+        if np.hypot(dx, dy) < _MIN_SHIFT_M:
+            return None
+        return map_edits.move_obstacle(present[index], dx, dy)

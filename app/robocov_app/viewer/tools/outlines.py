@@ -1,0 +1,177 @@
+"""Tools that draw obstacles point by point: polygons and walls."""
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import dist
+
+import numpy as np
+
+from robocov.environment import Point, WallObstacle
+from robocov.errors import RobocovError
+from robocov_app.toolkit.draw_tools import SAME, Outline
+from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.tools.snapping import SNAP_REACH_FRACTION, snap_point
+from robocov_app.viewer.tools.tool import Preview, Tool, add_obstacle
+
+DEFAULT_WALL_WIDTH_M = 0.1
+MIN_WALL_WIDTH_M = 0.02
+MAX_WALL_WIDTH_M = 5.0
+WALL_END_FRACTION = 0.3  # of a finger's width: a press this close to the last point ends a wall
+
+
+@dataclass
+class SnappedOutline:
+    """Points that are drawn one by one and snap to the map.
+
+    Attributes
+    ----------
+    outline : Outline
+        The points so far.
+    end_fraction : float
+        Fraction of a finger's width from the last point within which a press completes the outline.
+    """
+
+    outline: Outline
+    end_fraction: float = 0.0
+    _reach: float = 0.0
+
+    def press(self, session: Session, point: Point, reach: float) -> bool:
+        """Add a point; return whether that completes the outline."""
+        self._reach = reach
+        same_point = max(SAME, self.end_fraction * reach)
+        return self.outline.press(self._snap(session, point), point, reach, same_point)
+
+    def move(self, session: Session, point: Point) -> None:
+        """Move the end of the line that follows the cursor."""
+        self.outline.at = self._snap(session, point) if self.outline.points else point
+
+    def release(self, session: Session, point: Point) -> bool:
+        """End a drag; return whether that completes the outline."""
+        is_complete = self.outline.release(self._snap(session, point), point, self._reach)
+        if is_complete:
+            self.outline.points.append(self.outline.at)
+        return is_complete
+
+    def take_points(self) -> list[Point]:
+        """Return the points, and start over."""
+        return self.outline.take()
+
+    def cancel(self) -> bool:
+        """Drop the points; return whether there were any."""
+        return self.outline.cancel()
+
+    def build_preview(self) -> Preview | None:
+        """Return the line up to the cursor, with the length of its last edge."""
+        if not self.outline.points:
+            return None
+        line = (*self.outline.points, self.outline.at)
+        return Preview(line, is_closed=len(line) > 2, label=f"{dist(line[-2], line[-1]):.2f} m")
+
+    def _snap(self, session: Session, point: Point) -> Point:
+        return snap_point(session.displayed.environment, point, SNAP_REACH_FRACTION * self._reach)
+
+
+@dataclass
+class AddPolygonTool(Tool):
+    """Draws a polygon corner by corner."""
+
+    name = "polygon"
+    title = "Polygon"
+    key = "p"
+    hint = "click the corners; Enter, a double click or a click on the first corner closes it"
+    ends_on_double_click = True
+
+    drawing: SnappedOutline = field(
+        default_factory=lambda: SnappedOutline(Outline(least=3, closes=True)), repr=False
+    )
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Add a corner, or close the polygon."""
+        return self.finish(session) if self.drawing.press(session, point, reach) else None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Move the edge that follows the cursor."""
+        self.drawing.move(session, point)
+
+    def release(self, session: Session, point: Point) -> str | None:
+        """End a drag."""
+        return self.finish(session) if self.drawing.release(session, point) else None
+
+    def finish(self, session: Session) -> str | None:
+        """Add the polygon to the map."""
+        corners = self.drawing.take_points()
+        if not corners:
+            return None
+        return add_obstacle(session, map_edits.build_polygon(corners), self.name)
+
+    def cancel(self, session: Session) -> bool:
+        """Drop the corners."""
+        return self.drawing.cancel()
+
+    def build_preview(self, session: Session) -> Preview | None:
+        """Return the outline so far."""
+        return self.drawing.build_preview()
+
+
+@dataclass
+class AddWallTool(Tool):
+    """Draws a wall point by point, or with a single drag.
+
+    Attributes
+    ----------
+    width : float
+        Width of new walls, m.
+    """
+
+    name = "wall"
+    title = "Wall"
+    key = "w"
+    hint = "drag, or click its points; Enter or a double click ends it; [ and ] change its width"
+    ends_on_double_click = True
+    is_resizable = True
+
+    drawing: SnappedOutline = field(
+        default_factory=lambda: SnappedOutline(Outline(drags=True), WALL_END_FRACTION), repr=False
+    )
+    width: float = DEFAULT_WALL_WIDTH_M
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Add a point, or end the wall."""
+        return self.finish(session) if self.drawing.press(session, point, reach) else None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Move the end that follows the cursor."""
+        self.drawing.move(session, point)
+
+    def release(self, session: Session, point: Point) -> str | None:
+        """End a drag."""
+        return self.finish(session) if self.drawing.release(session, point) else None
+
+    def finish(self, session: Session) -> str | None:
+        """Add the wall to the map."""
+        points = self.drawing.take_points()
+        if not points:
+            return None
+        return add_obstacle(session, map_edits.build_wall(points, self.width), self.name)
+
+    def cancel(self, session: Session) -> bool:
+        """Drop the points."""
+        return self.drawing.cancel()
+
+    def build_preview(self, session: Session) -> Preview | None:
+        """Return the wall so far."""
+        outline = self.drawing.build_preview()
+        if outline is None:
+            return None
+        wall: WallObstacle | None = None
+        # Two points in the same position are no wall yet.
+        with suppress(RobocovError):
+            wall = map_edits.build_wall(list(outline.line), self.width)
+        return Preview(outline.line, obstacle=wall, label=f"{outline.label}, {self.width:g} m wide")
+
+    def resize(self, session: Session, factor: float) -> str:
+        """Multiply the width of new walls by a factor."""
+        width = round(self.width * factor, 3)
+        self.width = float(np.clip(width, MIN_WALL_WIDTH_M, MAX_WALL_WIDTH_M))
+        return f"new walls are {self.width:g} m wide"

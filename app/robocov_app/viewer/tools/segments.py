@@ -1,0 +1,138 @@
+"""Tools that drag from one point to another: the ruler, and circles from their center."""
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import dist
+
+import numpy as np
+
+from robocov.environment import CircleObstacle, Point
+from robocov.errors import RobocovError
+from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.tools.tool import Preview, Tool, add_obstacle
+
+
+@dataclass
+class DraggedSegment:
+    """Segment from the point where the button was pressed to the cursor.
+
+    Attributes
+    ----------
+    start : Point or None
+        Where the button was pressed, m; None before that.
+    end : Point
+        Where the cursor was last while the button was held, m.
+    is_pressed : bool
+        Whether the button is held down.
+    """
+
+    start: Point | None = None
+    end: Point = (0.0, 0.0)
+    is_pressed: bool = False
+
+    def press(self, point: Point) -> None:
+        """Start a new segment."""
+        self.start = point
+        self.end = point
+        self.is_pressed = True
+
+    def move(self, point: Point) -> None:
+        """Drag its end while the button is held down."""
+        if self.is_pressed:
+            self.end = point
+
+    def release(self) -> None:
+        """Keep the segment as it is."""
+        self.is_pressed = False
+
+    def clear(self) -> bool:
+        """Drop the segment; return whether there was one."""
+        was_drawn = self.start is not None
+        self.start = None
+        return was_drawn
+
+
+@dataclass
+class RulerTool(Tool):
+    """Measures the distance between two points."""
+
+    name = "ruler"
+    title = "Ruler"
+    key = "m"
+    hint = "drag from one point to another"
+
+    segment: DraggedSegment = field(default_factory=DraggedSegment, repr=False)
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Start measuring."""
+        self.segment.press(point)
+        return None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Measure up to the cursor."""
+        self.segment.move(point)
+
+    def release(self, session: Session, point: Point) -> str | None:
+        """Keep the measurement."""
+        self.segment.release()
+        return None
+
+    def cancel(self, session: Session) -> bool:
+        """Remove the measurement."""
+        return self.segment.clear()
+
+    def build_preview(self, session: Session) -> Preview | None:
+        """Return the segment with its length and its components."""
+        start = self.segment.start
+        if start is None:
+            return None
+        end = self.segment.end
+        dx = end[0] - start[0]
+        dy = end[1] - start[1]
+        return Preview((start, end), label=f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
+
+
+@dataclass
+class AddCircleTool(Tool):
+    """Draws a round pillar from its center."""
+
+    name = "circle"
+    title = "Circle"
+    key = "c"
+    hint = "drag from the center to the rim"
+
+    segment: DraggedSegment = field(default_factory=DraggedSegment, repr=False)
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Put the center."""
+        self.segment.press(point)
+        return None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Drag the rim to the cursor."""
+        self.segment.move(point)
+
+    def release(self, session: Session, point: Point) -> str | None:
+        """Add the circle to the map."""
+        center = self.segment.start
+        self.segment.clear()
+        if center is None:
+            return None
+        return add_obstacle(session, map_edits.build_circle(center, point), self.name)
+
+    def cancel(self, session: Session) -> bool:
+        """Drop the circle."""
+        return self.segment.clear()
+
+    def build_preview(self, session: Session) -> Preview | None:
+        """Return the circle so far."""
+        center = self.segment.start
+        if center is None:
+            return None
+        rim = self.segment.end
+        circle: CircleObstacle | None = None
+        # A circle without a radius is no obstacle yet.
+        with suppress(RobocovError):
+            circle = map_edits.build_circle(center, rim)
+        return Preview((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")

@@ -1,0 +1,57 @@
+"""What the window shows, whatever the session is: layers, theme, panel, options of the picture."""
+
+from dataclasses import dataclass
+
+FADE_S = 12.0  # length of path that fading trajectories show
+
+
+@dataclass
+class ViewState:
+    """What the window shows.
+
+    Attributes
+    ----------
+    layers : set of str
+        Names of the visible layers.
+    theme : str
+        ``light`` or ``dark``.
+    has_panel : bool
+        Whether the panel is visible.
+    fades_trajectories : bool
+        Whether trajectories show only the last `FADE_S` seconds.
+    has_suggestions : bool
+        Whether the window suggests what to try once the team has settled.
+    is_recording : bool
+        Whether a video of the window is being recorded.
+    """
+
+    layers: set[str]
+    theme: str = "light"
+    has_panel: bool = True
+    fades_trajectories: bool = False
+    has_suggestions: bool = True
+    is_recording: bool = False
+
+    def toggle_layer(self, name: str) -> None:
+        """Show or hide a layer."""
+        self.layers ^= {name}
+
+    def toggle_theme(self) -> None:
+        """Switch between the light and the dark theme."""
+        self.theme = "dark" if self.theme == "light" else "light"
+
+    def toggle_fading(self) -> str:
+        """Show all of the trajectories, or the last seconds; return a message."""
+        self.fades_trajectories = not self.fades_trajectories
+        if self.fades_trajectories:
+            return f"trajectories show the last {FADE_S:g} s"
+        return "trajectories stay"
+
+    def toggle_suggestions(self) -> str:
+        """Switch suggestions on or off; return a message."""
+        self.has_suggestions = not self.has_suggestions
+        return "suggestions on" if self.has_suggestions else "suggestions off"
+
+    def toggle_panel(self) -> None:
+        """Show or hide the panel."""
+        self.has_panel = not self.has_panel
