@@ -19,7 +19,7 @@ def driver(tmp_path: Path) -> Iterator[Driver]:
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
+def short_history(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the past be thinned soon."""
     monkeypatch.setattr(history, "MIN_STATES", 20)
     monkeypatch.setattr(present, "RunHistory", lambda dt: history.RunHistory(dt, 60_000))

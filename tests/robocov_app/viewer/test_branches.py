@@ -38,7 +38,7 @@ def test_a_branch_without_edits_is_the_same_bit_for_bit(controllers):
         np.testing.assert_array_equal(positions, before)
 
 
-def test_a_branch_from_a_thinned_past_is_the_same_bit_for_bit(short):
+def test_a_branch_from_a_thinned_past_is_the_same_bit_for_bit(short_history):
     session = advance_session(start_session(RAPF, LLOYD, robots=4), 100)
     circle = CircleObstacle((3.2, 2.2), 0.3)
     session.edit_map(replace(HALL, obstacles=(*HALL.obstacles, circle)), "circle drawn")
