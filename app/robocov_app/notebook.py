@@ -30,7 +30,7 @@ from robocov.text import escape_controls
 from robocov_app.figures.files import figure_png
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.render.camera import length_label, round_length
+from robocov_app.render.camera import format_scale_length, round_length
 from robocov_app.render.density import mean_label
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.report.pictures import Frame, map_picture
@@ -320,7 +320,7 @@ def environment_html(environment: Environment) -> str:
         f"<figcaption><b>{escape(environment.name)}</b> {escape(facts)}</figcaption>"
         f"{map_picture(environment, *_MAX_MAP_SIZE_PX)}"
         f'<div class="robocov-scale"><i style="margin-left:{left:.2f}%;width:{right - left:.2f}%"></i>'
-        f"{length_label(bar_length)}</div>"
+        f"{format_scale_length(bar_length)}</div>"
         f"</figure>"
     )
 

@@ -16,7 +16,7 @@ from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
-from robocov_app.render.camera import length_label, round_length
+from robocov_app.render.camera import format_scale_length, round_length
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
@@ -213,8 +213,8 @@ class Page:
             (a, b), (c, d) = self.at(x1, y - half), self.at(x2, y + half)
             self.figure.add_artist(Line2D([a, c], [b, d], color=tone(self.theme.ink), linewidth=1.3))
         words = right + 8 * self.scale
-        self.text(length_label(length), words, y, points=SMALL, bold=True)
-        return words + self.text_width(length_label(length), points=SMALL, bold=True)
+        self.text(format_scale_length(length), words, y, points=SMALL, bold=True)
+        return words + self.text_width(format_scale_length(length), points=SMALL, bold=True)
 
     def _legend_extent(self, handles: Sequence[Artist], begin: float) -> tuple[int, float, float]:
         """Return columns in which the legend fits the page in the fewest rows, and its width and height."""

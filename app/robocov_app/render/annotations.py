@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import Theme
-from robocov_app.render.camera import Camera, length_label, round_length
+from robocov_app.render.camera import Camera, format_scale_length, round_length
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.fonts import shortened, text_width
 from robocov_app.render.scene import Scene
@@ -45,7 +45,7 @@ def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
         canvas.surface.fill(ink, (round(x - width / 2), round(y - tick), width, round(2 * tick)))
     canvas.surface.fill(ink, (round(left), round(y - width / 2), round(pixels), width))
     space = pixels + 8 * canvas.scale
-    return space + canvas.text(length_label(length), (left + space, y), bold=True)
+    return space + canvas.text(format_scale_length(length), (left + space, y), bold=True)
 
 
 def bar_length(canvas: Canvas) -> float:
@@ -72,7 +72,7 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
 def draw_status(canvas: Canvas, scene: Scene) -> None:
     bar = bar_length(canvas)
     taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
-    taken += canvas.text_width(length_label(bar), bold=True)
+    taken += canvas.text_width(format_scale_length(bar), bold=True)
     right = canvas.surface.get_width() - EDGE * canvas.scale
     y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
     size = canvas.text_size(canvas.theme.text)

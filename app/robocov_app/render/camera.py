@@ -1,4 +1,6 @@
-"""The camera: world meters, y up, to pixels, y down, and back."""
+"""The camera: conversion between world coordinates, in meters with y up, and pixels, with y down."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -7,75 +9,135 @@ import numpy as np
 
 from robocov.arrays import Array
 
-SMALLEST, LARGEST = 1e-4, 1e7  # zoom, px/m: from a hundred times the largest map to a tenth of the smallest
-FARTHEST_PIXEL = 1e8
+MIN_ZOOM_PX_PER_M = 1e-4
+"""A hundredth of the zoom that shows the largest map."""
+MAX_ZOOM_PX_PER_M = 1e7
+"""Ten times the zoom that shows the smallest map."""
+MAX_PIXEL = 1e8
+"""Largest coordinate that pygame gets."""
+_MIN_SIZE_M = 1e-9
+_MIN_SIZE_PX = 1.0
+_METERS_PER_KILOMETER = 1000
+_MIN_METERS = 0.1
+"""Length below which labels are in centimeters, m."""
 Box: TypeAlias = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A view of the world: `center`, m, in the middle of `view` (left, top, width, height), `zoom` px/m."""
+    """A view of the world.
+
+    Attributes
+    ----------
+    center : (float, float), m
+        The position in the middle of the view.
+    zoom : float, px/m
+    view : tuple of float, px
+        Left, top, width and height of the area in which the world is drawn.
+    """
 
     center: tuple[float, float]
     zoom: float
     view: Box
 
     @classmethod
-    def fit(cls, bounds: Box, view: Box, margin: float = 0.0) -> "Camera":
-        """Return the camera that shows `bounds`, m, as large as possible, `margin` px from the sides."""
+    def fit(cls, bounds: Box, view: Box, margin: float = 0.0) -> Camera:
+        """Build the camera that shows a part of the world as large as possible.
+
+        Parameters
+        ----------
+        bounds : tuple of float, m
+            Low x, low y, high x and high y of the part.
+        view : tuple of float, px
+            Left, top, width and height.
+        margin : float, px
+            Distance of the part from the sides of the view.
+
+        Returns
+        -------
+        Camera
+        """
         low_x, low_y, high_x, high_y = bounds
-        width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)
-        room_x, room_y = max(view[2] - 2 * margin, 1.0), max(view[3] - 2 * margin, 1.0)
-        zoom = min(max(min(room_x / width, room_y / height), SMALLEST), LARGEST)
-        return cls(((low_x + high_x) / 2, (low_y + high_y) / 2), zoom, view)
+        zoom_x = max(view[2] - 2 * margin, _MIN_SIZE_PX) / max(high_x - low_x, _MIN_SIZE_M)
+        zoom_y = max(view[3] - 2 * margin, _MIN_SIZE_PX) / max(high_y - low_y, _MIN_SIZE_M)
+        center = ((low_x + high_x) / 2, (low_y + high_y) / 2)
+        return cls(center, _limit_zoom(min(zoom_x, zoom_y)), view)
 
     @property
     def middle(self) -> tuple[float, float]:
+        """The middle of the view, px."""
         left, top, width, height = self.view
         return left + width / 2, top + height / 2
 
     def to_pixels(self, points: Array) -> Array:
-        """Return the pixels of (..., 2) points in meters.
+        """Convert positions to pixels.
 
-        Drafts of maps may hold any number: what is too far away for pygame is moved to `FARTHEST_PIXEL`.
+        Parameters
+        ----------
+        points : (..., 2) array, m
+
+        Returns
+        -------
+        (..., 2) array, px
+            Drafts of maps may contain any number; coordinates are limited to `MAX_PIXEL`.
         """
         scale = np.array([self.zoom, -self.zoom])
         with np.errstate(over="ignore", invalid="ignore"):
-            found = np.asarray((points - np.array(self.center)) * scale + np.array(self.middle))
-        return found.clip(-FARTHEST_PIXEL, FARTHEST_PIXEL)
+            pixels = (points - np.array(self.center)) * scale + np.array(self.middle)
+        return np.asarray(pixels).clip(-MAX_PIXEL, MAX_PIXEL)
 
     def to_world(self, pixels: Array) -> Array:
+        """Convert pixels, (..., 2) px, to positions, (..., 2) m."""
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
         return np.asarray((pixels - np.array(self.middle)) * scale + np.array(self.center))
 
-    def zoomed(self, factor: float, at: tuple[float, float]) -> "Camera":
-        """Return the camera that magnifies by `factor` and keeps what is under pixel `at` there."""
-        zoom = min(max(self.zoom * factor, SMALLEST), LARGEST)
-        (x, y), (middle_x, middle_y) = at, self.middle
-        shrink = 1.0 / self.zoom - 1.0 / zoom
-        center = (self.center[0] + (x - middle_x) * shrink, self.center[1] - (y - middle_y) * shrink)
-        return replace(self, center=center, zoom=zoom)
+    def zoom_at(self, factor: float, pixel: tuple[float, float]) -> Camera:
+        """Return the camera that magnifies by a factor; the position at a pixel stays there."""
+        zoom = _limit_zoom(self.zoom * factor)
+        x, y = pixel
+        middle_x, middle_y = self.middle
+        meters_per_px = 1.0 / self.zoom - 1.0 / zoom
+        center_x = self.center[0] + (x - middle_x) * meters_per_px
+        center_y = self.center[1] - (y - middle_y) * meters_per_px
+        return replace(self, center=(center_x, center_y), zoom=zoom)
 
-    def panned(self, dx: float, dy: float) -> "Camera":
+    def pan(self, dx: float, dy: float) -> Camera:
+        """Return the camera that shows the world shifted by a number of pixels."""
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
 
-    def within(self, view: Box) -> "Camera":
+    def with_view(self, view: Box) -> Camera:
+        """Return the camera with the same center and zoom in another view, px."""
         return replace(self, view=view)
 
-    def visible(self) -> Box:
-        half_x, half_y = self.view[2] / 2 / self.zoom, self.view[3] / 2 / self.zoom
+    def compute_visible_bounds(self) -> Box:
+        """Return low x, low y, high x and high y of the visible part of the world, m."""
+        half_width = self.view[2] / 2 / self.zoom
+        half_height = self.view[3] / 2 / self.zoom
         x, y = self.center
-        return x - half_x, y - half_y, x + half_x, y + half_y
+        return x - half_width, y - half_height, x + half_width, y + half_height
 
 
-def round_length(at_most: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not above `at_most`."""
-    power = float(10.0 ** np.floor(np.log10(at_most) + 1e-12))
-    step = max(s for s in (1.0, 2.0, 5.0) if s * power <= at_most * (1 + 1e-9))
+def _limit_zoom(zoom: float) -> float:
+    return min(max(zoom, MIN_ZOOM_PX_PER_M), MAX_ZOOM_PX_PER_M)
+
+
+def round_length(maximum: float) -> float:
+    """Return the largest of 1, 2 or 5 times a power of ten that does not exceed a length."""
+    power = float(10.0 ** np.floor(np.log10(maximum) + 1e-12))
+    step = max(step for step in (1.0, 2.0, 5.0) if step * power <= maximum * (1 + 1e-9))
     return float(f"{step * power:.12g}")
 
 
-def length_label(meters: float) -> str:
-    if meters >= 1000:
-        return f"{meters / 1000:g} km"
-    return f"{meters * 100:g} cm" if meters < 0.1 else f"{meters:g} m"
+def format_scale_length(meters: float) -> str:
+    """Return a length with its unit, as on a scale bar.
+
+    Examples
+    --------
+    >>> [format_scale_length(meters) for meters in (0.05, 2.0, 5000.0)]
+    ['5 cm', '2 m', '5 km']
+    """
+    if meters >= _METERS_PER_KILOMETER:
+        return f"{meters / _METERS_PER_KILOMETER:g} km"
+    if meters < _MIN_METERS:
+        return f"{meters * 100:g} cm"
+    return f"{meters:g} m"

@@ -11,7 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.density import Density
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import STRIP
-from robocov_app.render.camera import length_label
+from robocov_app.render.camera import format_scale_length
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import colors, density_label, parts
 from robocov_app.render.distance_field import Field, levels, middles, palette, strength, ticks
@@ -214,7 +214,7 @@ def bar_room(canvas: Canvas, scene: Scene) -> float:
 def _marks(scene: Scene) -> list[tuple[float, str]]:
     assert scene.field is not None
     marks = ticks(scene.field_limit)
-    words = ["0", *(length_label(mark) for mark in marks[1:])]
+    words = ["0", *(format_scale_length(mark) for mark in marks[1:])]
     if scene.field.largest > scene.field_limit * (1.0 + 1e-9):
         words[-1] = f"≥ {words[-1]}"
     return list(zip(marks, words, strict=True))

@@ -92,7 +92,7 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
     least = GRID_GAP * canvas.scale / canvas.camera.zoom
     step = round_length(least)
     step = step if step >= least else round_length(2.5001 * step)
-    region, seen = scene.environment.region, canvas.camera.visible()
+    region, seen = scene.environment.region, canvas.camera.compute_visible_bounds()
     color, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
     for axis in (0, 1):
         low, high = max(region.bounds[axis], seen[axis]), min(region.bounds[axis + 2], seen[axis + 2])

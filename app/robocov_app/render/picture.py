@@ -145,10 +145,10 @@ class Painter:
         bottom = (STRIP if {"scale_bar", "status"} & self.visible and not small else MARGIN) * scale
         view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
         if self._camera is not None:
-            return self._camera.within(view)
+            return self._camera.with_view(view)
         side = MARGIN * scale
         inner = (side, top, max(view[2] - (1 if beside else 2) * side, 1.0), view[3])
-        return Camera.fit(self.environment.region.bounds, inner, margin=2 * scale).within(view)
+        return Camera.fit(self.environment.region.bounds, inner, margin=2 * scale).with_view(view)
 
     @camera.setter
     def camera(self, camera: Camera) -> None:

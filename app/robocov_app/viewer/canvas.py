@@ -58,7 +58,7 @@ class ViewerCanvas:
                 layers = [layer for layer in pane_layers() if layer.name != "status"]
             painter = Painter(self._environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
-                painter.camera = self._camera.within(painter.camera.view)
+                painter.camera = self._camera.with_view(painter.camera.view)
             self._painters.append(painter)
         self._strip = None
 
@@ -75,10 +75,10 @@ class ViewerCanvas:
         ).max()
         # neither a dot nor a single wall's paint
         factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
-        self._look(camera.zoomed(factor, (at[0] - left, at[1] - top)))
+        self._look(camera.zoom_at(factor, (at[0] - left, at[1] - top)))
 
     def pan(self, dx: float, dy: float) -> None:
-        camera = self._painters[0].camera.panned(dx, dy)
+        camera = self._painters[0].camera.pan(dx, dy)
         bounds = np.reshape(self.viewer.session.displayed.environment.region.bounds, (2, 2))
         x, y = np.clip(camera.center, *bounds).tolist()
         self._look(replace(camera, center=(x, y)))
@@ -86,7 +86,7 @@ class ViewerCanvas:
     def _look(self, camera: Camera) -> None:
         self._camera = camera
         for painter in self._painters:
-            painter.camera = camera.within(painter.camera.view)
+            painter.camera = camera.with_view(painter.camera.view)
 
     def pane_at(self, pixel: tuple[float, float]) -> int | None:
         return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)

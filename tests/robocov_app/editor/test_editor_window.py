@@ -246,12 +246,12 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
     for _ in range(80):
         hands.key("ctrl+left")
         hands.wheel(300, 300, -5)
-    low_x, low_y, high_x, high_y = hands.window.canvas.camera.visible()
+    low_x, low_y, high_x, high_y = hands.window.canvas.camera.compute_visible_bounds()
     assert low_x < 10 and high_x > 0 and low_y < 10 and high_y > 0
     hands.key("f")
     hands.select(1)
     hands.key("z")
-    low_x, _, high_x, _ = hands.window.canvas.camera.visible()
+    low_x, _, high_x, _ = hands.window.canvas.camera.compute_visible_bounds()
     assert high_x - low_x < 5
 
 

@@ -3,7 +3,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.render.camera import LARGEST, SMALLEST, Camera, length_label, round_length
+from robocov_app.render.camera import (
+    MAX_ZOOM_PX_PER_M,
+    MIN_ZOOM_PX_PER_M,
+    Camera,
+    format_scale_length,
+    round_length,
+)
 
 lengths = st.floats(1e-2, 1e4)
 places = st.floats(-1e4, 1e4)
@@ -31,7 +37,7 @@ def test_y_goes_up_in_the_world_and_down_on_the_page(camera):
 @given(cameras, st.floats(0.2, 5), st.floats(0, 4000), st.floats(0, 4000))
 def test_zoom_keeps_what_is_under_the_pointer(camera, factor, x, y):
     under = camera.to_world(np.array([x, y]))
-    zoomed = camera.zoomed(factor, (x, y))
+    zoomed = camera.zoom_at(factor, (x, y))
     assert zoomed.zoom == pytest.approx(camera.zoom * factor)
     assert zoomed.to_pixels(under) == pytest.approx([x, y], abs=1e-3)
 
@@ -39,14 +45,14 @@ def test_zoom_keeps_what_is_under_the_pointer(camera, factor, x, y):
 @given(cameras, st.floats(-500, 500), st.floats(-500, 500))
 def test_pan_moves_everything_by_what_was_dragged(camera, dx, dy):
     point = np.array([1.0, 2.0])
-    moved = camera.panned(dx, dy).to_pixels(point) - camera.to_pixels(point)
+    moved = camera.pan(dx, dy).to_pixels(point) - camera.to_pixels(point)
     assert moved == pytest.approx([dx, dy], abs=1e-3)
 
 
 def test_zoom_has_limits():
     camera = Camera((0.0, 0.0), 1.0, (0, 0, 100, 100))
-    assert camera.zoomed(1e-30, (0, 0)).zoom == SMALLEST
-    assert camera.zoomed(1e30, (0, 0)).zoom == LARGEST
+    assert camera.zoom_at(1e-30, (0, 0)).zoom == MIN_ZOOM_PX_PER_M
+    assert camera.zoom_at(1e30, (0, 0)).zoom == MAX_ZOOM_PX_PER_M
 
 
 @given(places, places, lengths, lengths, st.floats(100, 3000), st.floats(100, 3000), st.floats(0, 40))
@@ -65,7 +71,7 @@ def test_fit_shows_all_and_touches_two_sides(x, y, width, height, view_width, vi
 def test_visible_is_the_view(camera):
     left, top, width, height = camera.view
     corners = camera.to_world(np.array([[left, top + height], [left + width, top]])).ravel()
-    assert camera.visible() == pytest.approx(tuple(corners), rel=1e-6, abs=1e-6)
+    assert camera.compute_visible_bounds() == pytest.approx(tuple(corners), rel=1e-6, abs=1e-6)
 
 
 @given(st.floats(1e-6, 1e6))
@@ -79,5 +85,5 @@ def test_round_length_is_the_largest_round_one(limit):
 @pytest.mark.parametrize(
     ("meters", "text"), [(0.01, "1 cm"), (0.1, "0.1 m"), (20.0, "20 m"), (1000.0, "1 km"), (0.002, "0.2 cm")]
 )
-def test_length_labels(meters, text):
-    assert length_label(meters) == text
+def test_lengths_of_scale_bars(meters, text):
+    assert format_scale_length(meters) == text

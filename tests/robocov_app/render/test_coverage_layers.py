@@ -169,7 +169,7 @@ def test_an_unchanged_picture_is_kept(layer, monkeypatch):
     first = painter.frame(what).copy()
     np.testing.assert_array_equal(painter.frame(what), first)
     assert len(made) == 1
-    painter.camera = painter.camera.panned(10, 0)
+    painter.camera = painter.camera.pan(10, 0)
     painter.frame(what)
     _, other = scene(seed=1)
     painter.frame(other)

@@ -86,7 +86,7 @@ def test_another_density_is_drawn_anew():
 def test_zoomed_in_it_stays_in_the_view():
     painter = Painter(HEAVY, (400, 380))
     painter.frame(scene_of(HEAVY))
-    painter.camera = painter.camera.zoomed(40.0, (200, 200))
+    painter.camera = painter.camera.zoom_at(40.0, (200, 200))
     assert painter.frame(scene_of(HEAVY)).shape == (380, 400, 3)
 
 

@@ -205,7 +205,7 @@ class TestSensedObstacles:
         painter.frame(knowing())
         painter.theme = DARK
         assert dots(painter.frame(knowing()).astype(int), painter, DARK) == [True, True, True]
-        painter.camera = painter.camera.panned(40, -30)
+        painter.camera = painter.camera.pan(40, -30)
         assert dots(painter.frame(knowing()).astype(int), painter, DARK) == [True, True, True]
         scene = knowing(environment=Environment("empty", ROOMS.boundary, (), {"spread": UniformStart()}))
         frame = painter.frame(scene).astype(int)

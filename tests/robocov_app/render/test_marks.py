@@ -169,7 +169,7 @@ def test_marks_stay_inside_the_picture_of_the_map():
     scene = replace(broken({3: (1.0, 0.0)}, np.array([[4.0, 0.0], [1.0, 1.0]])), selected=0)
     painter = Painter(SQUARE, SIZE)
     painter.show({"failed", "selection", "status"})
-    painter.camera = painter.camera.panned(0, 4)
+    painter.camera = painter.camera.pan(0, 4)
     frame = painter.frame(scene).astype(int)
     alone, _ = drawn(explained(TWO), "status")
     strip = int(painter.camera.view[1] + painter.camera.view[3]) + 1

@@ -56,7 +56,7 @@ def test_zoomed_world_stays_in_its_view_and_fit_brings_it_back():
     painter = Painter(ROOMS, (640, 480))
     before = painter.frame(scene)
     strip = int(painter.camera.view[1])
-    painter.camera = painter.camera.zoomed(5.0, (300, 250)).panned(37, -12)
+    painter.camera = painter.camera.zoom_at(5.0, (300, 250)).pan(37, -12)
     zoomed = painter.frame(scene)
     assert (zoomed != before).any()
     assert (zoomed[:strip] == before[:strip]).all()  # the legend is not drawn over
@@ -86,7 +86,7 @@ def test_any_zoom_can_be_drawn(factor, pan, at):
     painter = Painter(SQUARE, (320, 240))
     painter.show({layer.name for layer in painter.layers})
     painter.frame(scene)
-    painter.camera = painter.camera.zoomed(factor, at).panned(*pan)
+    painter.camera = painter.camera.zoom_at(factor, at).pan(*pan)
     assert painter.frame(scene).shape == (240, 320, 3)
 
 
@@ -98,7 +98,7 @@ def test_what_is_magnified_is_still_true(factor, x, y):
     painter = Painter(SQUARE, (320, 240))
     painter.show({"cells"})
     painter.frame(scene)
-    painter.camera = replace(painter.camera, center=(x, y)).zoomed(factor, painter.camera.middle)
+    painter.camera = replace(painter.camera, center=(x, y)).zoom_at(factor, painter.camera.middle)
     frame = painter.frame(scene)
     grid = np.stack(np.meshgrid(np.arange(4, 320, 13), np.arange(16, 225, 13)), axis=-1).reshape(-1, 2)
     points = painter.camera.to_world(grid + 0.5)
@@ -156,7 +156,7 @@ def test_what_does_not_change_is_drawn_once():
     for row in range(10):
         painter.frame(scene_of(record, row))
     assert len(calls) == 1
-    painter.camera = painter.camera.panned(3, 0)
+    painter.camera = painter.camera.pan(3, 0)
     painter.frame(scene_of(record, 10))
     assert len(calls) == 2
 

@@ -104,7 +104,7 @@ class EditorCanvas:
         """Adapt to another size or theme of the window."""
         self.layout = layout
         self.theme = theme
-        self._set_camera(self.camera.within(self._compute_view_box()))
+        self._set_camera(self.camera.with_view(self._compute_view_box()))
         is_fitted = self._fitted == (self.camera.center, self.camera.zoom)
         if is_fitted:
             self.fit()
@@ -177,11 +177,11 @@ class EditorCanvas:
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         extent = max(high_x - low_x, high_y - low_y, 1.0)
         zoom = float(np.clip(self.camera.zoom * factor, MIN_MAP_PX / extent, MAX_ZOOM))
-        self._set_camera(self.camera.zoomed(zoom / self.camera.zoom, at))
+        self._set_camera(self.camera.zoom_at(zoom / self.camera.zoom, at))
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the view by pixels; the map stays in it."""
-        camera = self.camera.panned(dx, dy)
+        camera = self.camera.pan(dx, dy)
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         _, _, width, height = camera.view
         margin_x = MAX_PAN_FRACTION * width / camera.zoom
@@ -236,7 +236,7 @@ class EditorCanvas:
         """Draw the map and the strips."""
         box = Rect(self.layout.arena)
         self._update_legend(self._build_view().build_canvas(Surface((box.width, 1))))
-        self._set_camera(self.camera.within(self._compute_view_box()))
+        self._set_camera(self.camera.with_view(self._compute_view_box()))
         scene = self._build_scene(screen)
         screen.fill(self.theme.background, box)
         self._draw_sheet(scene)

@@ -22,7 +22,7 @@ from robocov_app.editor.tools.tool import KNOB_HEIGHT_PX, DrawState, Handle
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
-from robocov_app.render.camera import FARTHEST_PIXEL
+from robocov_app.render.camera import MAX_PIXEL
 from robocov_app.render.canvas import Canvas
 from robocov_app.toolkit.overlay import tag
 
@@ -78,7 +78,7 @@ def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
         Positions, px. What has no position, such as the center of an infinite box, is far away.
     """
     coordinates = np.array(list(points), dtype=float).reshape(-1, 2)
-    return np.nan_to_num(canvas.camera.to_pixels(coordinates), nan=-FARTHEST_PIXEL)
+    return np.nan_to_num(canvas.camera.to_pixels(coordinates), nan=-MAX_PIXEL)
 
 
 def draw_ring(canvas: Canvas, at: Point, radius: float, color: Color, width: float) -> None:

@@ -80,7 +80,7 @@ class Sheet:
             The page, as large as the window; it is drawn on again by the next call.
         """
         left, top, width, height = view.camera.view
-        camera = view.camera.within((left + PIXEL_BIAS, top + PIXEL_BIAS, width, height))
+        camera = view.camera.with_view((left + PIXEL_BIAS, top + PIXEL_BIAS, width, height))
         view = replace(view, camera=camera)
         items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
         state = _PageState(_describe_look(view, sketch), camera, items)
@@ -192,7 +192,7 @@ class Sheet:
         """Draw obstacles so that the picture under them stays visible."""
         layer = Surface(box.size, pygame.SRCALPHA, 32)
         left, top, width, height = canvas.camera.view
-        camera = canvas.camera.within((left - box.x, top - box.y, width, height))
+        camera = canvas.camera.with_view((left - box.x, top - box.y, width, height))
         self.draw_items(replace(canvas, surface=layer, camera=camera), items)
         layer.set_alpha(round(255 * OBSTACLE_OPACITY))
         canvas.surface.blit(layer, box)
@@ -300,7 +300,7 @@ def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) ->
 
 
 def _draw_grid_lines(page: Surface, view: View, box: Rect, step: float, color: Color) -> None:
-    low_x, low_y, high_x, high_y = view.camera.visible()
+    low_x, low_y, high_x, high_y = view.camera.compute_visible_bounds()
     width = max(1, round(view.scale))
     xs = np.arange(np.ceil(low_x / step), np.floor(high_x / step) + 1) * step
     ys = np.arange(np.ceil(low_y / step), np.floor(high_y / step) + 1) * step
