@@ -1,16 +1,16 @@
-"""The file of a session, what is kept aside of it, and a start that offers it."""
+"""The file of a session, its drafts, and the recovery of unsaved work."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from driven_window import opened
 from sample_sessions import advance_session, build_presenter, get_positions, start_session
 
 from robocov.errors import MapError
-from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.workspace import (
     DRAFT_KIND,
     SessionWorkspace,
@@ -20,61 +20,63 @@ from robocov_app.viewer.session.workspace import (
 )
 
 
-def kept(workspace: SessionWorkspace) -> None:
-    """Keep a copy now, and end without a word, as kill -9 does."""
-    workspace._when = -1e9
-    workspace.save_draft({"theme": "light"})
+def crash_after_draft(workspace: SessionWorkspace) -> None:
+    """Save a draft, and release its lock without closing the workspace, as when the process is killed."""
+    workspace.save_draft({"theme": "light"}, at_once=True)
     assert workspace._autosaver.flush()
     workspace._autosaver._lock.close()
 
 
-def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
+def test_unsaved_work_is_recovered(tmp_path: Path) -> None:
     session = start_session()
     workspace = SessionWorkspace(session, tmp_path)
     workspace.save_draft({})
     assert not workspace.has_unsaved_edits
     advance_session(session, 20).fail_robot(2)
     advance_session(session, 10)
-    kept(workspace)
-    (found,) = find_recoverable_drafts(tmp_path)
-    assert "1 edit, " in describe_draft(found) and describe_draft(found).endswith("never saved")
-    again, view = recover_draft(found, (), tmp_path)
-    assert view == {"theme": "light"} and again.has_unsaved_edits
-    assert (
-        again.session.displayed.numbers == (1, 3)
-        and again.session.timeline.end_time == session.timeline.end_time
-    )
-    for mine, theirs in zip(get_positions(again.session), get_positions(session), strict=True):
-        assert (mine == theirs).all()
-    again.save(tmp_path, {}, tmp_path / "story.robocov")
-    assert not again.has_unsaved_edits
-    again.close()
+    crash_after_draft(workspace)
+    (draft,) = find_recoverable_drafts(tmp_path)
+    description = describe_draft(draft)
+    assert "1 edit, " in description
+    assert description.endswith("never saved")
+    recovered, view = recover_draft(draft, (), tmp_path)
+    assert view == {"theme": "light"}
+    assert recovered.has_unsaved_edits
+    assert recovered.session.displayed.numbers == (1, 3)
+    assert recovered.session.timeline.end_time == session.timeline.end_time
+    for positions, expected in zip(get_positions(recovered.session), get_positions(session), strict=True):
+        np.testing.assert_array_equal(positions, expected)
+    recovered.save(tmp_path, {}, tmp_path / "session.robocov")
+    assert not recovered.has_unsaved_edits
+    recovered.close()
     assert find_recoverable_drafts(tmp_path) == ()
 
 
 @pytest.mark.parametrize("session", [None, [], {}, {"touches": 3}])
-def test_a_broken_draft_is_not_offered(session: object, tmp_path: Path) -> None:
-    place = tmp_path / "broken"
-    place.mkdir()
-    head = {"format": DRAFT_KIND, "version": 1, "path": None, "when": "2030-05-17T12:00:00"}
-    (place / "draft.json").write_text(json.dumps(head | {"session": session}))
+def test_a_damaged_draft_is_not_offered(session: object, tmp_path: Path) -> None:
+    folder = tmp_path / "damaged"
+    folder.mkdir()
+    header = {"format": DRAFT_KIND, "version": 1, "path": None, "when": "2030-05-17T12:00:00"}
+    (folder / "draft.json").write_text(json.dumps(header | {"session": session}))
     assert find_recoverable_drafts(tmp_path) == ()
-    assert (place / "draft.json").exists()
+    assert (folder / "draft.json").exists()
 
 
-def test_a_session_that_was_saved_and_closed_leaves_nothing(tmp_path: Path) -> None:
+def test_a_session_that_was_saved_and_closed_leaves_no_draft(tmp_path: Path) -> None:
     session = advance_session(start_session(), 5)
-    workspace = SessionWorkspace(session, tmp_path / "kept")
+    workspace = SessionWorkspace(session, tmp_path / "drafts")
     session.fail_robot(1)
     path = workspace.save(tmp_path, {})
-    assert path == tmp_path / "hall-1.robocov" and not workspace.has_unsaved_edits
+    assert path == tmp_path / "hall-1.robocov"
+    assert not workspace.has_unsaved_edits
     session.fail_robot(2)
-    assert workspace.has_unsaved_edits and workspace.save(tmp_path, {}) == path
+    assert workspace.has_unsaved_edits
+    assert workspace.save(tmp_path, {}) == path
     workspace.close()
-    assert find_recoverable_drafts(tmp_path / "kept") == ()
+    assert find_recoverable_drafts(tmp_path / "drafts") == ()
 
 
-def test_ctrl_q_with_work_that_is_not_saved_keeps_it(tmp_path: Path) -> None:
+def test_a_session_that_is_closed_with_unsaved_edits_leaves_a_draft(tmp_path: Path) -> None:
     session = advance_session(start_session(), 5)
     workspace = SessionWorkspace(session, tmp_path)
     session.fail_robot(1)
@@ -83,7 +85,21 @@ def test_ctrl_q_with_work_that_is_not_saved_keeps_it(tmp_path: Path) -> None:
     assert len(find_recoverable_drafts(tmp_path)) == 1
 
 
-def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_path: Path) -> None:
+def test_drafts_are_not_saved_at_each_frame(tmp_path: Path) -> None:
+    session = advance_session(start_session(), 5)
+    workspace = SessionWorkspace(session, tmp_path)
+    session.fail_robot(1)
+    workspace.save_draft({})
+    drafted_state = workspace._drafted_state
+    advance_session(session, 1)
+    workspace.save_draft({})
+    assert workspace._drafted_state == drafted_state
+    workspace.save_draft({}, at_once=True)
+    assert workspace._drafted_state != drafted_state
+    workspace.close()
+
+
+def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(2)
         advance_session(driver.session, 10)
@@ -93,30 +109,35 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
         driver.key("ctrl+s")
         (path,) = tmp_path.glob("*.robocov")
         assert str(path) in driver.viewer.message
-        driver.key("alt+left")
-        assert (
-            driver.viewer.message == "branch 1 of 2: robot 2 failed"
-            and driver.session.displayed.numbers == (1, 3)
-        )
-        driver.key("alt+right")
-        assert driver.session.displayed.numbers == (2, 3)
         driver.window.commands.typed(f"open {path}")
         driver.frames(2)
-        assert (
-            driver.viewer.session.displayed.numbers == (2, 3)
-            and len(driver.viewer.session.timeline.document.list_branches()) == 2
-        )
+        session = driver.viewer.session
+        assert session.displayed.numbers == (2, 3)
+        assert len(session.timeline.document.list_branches()) == 2
         driver.window.commands.typed("branch 1")
-        assert driver.viewer.session.displayed.numbers == (1, 3)
+        assert session.displayed.numbers == (1, 3)
 
 
-def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
-    viewer: Presenter = build_presenter(folder=tmp_path)
+def test_branches_are_entered_by_keys(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        advance_session(driver.session, 10).fail_robot(2)
+        advance_session(driver.session, 10)
+        driver.session.undo()
+        driver.session.fail_robot(1)
+        driver.key("alt+left")
+        assert driver.viewer.message == "branch 1 of 2: robot 2 failed"
+        assert driver.session.displayed.numbers == (1, 3)
+        driver.key("alt+right")
+        assert driver.session.displayed.numbers == (2, 3)
+
+
+def test_a_file_that_is_no_session_is_rejected(tmp_path: Path) -> None:
+    viewer = build_presenter(folder=tmp_path)
     (tmp_path / "no.robocov").write_text("{}")
-    before = viewer.session
+    session = viewer.session
     with pytest.raises(MapError, match="format: missing"):
         viewer.files.open_session(tmp_path / "no.robocov")
-    assert viewer.session is before
+    assert viewer.session is session
 
 
 @pytest.mark.slow
@@ -131,8 +152,6 @@ def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
         ((node, points),) = driver.window.chart._ghosts
         x, y = points[-1].tolist()
         driver.click(x, y + driver.window.layout.chart[1])
-        assert (
-            driver.viewer.message == "branch 1 of 2: robot 2 failed"
-            or "robot 2 failed" in driver.viewer.message
-        )
-        assert driver.session.timeline.head.number == node and driver.session.displayed.numbers == (1, 3)
+        assert "robot 2 failed" in driver.viewer.message
+        assert driver.session.timeline.head.number == node
+        assert driver.session.displayed.numbers == (1, 3)
