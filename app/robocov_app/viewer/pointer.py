@@ -152,14 +152,14 @@ class ViewerPointer:
         viewer = self._viewer
         inspection = viewer.inspection
         canvas = self._canvas
-        pane = canvas.pane_at(self.at) if inspection.cursor is not None else None
+        pane = canvas.find_pane(self.at) if inspection.cursor is not None else None
         number: int | None = None
         if pane is not None:
             # The camera may have moved although the mouse has not.
             inspection.cursor = canvas.to_world(self.at, pane)
             inspection.cursor_pane = pane
             if viewer.tool.takes_robots:
-                number = canvas.robot_at(self.at, pane)
+                number = canvas.find_robot(self.at, pane)
         canvas.hovered = _NO_ROBOT
         if pane is not None and number is not None:
             canvas.hovered = (pane, number)
@@ -180,7 +180,7 @@ class ViewerPointer:
         return inside(layout.track, self.at) or inside(layout.chart, self.at)
 
     def _turn_wheel(self, event: pygame.event.Event) -> None:
-        if self._canvas.pane_at(self.at) is None:
+        if self._canvas.find_pane(self.at) is None:
             return
         factor = WHEEL ** wheel_notches(event)
         if self._viewer.tool.uses_wheel:
@@ -198,7 +198,7 @@ class ViewerPointer:
             if event.button == LEFT_BUTTON:
                 self._press_chart(event.pos)
             return
-        pane = self._canvas.pane_at(event.pos)
+        pane = self._canvas.find_pane(event.pos)
         if pane is None or event.button not in BUTTONS:
             return
         tool = self._viewer.tool
@@ -240,8 +240,8 @@ class ViewerPointer:
             viewer.attempt(viewer.finish_drawing)
             return
         point = canvas.to_world(pixel, pane)
-        number = canvas.robot_at(pixel, pane)
-        reach = canvas.reach(pane)
+        number = canvas.find_robot(pixel, pane)
+        reach = canvas.get_reach(pane)
         viewer.attempt(lambda: viewer.tool.press(viewer.session, point, reach, number))
         if viewer.tool is hand and number is not None:
             self._panel.show_tab("robot")
@@ -253,7 +253,7 @@ class ViewerPointer:
     def _move(self, event: pygame.event.Event) -> None:
         viewer = self._viewer
         inspection = viewer.inspection
-        pane = self._canvas.pane_at(event.pos)
+        pane = self._canvas.find_pane(event.pos)
         inspection.cursor = None
         if pane is not None and not inside(self._canvas.layout.panel, event.pos):
             inspection.cursor = self._canvas.to_world(event.pos, pane)

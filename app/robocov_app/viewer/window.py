@@ -283,7 +283,7 @@ class ViewerWindow(BaseWindow):
         session = self.viewer.session
         size = self.screen.get_size()
         panes = len(session.timeline.panes)
-        legend_rows = max(self.canvas.shared_rows(), 1) if panes > 1 and self._arranged else 1
+        legend_rows = max(self.canvas.count_legend_rows(), 1) if panes > 1 and self._arranged else 1
         low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
         frame = (size, self.scale, view.has_panel, view.theme)
@@ -367,7 +367,7 @@ class ViewerWindow(BaseWindow):
         """Zoom at the mouse if it is over a pane, else at the middle of the first pane."""
         left, top, width, height = self.layout.panes[0]
         center: tuple[float, float] = (left + width / 2, top + height / 2)
-        if self.canvas.pane_at(self.pointer.at) is not None:
+        if self.canvas.find_pane(self.pointer.at) is not None:
             center = self.pointer.at
         self.canvas.zoom(factor, center)
 

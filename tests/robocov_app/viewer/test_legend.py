@@ -18,7 +18,7 @@ def words(tmp_path: Path, *laws: str) -> list[str]:
     with Launcher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
         for _ in range(10):
             window.frame(1 / 30)
-        return [entry.text for entry in window.canvas._legend_entries()]
+        return [entry.text for entry in window.canvas._list_legend_entries()]
 
 
 @pytest.mark.parametrize("laws", [("rpf", "lloyd"), ("lloyd", "rpf")])

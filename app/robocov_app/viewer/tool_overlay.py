@@ -1,0 +1,104 @@
+"""What the mouse does, drawn on top of a pane: dragged and hovered robots, previews of tools."""
+
+from functools import partial
+
+import numpy as np
+import pygame
+import shapely
+
+from robocov.arrays import Array
+from robocov.environment import Obstacle, Point
+from robocov_app.render import sprites
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.marks import drawn_radii
+from robocov_app.render.scene import Scene
+from robocov_app.toolkit.overlay import tag
+from robocov_app.viewer.tools.tool import Preview
+
+# Lengths in pixels at scale 1.
+FAILED_RADIUS_PX = 9.0  # within which a failed robot is hit, even if it is drawn smaller
+_MARK_PX = 3.0  # half the side of the mark of a point
+_LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
+
+_OBSTACLE_ALPHA = 89  # of an obstacle that would be drawn
+_PREMULTIPLIED_FRACTION = 0.35  # the same as a factor of its color
+_FARTHEST_PIXEL = 1e4  # polygons are drawn up to it
+
+
+def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> None:
+    """Draw a line from a robot that is dragged to where it is dragged."""
+    numbers = list(scene.numbers or ())
+    if drag is None or drag[0] not in numbers:
+        return
+    number, target = drag
+    position = scene.now.positions[numbers.index(number)]
+    start, end = canvas.camera.to_pixels(np.array([position, target])).tolist()
+    canvas.dashes(start, end, canvas.theme.ink, canvas.width(1.5), dash=3.0)
+
+
+def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) -> None:
+    """Draw a ring around the selected robot if it has failed; painters do so around others."""
+    if selected is None or selected not in scene.failed:
+        return
+    radius = scene.failed_radius(selected) * canvas.camera.zoom
+    radius = max(radius, FAILED_RADIUS_PX * canvas.scale)
+    ring = partial(sprites.ring, round(radius) + 4.0 * canvas.scale, canvas.theme.ink, 2.2 * canvas.scale)
+    canvas.stamp(ring, canvas.camera.to_pixels(np.array(scene.failed[selected])).tolist())
+
+
+def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
+    """Draw a ring around a robot that can be taken hold of."""
+    numbers = list(scene.numbers or ())
+    if number not in numbers:
+        return
+    row = numbers.index(number)
+    if row == scene.selected:
+        return
+    radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
+    center = canvas.camera.to_pixels(scene.now.positions[row]).tolist()
+    canvas.stamp(partial(sprites.ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
+
+
+def draw_preview(canvas: Canvas, preview: Preview) -> None:
+    """Draw what a tool will do next."""
+    if preview.obstacle is not None:
+        _draw_obstacle(canvas, preview.obstacle)
+    if not preview.line:
+        return
+    points = canvas.camera.to_pixels(np.array(preview.line))
+    _draw_line(canvas, points, is_closed=preview.is_closed)
+    if preview.has_marks:
+        _draw_marks(canvas, points)
+    if preview.label:
+        x, y = points[-1].tolist()
+        dx, dy = _LABEL_OFFSET_PX
+        position = (x + dx * canvas.scale, y + dy * canvas.scale)
+        tag(canvas.surface, preview.label, position, canvas.theme, canvas.scale)
+
+
+def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
+    """Draw an obstacle that would be drawn or moved, half transparent."""
+    fill = [round(channel * _PREMULTIPLIED_FRACTION) for channel in canvas.theme.obstacle]
+    for polygon in shapely.get_parts(obstacle.polygon):
+        corners = canvas.camera.to_pixels(np.asarray(polygon.exterior.coords)[:-1])
+        ring = np.rint(np.clip(corners, -_FARTHEST_PIXEL, _FARTHEST_PIXEL)).tolist()
+        page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+        pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
+        canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        canvas.outline(corners, canvas.theme.final, canvas.width(1.5))
+
+
+def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
+    if len(points) < 2:
+        return
+    canvas.outline(points, canvas.theme.final, canvas.width(1.5), closed=False)
+    if is_closed:
+        canvas.dashes(points[-1].tolist(), points[0].tolist(), canvas.theme.final, canvas.width(1.0))
+
+
+def _draw_marks(canvas: Canvas, points: Array) -> None:
+    size = _MARK_PX * canvas.scale
+    for x, y in points.tolist():
+        box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
+        pygame.draw.rect(canvas.surface, canvas.theme.background, box)
+        pygame.draw.rect(canvas.surface, canvas.theme.final, box, canvas.width(1.5))
