@@ -33,9 +33,10 @@ from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import format_scale_length, round_length
 from robocov_app.render.density import mean_label
 from robocov_app.render.distance_field import Field, FieldLattice
-from robocov_app.report.pictures import Frame, map_picture
-from robocov_app.report.replay import ReplayRun, asset, replay_html
-from robocov_app.report.theme_css import theme_rules
+from robocov_app.report.embedding import ReplayRun
+from robocov_app.report.pictures import PictureFrame, draw_map
+from robocov_app.report.replay import build_replay_html, read_asset
+from robocov_app.report.theme_css import build_theme_rules
 from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost
 from robocov_app.web.live import LiveWindow
 
@@ -303,11 +304,11 @@ def environment_html(environment: Environment) -> str:
     """Return the HTML of a map with its properties and a scale bar, in the theme of the notebook."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     width = high_x - low_x
-    frame = Frame(environment, *_MAX_MAP_SIZE_PX)
+    frame = PictureFrame(environment, *_MAX_MAP_SIZE_PX)
     bar_length = round_length(width / 5)
     bar_ends = np.array([[low_x, low_y], [low_x + bar_length, low_y]])
     # Percent of the width, so that the bar stays right when the page shrinks the map.
-    left, right = frame.at(bar_ends)[:, 0] / (frame.width / 100)
+    left, right = frame.to_pixels(bar_ends)[:, 0] / (frame.width / 100)
     starts = ", ".join(environment.starts) or "uniform"
     facts = (
         f"{width:.4g} × {high_y - low_y:.4g} m, {environment.free_area:.4g} m² free, "
@@ -315,10 +316,10 @@ def environment_html(environment: Environment) -> str:
         f"start{'s' if len(environment.starts) > 1 else ''} {starts}"
     )
     return escape_controls(
-        f"<style>{theme_rules('.robocov-map')}{asset('picture.css')}{_MAP_CSS}</style>"
+        f"<style>{build_theme_rules('.robocov-map')}{read_asset('picture.css')}{_MAP_CSS}</style>"
         f'<figure class="robocov-map" style="max-width:{frame.width + 24:.0f}px">'
         f"<figcaption><b>{escape(environment.name)}</b> {escape(facts)}</figcaption>"
-        f"{map_picture(environment, *_MAX_MAP_SIZE_PX)}"
+        f"{draw_map(environment, *_MAX_MAP_SIZE_PX)}"
         f'<div class="robocov-scale"><i style="margin-left:{left:.2f}%;width:{right - left:.2f}%"></i>'
         f"{format_scale_length(bar_length)}</div>"
         f"</figure>"
@@ -333,11 +334,11 @@ def environment_png(environment: Environment) -> bytes:
 def record_html(record: Record) -> str:
     """Return the HTML of a replay of a run, with its cost if that can be computed quickly."""
     run = ReplayRun(record, _compute_history(record), f"{record.label} on {record.environment.name}")
-    map_width = Frame(record.environment, *_MAX_REPLAY_MAP_SIZE_PX).width
+    map_width = PictureFrame(record.environment, *_MAX_REPLAY_MAP_SIZE_PX).width
     width = max(map_width, _MIN_REPLAY_WIDTH_PX)
     return (
         f'<style>{_RUN_CSS}</style><div class="robocov-run" style="max-width:{width:.0f}px">'
-        f"{replay_html([run])}</div>"
+        f"{build_replay_html([run])}</div>"
     )
 
 
@@ -352,7 +353,7 @@ def comparison_html(comparison: Comparison) -> str:
     for label, record in comparison.records.items():
         title = f"{label} on {record.environment.name}"
         runs.append(ReplayRun(record, comparison.histories[label], title, label=label))
-    return f'<style>{_RUN_CSS}</style><div class="robocov-run">{replay_html(runs)}</div>'
+    return f'<style>{_RUN_CSS}</style><div class="robocov-run">{build_replay_html(runs)}</div>'
 
 
 def comparison_png(comparison: Comparison) -> bytes:

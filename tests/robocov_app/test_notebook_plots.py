@@ -23,8 +23,8 @@ from robocov.metrics import compute_cost_history
 from robocov_app import notebook as drawing_backend
 from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
+from robocov_app.look.colors import format_hex_color
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.report.theme_css import hex_code
 
 
 @pytest.fixture(autouse=True)
@@ -246,7 +246,7 @@ class TestNotebook:
         html = ROOMS._repr_html_()
         assert "prefers-color-scheme:dark" in html
         assert "data-jp-theme-light" in html and "data-vscode-theme-kind" in html
-        assert hex_code(DARK.background) in html
+        assert format_hex_color(DARK.background) in html
         (drawing,) = re.findall(r"<svg.*</svg>", html, flags=re.DOTALL)
         assert "#" not in drawing, "colors of a theme in the drawing"
 

@@ -15,8 +15,8 @@ from robocov.environment import Environment
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.render.density import density_kind, density_lines
-from robocov_app.report.pictures import density_picture
-from robocov_app.report.replay import embedded_map
+from robocov_app.report.embedding import embed_map
+from robocov_app.report.pictures import build_density_image
 
 PLAIN = Environment("plain", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)))
 HEAVY = PLAIN.with_density(Gaussians((Gaussian((5.0, 5.0), 4.0, sigma=1.0),), 0.5))
@@ -109,9 +109,9 @@ def test_a_report_shows_and_tells_it(maps, capsys, tmp_path) -> None:
 
 
 def test_the_picture_in_pages() -> None:
-    assert density_picture(PLAIN) == density_picture(PLAIN.with_density(Uniform(2.0))) == ""
-    assert "density" not in embedded_map(PLAIN)
-    address = embedded_map(HEAVY)["density"]
+    assert build_density_image(PLAIN) == build_density_image(PLAIN.with_density(Uniform(2.0))) == ""
+    assert "density" not in embed_map(PLAIN)
+    address = embed_map(HEAVY)["density"]
     head, _, data = address.partition(",")
     assert head == "data:image/png;base64"
     with Image.open(io.BytesIO(base64.b64decode(data))) as image:
@@ -121,7 +121,7 @@ def test_the_picture_in_pages() -> None:
     # the top row first: the peak at (5, 5) m of 6 x 6 m
     assert abs(row - 13) <= 2 and abs(column - 66) <= 2
     cut = Environment("cut", ((0.0, 0.0), (6.0, 0.0), (0.0, 6.0)), density=HEAVY.density)
-    with Image.open(io.BytesIO(base64.b64decode(density_picture(cut).partition(",")[2]))) as image:
+    with Image.open(io.BytesIO(base64.b64decode(build_density_image(cut).partition(",")[2]))) as image:
         assert not np.asarray(image)[5:20, 60:, 3].any()
 
 

@@ -19,11 +19,11 @@ from robocov_app.figures.page import quiet_axes, tone
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report import replay
-from robocov_app.report.document import template
+from robocov_app.report.document import load_template
 from robocov_app.report.plots import Plot
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.tables import Table
-from robocov_app.report.theme_css import theme_rules
+from robocov_app.report.theme_css import build_theme_rules
 
 
 class Quantity(NamedTuple):
@@ -124,11 +124,11 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     }
     if not tracks:
         raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
-    page = template("benchmark.html.jinja").render(
+    page = load_template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
         version=__version__,
-        style=theme_rules(":root") + replay.asset("report.css"),
+        style=build_theme_rules(":root") + replay.read_asset("report.css"),
         marks=MARKER_PATHS,
         looks=entries.styles,
         overview=_build_overview(labels, tracks),

@@ -83,7 +83,7 @@ def _write_report(
     options: Arguments, sections: Sequence[tuple[Path, str]], target: Path, scratch: Path
 ) -> None:
     """Gather the results, write the page, and print the answer."""
-    from robocov_app.report.document import report
+    from robocov_app.report.document import build_report
     from robocov_app.report.results import gathered
 
     results = [replace(gathered(folder), part=description) for folder, description in sections]
@@ -91,7 +91,7 @@ def _write_report(
     results = _read_runs(options, results)
     _check_damaged_runs(options, results)
     results = _add_references(options, results)
-    page = report(results, title=options.title, theme=options.theme)
+    page = build_report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
     # The report in the folder of a run is registered as one of its files, so that it is replaced with it.
     is_in_run_folder = target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep"

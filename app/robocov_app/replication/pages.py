@@ -34,9 +34,16 @@ from robocov_app.replication.paper_figures import CAPTIONS, FIGURES
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, UNSEEN, Plan
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
 from robocov_app.replication.svg_marks import DotStrip, draw_interval_bar, draw_strips
-from robocov_app.report.pictures import run_picture
-from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
-from robocov_app.report.theme_css import theme_rules
+from robocov_app.report.embedding import ReplayRun
+from robocov_app.report.pictures import draw_run
+from robocov_app.report.replay import (
+    build_replay_part,
+    read_asset,
+    read_replay_css,
+    read_replay_js,
+    wrap_script,
+)
+from robocov_app.report.theme_css import build_theme_rules
 from robocov_app.sweep.parameters import UNITS
 from robocov_app.terminal.output import replace_non_finite
 
@@ -119,7 +126,7 @@ def build_paper_page(
         "images": figure_files,
         "figures": numbered_figures,
         "replay": _build_replay(runs),
-        "replay_script": Markup(script(f"{replay_js()}startReplays();")),
+        "replay_script": Markup(wrap_script(f"{read_replay_js()}startReplays();")),
         "versions": list_versions(),
         "all_bundled": len(plan.bundled) == len(NON_CONVEX),
     }
@@ -134,7 +141,7 @@ def _build_replay(runs: Mapping[str, FigureRun]) -> Markup:
         figure = _FIGURES_OF_CASES[name.partition("/")[0]]
         replays.append(ReplayRun(run.record, run.history, f"{figure}: {run.record.label}"))
     panes = [list(runs).index(name) for name in _REPLAY_PANES]
-    return Markup(replay_part(replays, panes, _MAX_REPLAY_BYTES))
+    return Markup(build_replay_part(replays, panes, _MAX_REPLAY_BYTES))
 
 
 def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
@@ -242,7 +249,7 @@ def _show_failures(
         if key not in OURS:
             stuck = outcomes.get_values(key, "stuck")[k]
             description += f"; {stuck:.0f} of {len(record.team)} robots rest away from their goals"
-        picture = Markup(run_picture(record, None, *_PICTURE_SIZE_PX, numbers=True))
+        picture = Markup(draw_run(record, None, *_PICTURE_SIZE_PX, has_numbers=True))
         failures.append(ShownFailure(instance, picture, f"{description}."))
     return failures
 
@@ -287,7 +294,7 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         quick=plan.name == "quick",
     )
     own_style = (ASSETS / "paper.css").read_text("utf-8")
-    style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own_style)
+    style = Markup(build_theme_rules(":root") + read_replay_css() + read_asset("report.css") + own_style)
     return escape_controls(environment.get_template(template).render(style=style, **context))
 
 

@@ -1,4 +1,4 @@
-"""Small pictures of maps and runs as SVG without a script, in CSS variables: for light, dark and paper."""
+"""Small pictures of maps and runs as SVG in a page, with the colors of the page: light, dark or paper."""
 
 import base64
 import io
@@ -11,215 +11,297 @@ from PIL import Image
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import format_count
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.look.colors import mix
 from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.density import density_label, dots, shading
+from robocov_app.render.density import dots, shading
 from robocov_app.render.layout import fitted_radii, mark_size
-from robocov_app.render.scene import moving_obstacles
+from robocov_app.render.scene import MovingObstacle, moving_obstacles
+from robocov_app.report.descriptions import describe_map, describe_run
 from robocov_app.runs.saved_runs import build_roster
 
-_MARGIN = 3.0  # pixels round the region
-_FINE = 0.2  # pixels by which a line may be simplified
-_DOTS = 80  # dots along the longer side of the picture of a density
-# seconds between the first moment and the last, if there are no others, above which they tell no path
-SPARSE = 1.5
-# robots up to which cells and trajectories are drawn: a larger team would make too large a picture
-MOST_ROBOTS = 400
+MAX_ROBOTS = 400
+"""Robots up to which cells and trajectories are drawn. Those of more would make the page too large."""
+MAX_TWO_MOMENT_SPAN_S = 1.5
+"""Two moments that are farther apart than this do not show where the robots went."""
+_SIZE_PX = (300.0, 220.0)
+_MARGIN_PX = 3.0
+_TOLERANCE_PX = 0.2
+"""Lines may be simplified by this."""
+_DENSITY_DOTS = 80
+"""Dots of the image of a density along its longer side."""
+_NUMBER_SIZES = (1.35, 1.15, 0.9, 0.7)
+"""Text sizes of numbers of one, two, three and more digits, in radii of the robot."""
+_MIN_NUMBER_PX = 6.0
 
 
-class Frame:
-    """Transform from meters to the pixels of a picture of at most `width` by `height`."""
+class PictureFrame:
+    """Transform from meters to the pixels of a picture.
+
+    Parameters
+    ----------
+    environment : Environment
+        Its region fills the picture.
+    width, height : float, px
+        Maximum size.
+
+    Attributes
+    ----------
+    width, height : float, px
+        Size of the picture.
+    zoom : float, px/m
+    corner : (2,) array, m
+        Upper left corner of the region.
+    """
 
     def __init__(self, environment: Environment, width: float, height: float) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds
-        room_x, room_y = width - 2 * _MARGIN, height - 2 * _MARGIN
-        self.zoom = min(room_x / (high_x - low_x), room_y / (high_y - low_y))
+        free_width = width - 2 * _MARGIN_PX
+        free_height = height - 2 * _MARGIN_PX
+        self.zoom = min(free_width / (high_x - low_x), free_height / (high_y - low_y))
         self.corner = np.array([low_x, high_y])
-        self.width = round(self.zoom * (high_x - low_x) + 2 * _MARGIN, 1)
-        self.height = round(self.zoom * (high_y - low_y) + 2 * _MARGIN, 1)
+        self.width = round(self.zoom * (high_x - low_x) + 2 * _MARGIN_PX, 1)
+        self.height = round(self.zoom * (high_y - low_y) + 2 * _MARGIN_PX, 1)
 
-    def at(self, points: Array) -> Array:
-        """Return (..., 2) m as pixels from the upper left corner."""
-        return np.asarray((points - self.corner) * np.array([self.zoom, -self.zoom]) + _MARGIN)
+    def to_pixels(self, points: Array) -> Array:
+        """Return (..., 2) points, m, as pixels from the upper left corner."""
+        return np.asarray((points - self.corner) * np.array([self.zoom, -self.zoom]) + _MARGIN_PX)
 
 
-def density_picture(environment: Environment) -> str:
-    """Return a ``data:image/png`` of the density over the region's box, clear outside; empty without one."""
+def build_density_image(environment: Environment) -> str:
+    """Build an image of the density over the bounding box of the region.
+
+    Parameters
+    ----------
+    environment : Environment
+
+    Returns
+    -------
+    str
+        Address ``data:image/png;...``, transparent outside the region; empty if the density is uniform.
+    """
     if environment.density is None or environment.density.is_uniform:
         return ""
-    picture = shading(environment, _DOTS, LIGHT)
-    # one color for light and dark: it is between the two
-    picture[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
-    x, y = np.meshgrid(*dots(environment, _DOTS))
-    inside = environment.region.contains(np.column_stack([x.ravel(), y.ravel()]))
-    picture[~inside.reshape(x.shape), 3] = 0
+    pixels = shading(environment, _DENSITY_DOTS, LIGHT)
+    # An image has one color for both themes: between the two.
+    pixels[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
+    x, y = np.meshgrid(*dots(environment, _DENSITY_DOTS))
+    is_inside = environment.region.contains(np.column_stack([x.ravel(), y.ravel()]))
+    pixels[~is_inside.reshape(x.shape), 3] = 0
     file = io.BytesIO()
-    Image.fromarray(picture[::-1]).save(file, "PNG", optimize=True)
+    Image.fromarray(pixels[::-1]).save(file, "PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
-def rings_of(area: shapely.Geometry) -> list[Array]:
-    """Return the rings of polygons, (k, 2) m each, open, of each polygon the outer one first."""
+def extract_rings(area: shapely.Geometry) -> list[Array]:
+    """Return the rings of polygons, (k, 2) m each, not closed; of each polygon the outer one first."""
     return [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(shapely.get_parts(area))]
 
 
 def has_path(record: Record) -> bool:
-    """Return whether there is more than the first moment and the last, to tell where the robots went."""
-    return len(record) > 2 or (len(record) == 2 and float(record.time[1] - record.time[0]) <= SPARSE)
+    """Return whether a record shows where the robots went, not only its start and its end."""
+    if len(record) == 2:
+        return float(record.time[1] - record.time[0]) <= MAX_TWO_MOMENT_SPAN_S
+    return len(record) > 2
 
 
-def lives(record: Record) -> list[tuple[float, float | None]]:
-    """Return when each robot is first there (never: after the end) and fails (never: None), s."""
-    since = record.time - record.time[0]
-    found: list[tuple[float, float | None]] = []
-    for present, working in zip(record.present.T, record.working.T, strict=True):
-        begins, failed = np.flatnonzero(present), np.flatnonzero(present & ~working)
-        begin = float(since[begins[0]]) if len(begins) else float(since[-1]) + 1.0
-        found.append((begin, float(since[failed[0]]) if len(failed) else None))
-    return found
+def draw_map(environment: Environment, width: float = _SIZE_PX[0], height: float = _SIZE_PX[1]) -> str:
+    """Draw a map as an SVG element of at most a width and a height, px."""
+    frame = PictureFrame(environment, width, height)
+    return _build_svg(frame, _draw_map_shapes(environment, frame, 0.0), describe_map(environment))
 
 
-def map_picture(environment: Environment, width: float = 300.0, height: float = 220.0) -> str:
-    frame = Frame(environment, width, height)
-    return _svg(frame, _map_shapes(environment, frame, 0.0), map_sentence(environment))
-
-
-def run_picture(
+def draw_run(
     record: Record,
     history: CostHistory | None,
-    width: float = 300.0,
-    height: float = 220.0,
+    width: float = _SIZE_PX[0],
+    height: float = _SIZE_PX[1],
     *,
-    numbers: bool = False,
-    hidden: bool = False,
+    has_numbers: bool = False,
+    is_hidden: bool = False,
 ) -> str:
-    """Return a run as an SVG element; with `numbers` on robots, or `hidden` from screen readers."""
-    frame = Frame(record.environment, width, height)
-    n, last = len(record.team), record.positions[-1]
-    parts: list[str] = []
-    if n <= MOST_ROBOTS:
-        cells, working = record.cells(), np.flatnonzero(record.working[-1])
-        hues = choose_robot_hues(n, working[cells.adjacency] if n > MAX_OWN_HUES else None).tolist()
-        for cell, owner in zip(*cells.outlines, strict=True):
+    """Draw a run as an SVG element: map, trajectories, and the final positions and cells.
+
+    Parameters
+    ----------
+    record : Record
+    history : CostHistory or None
+        For the description.
+    width, height : float, px
+        Maximum size.
+    has_numbers : bool
+        Whether robots bear their numbers.
+    is_hidden : bool
+        Whether the picture is hidden from screen readers, since a text next to it says the same.
+
+    Returns
+    -------
+    str
+    """
+    environment = record.environment
+    frame = PictureFrame(environment, width, height)
+    shapes = [
+        _draw_cells(record, frame),
+        _draw_map_shapes(environment, frame, float(record.time[-1])),
+        _draw_trajectories(record, frame),
+        _draw_starts(record, frame),
+        _draw_robots(record, frame, has_numbers=has_numbers),
+    ]
+    description = None if is_hidden else describe_run(record, history)
+    return _build_svg(frame, "".join(shapes), description)
+
+
+def _draw_cells(record: Record, frame: PictureFrame) -> str:
+    """Draw the final Voronoi cells."""
+    robots = len(record.team)
+    if robots > MAX_ROBOTS:
+        return ""
+    cells = record.cells()
+    working = np.flatnonzero(record.working[-1])
+    adjacency = working[cells.adjacency] if robots > MAX_OWN_HUES else None
+    hues = choose_robot_hues(robots, adjacency).tolist()
+    paths = []
+    for outline, owner in zip(*cells.outlines, strict=True):
+        if len(outline) > 2:
             hue = hues[working[int(owner)]]
-            if len(cell) > 2:
-                parts.append(f'<path class="cell c{hue}" d="{_path([frame.at(cell)], closed=True)}"/>')
-    parts.append(_map_shapes(record.environment, frame, float(record.time[-1])))
-    # before it joins, a robot goes nowhere
-    began, joined = np.argmax(record.present, axis=0), record.present.any(axis=0)
-    if has_path(record) and n <= MOST_ROBOTS:
-        tracks = np.moveaxis(frame.at(record.positions), 1, 0)
-        there = [track[first:] for track, first in zip(tracks, began, strict=True)]
-        lines = [shapely.simplify(shapely.LineString(track), _FINE) for track in there if len(track) > 1]
-        parts.append(f'<path class="way" d="{_path(map(shapely.get_coordinates, lines))}"/>')
-    starts, ends = frame.at(record.positions[began[joined], np.flatnonzero(joined)]), frame.at(last)
-    ring = mark_size(starts, 2.4, 5.0) / 2
-    parts += [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{ring:.1f}"/>' for x, y in starts]
-    radii = fitted_radii(ends, record.team.radius * frame.zoom, 1.5, 9.0 if numbers else 4.5)
-    states = zip(record.present[-1], record.working[-1], strict=True)
-    for number, (x, y), r, (there, works) in zip(
-        build_roster(record).numbers, ends, radii, states, strict=True
-    ):
-        if not there:
-            continue
-        kind = "robot" if works else "failed"
-        parts.append(f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>')
-        size = r * (1.35, 1.15, 0.9, 0.7)[min(len(str(number)), 4) - 1]
-        if not works:  # crossed out
-            a = 0.62 * r
-            ends_of = ((y - s * a, y + s * a) for s in (1, -1))
-            cross = "".join(f"M{x - a:.1f} {low:.1f}L{x + a:.1f} {high:.1f}" for low, high in ends_of)
-            parts.append(f'<path class="failed" d="{cross}"/>')
-        elif numbers and size >= 6.0:
-            below = y + 0.36 * size
-            parts.append(f'<text x="{x:.1f}" y="{below:.1f}" font-size="{size:.1f}">{number}</text>')
-    return _svg(frame, "".join(parts), None if hidden else run_sentence(record, history))
+            line = _format_path([frame.to_pixels(outline)], is_closed=True)
+            paths.append(f'<path class="cell c{hue}" d="{line}"/>')
+    return "".join(paths)
 
 
-def map_sentence(environment: Environment) -> str:
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
-    count, weighed = len(environment.obstacles), density_label(environment)
-    moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
-    obstacles = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
-    obstacles += f" ({moving} moving)" if moving else ""
-    return (
-        f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m {obstacles}, "
-        f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked"
-        f"{', ' if weighed else ''}{weighed}."
-    )
+def _draw_trajectories(record: Record, frame: PictureFrame) -> str:
+    """Draw the trajectories as one path, each from where its robot joined."""
+    if not has_path(record) or len(record.team) > MAX_ROBOTS:
+        return ""
+    first_rows = np.argmax(record.present, axis=0)
+    tracks = np.moveaxis(frame.to_pixels(record.positions), 1, 0)
+    lines = []
+    for track, first_row in zip(tracks, first_rows, strict=True):
+        track_since_join = track[first_row:]
+        if len(track_since_join) > 1:
+            simplified = shapely.simplify(shapely.LineString(track_since_join), _TOLERANCE_PX)
+            lines.append(shapely.get_coordinates(simplified))
+    return f'<path class="way" d="{_format_path(lines)}"/>'
 
 
-def run_sentence(record: Record, history: CostHistory | None) -> str:
-    robots, span = format_count(len(record.team), "robot"), record.time[-1] - record.time[0]
-    start = f" from start {record.start}" if record.start else ""
-    head = f"{record.label} on map {record.environment.name}: trajectories of"
-    words = [f"{head} {robots}{start} over {span:.4g} s."]
-    changes = []  # who joined and who failed
-    for number, (begin, failed) in zip(build_roster(record).numbers, lives(record), strict=True):
-        if record.conditions is not None and 0.0 < begin <= span:
-            changes.append((begin, f"robot {number} joins at {begin:.1f} s"))
-        if record.conditions is not None and failed is not None:
-            changes.append((failed, f"robot {number} fails at {failed:.1f} s"))
-    if changes:
-        text = ", ".join(change for _, change in sorted(changes))
-        words.append(f"{text[0].upper()}{text[1:]}.")
-    if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
-        first, final = history.mean_distance[[0, -1]]
-        goes = "falls" if final < first else "goes"
-        weighed = ", weighed by φ," if density_label(record.environment) else ""
-        change = f"{goes} from {first:.3f} m to {final:.3f} m"
-        words.append(f"The mean distance to the nearest robot{weighed} {change}.")
-        if history.mean_time is not None and np.isfinite(history.mean_time[[0, -1]]).all():
-            first, final = history.mean_time[[0, -1]]
-            words.append(f"The mean time until the first is there goes from {first:.3f} s to {final:.3f} s.")
-    return " ".join(words)
+def _draw_starts(record: Record, frame: PictureFrame) -> str:
+    """Draw a ring where each robot started."""
+    first_rows = np.argmax(record.present, axis=0)
+    joined = np.flatnonzero(record.present.any(axis=0))
+    starts = frame.to_pixels(record.positions[first_rows[joined], joined])
+    radius = mark_size(starts, 2.4, 5.0) / 2
+    rings = [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>' for x, y in starts]
+    return "".join(rings)
 
 
-def _svg(frame: Frame, content: str, sentence: str | None) -> str:
-    label = 'aria-hidden="true"' if sentence is None else f'role="img" aria-label="{escape(sentence)}"'
-    # no size of its own: the page gives it a width, and the view box the height
+def _draw_robots(record: Record, frame: PictureFrame, *, has_numbers: bool) -> str:
+    """Draw the final positions; failed robots are crossed out."""
+    centers = frame.to_pixels(record.positions[-1])
+    max_radius = 9.0 if has_numbers else 4.5
+    radii = fitted_radii(centers, record.team.radius * frame.zoom, 1.5, max_radius)
+    numbers = build_roster(record).numbers
+    shapes = []
+    for robot in np.flatnonzero(record.present[-1]).tolist():
+        x, y = centers[robot].tolist()
+        radius = float(radii[robot])
+        is_working = bool(record.working[-1, robot])
+        kind = "robot" if is_working else "failed"
+        shapes.append(f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>')
+        if not is_working:
+            shapes.append(_draw_cross(x, y, radius))
+        elif has_numbers:
+            shapes.append(_draw_number(numbers[robot], x, y, radius))
+    return "".join(shapes)
+
+
+def _draw_cross(x: float, y: float, radius: float) -> str:
+    """Draw the cross on a failed robot."""
+    arm = 0.62 * radius
+    falling = f"M{x - arm:.1f} {y - arm:.1f}L{x + arm:.1f} {y + arm:.1f}"
+    rising = f"M{x - arm:.1f} {y + arm:.1f}L{x + arm:.1f} {y - arm:.1f}"
+    return f'<path class="failed" d="{falling}{rising}"/>'
+
+
+def _draw_number(number: int, x: float, y: float, radius: float) -> str:
+    """Draw the number of a robot, nothing if it would be too small to read."""
+    digits = min(len(str(number)), len(_NUMBER_SIZES))
+    size = radius * _NUMBER_SIZES[digits - 1]
+    if size < _MIN_NUMBER_PX:
+        return ""
+    baseline = y + 0.36 * size
+    return f'<text x="{x:.1f}" y="{baseline:.1f}" font-size="{size:.1f}">{number}</text>'
+
+
+def _build_svg(frame: PictureFrame, content: str, description: str | None) -> str:
+    """Build the SVG element. It has no size: the page gives it a width, and the view box the height."""
+    if description is None:
+        label = 'aria-hidden="true"'
+    else:
+        label = f'role="img" aria-label="{escape(description)}"'
     box = f"0 0 {frame.width:g} {frame.height:g}"
     return f'<svg class="robocov-picture" viewBox="{box}" {label}>{content}</svg>'
 
 
-def _map_shapes(environment: Environment, frame: Frame, time: float) -> str:
-    """Return the shading of the density, what is blocked, what moves, and the boundary of the region."""
-    shapes = ""
-    if address := density_picture(environment):
-        wide, high = frame.width - 2 * _MARGIN, frame.height - 2 * _MARGIN
-        box = f'x="{_MARGIN:g}" y="{_MARGIN:g}" width="{wide:g}" height="{high:g}"'
-        shapes = f'<image {box} preserveAspectRatio="none" href="{address}"/>'
-    rings = rings_of(shapely.simplify(environment.at(time).blocked, _FINE / frame.zoom))
+def _draw_map_shapes(environment: Environment, frame: PictureFrame, time: float) -> str:
+    """Draw the density, obstacles, those that move, and the boundary of the region, at a time, s."""
+    shapes = [_draw_density(environment, frame)]
+    obstacles = shapely.simplify(environment.at(time).blocked, _TOLERANCE_PX / frame.zoom)
+    rings = [frame.to_pixels(ring) for ring in extract_rings(obstacles)]
     if rings:
-        shapes += f'<path class="blocked" d="{_path(map(frame.at, rings), closed=True)}"/>'
-    for obstacle in moving_obstacles(environment, time):
-        seen = shapely.intersection(obstacle.polygon, environment.region.polygon)
-        along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
-        across, middle = 0.45 * along[::-1] * np.array([-1.0, 1.0]), frame.at(obstacle.middle)
-        arrow = np.array([middle - along, middle + along])
-        head = np.array([middle + 0.2 * along + across, middle + along, middle + 0.2 * along - across])
-        shapes += (
-            f'<path class="blocked moving" d="{_path(map(frame.at, rings_of(seen)), closed=True)}"/>'
-            f'<path class="motion" d="{_path([frame.at(obstacle.path)])}"/>'
-            f'<path class="heading" d="{_path([arrow, head])}"/>'
-        )
-    region = _path([frame.at(environment.region.vertices)], closed=True)
-    return f'{shapes}<path class="region" d="{region}"/>'
+        shapes.append(f'<path class="blocked" d="{_format_path(rings, is_closed=True)}"/>')
+    moving = moving_obstacles(environment, time)
+    shapes += [_draw_moving_obstacle(obstacle, environment, frame) for obstacle in moving]
+    region = _format_path([frame.to_pixels(environment.region.vertices)], is_closed=True)
+    shapes.append(f'<path class="region" d="{region}"/>')
+    return "".join(shapes)
 
 
-def _path(lines: Iterable[Array], *, closed: bool = False) -> str:
-    """Return the path of lines of (k, 2) px: relative, in tenths of a pixel, that no error adds up."""
-    words = []
+def _draw_density(environment: Environment, frame: PictureFrame) -> str:
+    """Draw the density as an image."""
+    address = build_density_image(environment)
+    if not address:
+        return ""
+    width = frame.width - 2 * _MARGIN_PX
+    height = frame.height - 2 * _MARGIN_PX
+    box = f'x="{_MARGIN_PX:g}" y="{_MARGIN_PX:g}" width="{width:g}" height="{height:g}"'
+    return f'<image {box} preserveAspectRatio="none" href="{address}"/>'
+
+
+def _draw_moving_obstacle(obstacle: MovingObstacle, environment: Environment, frame: PictureFrame) -> str:
+    """Draw an obstacle that moves, its path, and an arrow in its direction."""
+    visible = shapely.intersection(obstacle.polygon, environment.region.polygon)
+    rings = [frame.to_pixels(ring) for ring in extract_rings(visible)]
+    middle = frame.to_pixels(obstacle.middle)
+    along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
+    across = 0.45 * along[::-1] * np.array([-1.0, 1.0])
+    tip = middle + along
+    shaft = np.array([middle - along, tip])
+    head = np.array([middle + 0.2 * along + across, tip, middle + 0.2 * along - across])
+    return (
+        f'<path class="blocked moving" d="{_format_path(rings, is_closed=True)}"/>'
+        f'<path class="motion" d="{_format_path([frame.to_pixels(obstacle.path)])}"/>'
+        f'<path class="heading" d="{_format_path([shaft, head])}"/>'
+    )
+
+
+def _format_path(lines: Iterable[Array], *, is_closed: bool = False) -> str:
+    """Return lines of (k, 2) px as SVG path data in relative steps, which are short.
+
+    Positions are rounded to tenths of a pixel before their differences are taken, so errors do not add up.
+    """
+    pieces = []
     for line in lines:
         tenths = np.rint(line * 10).astype(int)
         steps = np.diff(tenths, axis=0)
         steps = steps[(steps != 0).any(axis=1)]
         x, y = (tenths[0] / 10).tolist()
         moves = " ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps.tolist())
-        words.append(f"M{x:g} {y:g}" + (f"l{moves}" if moves else "h0") + ("z" if closed else ""))
-    return "".join(words)
+        piece = f"M{x:g} {y:g}"
+        # A line without length is drawn as a dot.
+        piece += f"l{moves}" if moves else "h0"
+        if is_closed:
+            piece += "z"
+        pieces.append(piece)
+    return "".join(pieces)

@@ -18,9 +18,9 @@ from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sa
 from robocov_app.figures.runs import share
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.report import groups as grouped
+from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.groups import Comparison, Group, Scales, ratio_text, setting_label
 from robocov_app.report.pictures import has_path
-from robocov_app.report.replay import ReplayRun
 from robocov_app.report.results import Entry, Result
 from robocov_app.report.svg import inline_svg
 from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS

@@ -11,8 +11,9 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from robocov_app.figures.files import plain_style
+from robocov_app.look.colors import format_hex_color
 from robocov_app.look.theme import LIGHT
-from robocov_app.report.theme_css import hex_code, named_colors
+from robocov_app.report.theme_css import list_css_colors
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
 _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": None, "Type": None}
@@ -127,6 +128,6 @@ def _colored(style: str) -> str:
 @cache
 def _variables() -> dict[str, str]:
     """Return what stands for each color of the light theme that plots use, its first name."""
-    colors = named_colors(LIGHT)
+    colors = list_css_colors(LIGHT)
     names = [*_PLOTTED, *(name for name in colors if name.startswith(("other-", "heat-")))]
-    return {hex_code(colors[name]): f"var(--rc-{name})" for name in reversed(names)}
+    return {format_hex_color(colors[name]): f"var(--rc-{name})" for name in reversed(names)}

@@ -1,53 +1,77 @@
-"""The project's colors as CSS variables, for pages that follow the reader's preference.
+"""The themes as CSS variables, for pages that follow the reader's preference.
 
-Every color has one name in both themes: what is drawn with names is right in light and dark.
+A color has the same name in both themes, so whatever is drawn with names is right in light and in dark.
 """
 
-from robocov_app.look.colors import Color, choose_text_color, mix
+from robocov_app.look.colors import Color, choose_text_color, format_hex_color, mix
 from robocov_app.look.theme import DARK, LIGHT, Theme, get_theme
 
+_LINE_FADE = 0.45
+"""Fraction of the background in lines that separate rows of tables."""
 
-def hex_code(color: Color) -> str:
-    return f"#{bytes(color).hex()}"
 
-
-def named_colors(theme: Theme) -> dict[str, Color]:
-    def own(*names: str) -> dict[str, Color]:
-        return {name: getattr(theme, name.replace("-", "_")) for name in names}
-
-    return {
-        **own("background", "panel", "ink", "faint", "grid"),
-        "line": mix(theme.grid, theme.background, 0.45),
-        "accent": theme.get_controller_color("rapf"),
+def list_css_colors(theme: Theme) -> dict[str, Color]:
+    """Return the colors of a theme by the names of their CSS variables, without ``--rc-``."""
+    accent = theme.get_controller_color("rapf")
+    colors = {
+        "background": theme.background,
+        "panel": theme.panel,
+        "ink": theme.ink,
+        "faint": theme.faint,
+        "grid": theme.grid,
+        "line": mix(theme.grid, theme.background, _LINE_FADE),
+        "accent": accent,
         "warning": theme.get_controller_color("rpf"),
-        **own("boundary", "obstacle", "obstacle-edge", "moving-obstacle", "cell-edge", "start", "final"),
+        "boundary": theme.boundary,
+        "obstacle": theme.obstacle,
+        "obstacle-edge": theme.obstacle_edge,
+        "moving-obstacle": theme.moving_obstacle,
+        "cell-edge": theme.cell_edge,
+        "start": theme.start,
+        "final": theme.final,
         "on-final": choose_text_color(theme.final),
-        "on-accent": choose_text_color(theme.get_controller_color("rapf")),
+        "on-accent": choose_text_color(accent),
         "trajectory": theme.trajectory,
         "ring": theme.robot_ring,
-        **{name: theme.get_controller_color(name) for name in theme.controllers},
-        **{f"other-{k}": color for k, color in enumerate(theme.others)},
-        **{f"cell-{k}": mix(theme.background, hue, theme.paper_tint) for k, hue in enumerate(theme.robots)},
-        **{f"heat-{k}": color for k, color in enumerate(theme.quiet_heat)},
     }
+    colors |= {name: theme.get_controller_color(name) for name in theme.controllers}
+    colors |= {f"other-{number}": color for number, color in enumerate(theme.others)}
+    colors |= {f"cell-{hue}": theme.get_paper_cell_color(hue) for hue in range(len(theme.robots))}
+    colors |= {f"heat-{level}": color for level, color in enumerate(theme.quiet_heat)}
+    return colors
 
 
-def variables(theme: Theme) -> str:
-    colors = "".join(f"--rc-{name}:{hex_code(color)};" for name, color in named_colors(theme).items())
-    return f"color-scheme:{theme.name};{colors}"
+def format_variables(theme: Theme) -> str:
+    """Return CSS declarations of the colors of a theme."""
+    colors = list_css_colors(theme).items()
+    declarations = "".join(f"--rc-{name}:{format_hex_color(color)};" for name, color in colors)
+    return f"color-scheme:{theme.name};{declarations}"
 
 
-def theme_rules(scope: str, theme: str = "auto") -> str:
-    """Return CSS that gives a selector its colors; "auto" follows notebook or browser, paper is white."""
-    light, dark = variables(LIGHT), variables(DARK)
+def build_theme_rules(scope: str, theme: str = "auto") -> str:
+    """Build the CSS that gives a selector its colors.
+
+    Parameters
+    ----------
+    scope : str
+        A selector.
+    theme : str
+        Name of a theme, or "auto" to follow the notebook or the browser. On paper it is always light.
+
+    Returns
+    -------
+    str
+    """
+    light = format_variables(LIGHT)
+    dark = format_variables(DARK)
     if theme != "auto":
-        return f"{scope}{{{variables(get_theme(theme))}}}@media print{{{scope}{{{light}}}}}\n"
+        return f"{scope}{{{format_variables(get_theme(theme))}}}@media print{{{scope}{{{light}}}}}\n"
     notebook = f':is([data-jp-theme-light="{{}}"],[data-vscode-theme-kind$="{{}}"]) {scope}'
     return (
         f"{scope}{{{light}}}"
         f"@media (prefers-color-scheme:dark){{{scope}{{{dark}}}}}"
         f"{notebook.format('true', 'light')}{{{light}}}"
         f"{notebook.format('false', 'dark')}{{{dark}}}"
-        # as strong as the rules for notebooks, and after them
+        # These are as specific as the rules for notebooks, and follow them, so that they win.
         f"@media print{{{scope},:is([data-jp-theme-light],[data-vscode-theme-kind]) {scope}{{{light}}}}}\n"
     )

@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 from drawn_run import ROOMS
 from driven_browser import CHROMIUM, DRIVER, Browser
+from moving_teams import build_moving_record, list_hues
 from reported_results import HOSTILE, entry, falling, walk, watched
 
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.voronoi import partition
+from robocov_app.look.axes import TICK_FACTORS, choose_value_limits
 from robocov_app.look.curve_styles import choose_controller_styles
+from robocov_app.look.labels import spread_labels
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.report.document import report
-from robocov_app.report.replay import ReplayRun, asset, embedded_map, embedded_run, replay_html
+from robocov_app.report.document import build_report
+from robocov_app.report.embedding import ReplayRun, embed_axis_rules, embed_map, embed_run
+from robocov_app.report.replay import build_replay_html, read_asset
 from robocov_app.report.results import Damaged
 
 pytestmark = [
@@ -83,7 +87,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "report.html"
     result = replace(watched([*ENTRIES, entry("lloyd", error="it broke")], seconds=SECONDS), wanted=9)
-    path.write_text(report([result]).html, encoding="utf-8")
+    path.write_text(build_report([result]).html, encoding="utf-8")
     return path
 
 
@@ -355,7 +359,7 @@ def test_hostile_names_do_nothing(browser, tmp_path) -> None:
     entries = [replace(entry(HOSTILE, seed, map_name=HOSTILE), label=HOSTILE) for seed in range(2)]
     path = tmp_path / "hostile.html"
     path.write_text(
-        report([watched(entries, replace(ROOMS, name=HOSTILE), seconds=2.0)]).html, encoding="utf-8"
+        build_report([watched(entries, replace(ROOMS, name=HOSTILE), seconds=2.0)]).html, encoding="utf-8"
     )
     browser.open(path)
     browser.find(".add").click()
@@ -366,7 +370,7 @@ def test_hostile_names_do_nothing(browser, tmp_path) -> None:
 
 def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
     runs = [ReplayRun(walk(seed=k, seconds=2.0), None, f"run {k}") for k in range(2)]
-    cells = "".join(f"<section>{replay_html([run])}</section>" for run in runs)
+    cells = "".join(f"<section>{build_replay_html([run])}</section>" for run in runs)
     path = tmp_path / "notebook.html"
     path.write_text(
         f'<!doctype html><meta charset="utf-8"><body data-jp-theme-light="false">{cells}', "utf-8"
@@ -389,7 +393,7 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
     places = record.positions[0]
     if robots == 5:
         places[4] = places[3]  # two in one place have the same cell
-    script = asset("arena.js") + (
+    script = read_asset("arena.js") + (
         "const [region, places] = arguments;"
         "return Array.from({length: places.length / 2}, (_, i) => cellOf(region, places, i))"
     )
@@ -405,10 +409,10 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
 def test_obstacles_are_where_they_are_in_the_run(browser, repeat) -> None:
     path = ObstaclePath(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0)), 0.7, repeat)
     cart = CircleObstacle((1.0, 1.0), 0.3, path=path)
-    (mover,) = embedded_map(replace(ROOMS, obstacles=(cart,)))["movers"]
+    (mover,) = embed_map(replace(ROOMS, obstacles=(cart,)))["movers"]
     mover["line"] = [0.001 * value for value in mover["line"]]
     for seconds in (0.0, 1.0, 4.5, 7.3, 20.0, 1234.5):
-        shift = browser.js(asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
+        shift = browser.js(read_asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
         assert shift == pytest.approx(path.compute_displacement(seconds).tolist(), abs=1e-6)
 
 
@@ -416,7 +420,7 @@ def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_
     record = replace(walk(), conditions=Conditions(failures=((2, 2.0),), joins=((3, 4.0),)))
     page = tmp_path / "replay.html"
     run = ReplayRun(record, falling(record, 2.0), "a run")
-    page.write_text(f"<!doctype html><main>{replay_html([run])}</main>", encoding="utf-8")
+    page.write_text(f"<!doctype html><main>{build_replay_html([run])}</main>", encoding="utf-8")
     browser.open(page)
     browser.until(lambda: browser.all(".chart"))
     notes = []
@@ -425,26 +429,49 @@ def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_
         notes.append(browser.find(".facts").text.partition(" m ")[2])
     assert notes == ["mean distance", "mean distance, robot 2 failed", "mean distance, robot 2 failed"]
     script = (
-        asset("data.js")
+        read_asset("data.js")
         + "const [data, times] = arguments; const run = new Run(data, new Plan(data.plan, () => {}));"
         + "return [times.map((time) => run.statesAt(time)), run.events.map(({said}) => said)]"
     )
-    data = embedded_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, goals=True)
-    states, said = browser.js(script, {**data, "plan": embedded_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
+    data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, has_goals=True)
+    states, said = browser.js(script, {**data, "plan": embed_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
     assert states == [[1, 1, 0, 1], [1, 2, 0, 1], [1, 2, 0, 1], [1, 2, 1, 1]]
     assert said == ["robot 2 fails", "robot 3 joins"]
     assert browser.complaints() == []
 
 
-def test_labels_of_curves_do_not_overlap(browser) -> None:
-    script = asset("arena.js") + asset("chart.js") + "return spreadApart(...arguments)"
+def test_labels_of_curves_are_where_figures_have_them(browser) -> None:
+    script = read_asset("arena.js") + read_asset("chart.js") + "return spreadLabels(...arguments)"
     rng = np.random.default_rng(2)
-    for count in (1, 2, 4, 7):
+    for count in (1, 2, 4, 7, 12):
         heights = rng.uniform(0.0, 120.0, count).tolist()
-        apart = browser.js(script, heights, 15, 0, 150)
-        order = np.argsort(heights, kind="stable")
-        assert (np.diff(np.array(apart)[order]) >= 15 - 1e-9).all()
-        assert min(apart) >= 0 and max(apart) <= 150
+        assert browser.js(script, heights, 15, 0, 150) == pytest.approx(spread_labels(heights, 15, 0, 150))
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(2.0, 6.0), (2.3, 6.0), (2.4, 6.0), (5.0, 6.0), (3.0, 3.0), (0.0, 0.0)]
+)
+def test_axes_of_curves_are_those_of_figures(browser, low, high) -> None:
+    script = read_asset("arena.js") + read_asset("chart.js") + "return limitsOf(...arguments)"
+    limits = browser.js(script, [{"end": 4.0, "range": {"low": low, "high": high}}], embed_axis_rules())
+    assert (limits["low"], limits["high"]) == pytest.approx(choose_value_limits(low, high))
+    assert limits["end"] == 4.0
+
+
+@pytest.mark.parametrize("robots", [12, 20, 30])
+def test_the_page_has_the_hues_of_the_data(browser, robots) -> None:
+    record = build_moving_record(robots)
+    run = ReplayRun(record, None, "a run")
+    data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, has_goals=False)
+    script = (
+        read_asset("data.js")
+        + "const [data, times] = arguments; const run = new Run(data, new Plan(data.plan, () => {}));"
+        + "return times.map((time) => run.huesAt(time))"
+    )
+    moments = [0, 1, data["count"] // 2, data["count"] - 1]
+    times = [min(moment * data["step"], data["end"]) for moment in moments]
+    shown = browser.js(script, {**data, "plan": embed_map(record.environment)}, times)
+    assert shown == list_hues(data["hues"], moments)
 
 
 ULP = float(np.spacing(2.0))
@@ -461,8 +488,8 @@ ULP = float(np.spacing(2.0))
     ],
 )
 def test_ticks_are_few_whatever_they_span(browser, low, high, wanted) -> None:
-    script = asset("arena.js") + asset("chart.js") + "return roundTicks(...arguments)"
-    assert browser.js(script, low, high, 5) == pytest.approx(wanted)
+    script = read_asset("arena.js") + read_asset("chart.js") + "return roundTicks(...arguments)"
+    assert browser.js(script, low, high, 5, TICK_FACTORS) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("values", [(2.0, 2.0 + ULP), (2.0, 2.0), (-0.0, 0.0), (1e-3, 1e300), (np.nan, 2.0)])
@@ -473,7 +500,7 @@ def test_no_curve_freezes_the_page(browser, tmp_path, values) -> None:
         distance = np.where(np.arange(len(time)) % 2, *values)
         result.loaded[folder] = saved._replace(history=replace(saved.history, mean_distance=distance))
     path = tmp_path / "page.html"
-    path.write_text(report([result]).html, encoding="utf-8")
+    path.write_text(build_report([result]).html, encoding="utf-8")
     browser.open(path)
     browser.until(lambda: browser.all(".pane"))
     browser.seek(1.0)
@@ -497,7 +524,7 @@ def test_no_name_is_too_long_for_a_page(browser, tmp_path, width) -> None:
     )
     result = replace(result, entries=(*result.entries, failed), damaged=(Damaged(name, name),))
     path = tmp_path / "names.html"
-    path.write_text(report([result], title=name).html, encoding="utf-8")
+    path.write_text(build_report([result], title=name).html, encoding="utf-8")
     browser.open(path, width, 844)
     browser.until(lambda: browser.all(".pane"))
     browser.js("for (const details of document.querySelectorAll('details')) details.open = true")

@@ -16,7 +16,7 @@ from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
 from robocov.text import escape_controls
 from robocov_app.look.curve_styles import MARKER_PATHS
-from robocov_app.report.document import MOST_LETTERS, report
+from robocov_app.report.document import MAX_WORD_CHARS, build_report
 from robocov_app.report.results import Damaged
 from robocov_app.runs.saved_runs import SavedRun
 
@@ -31,7 +31,7 @@ SWEEP = [
 @pytest.fixture(scope="module")
 def html() -> str:
     """A page of a sweep with gains, failures and missing runs."""
-    return report([replace(watched([*SWEEP, entry("mine", error=HOSTILE)]), wanted=40)]).html
+    return build_report([replace(watched([*SWEEP, entry("mine", error=HOSTILE)]), wanted=40)]).html
 
 
 def test_it_is_well_formed_and_its_ids_are_unique(html) -> None:
@@ -106,7 +106,7 @@ def test_hostile_names_stay_names() -> None:
     entries.append(replace(entries[0], error=HOSTILE, figures={}, start=HOSTILE, seed=9))
     result = watched(entries, replace(ROOMS, name=HOSTILE))
     result = replace(result, units={HOSTILE: HOSTILE}, meanings={HOSTILE: HOSTILE})
-    html = report([result], title=HOSTILE).html
+    html = build_report([result], title=HOSTILE).html
     page = Page(html)
     assert not page.all("img")
     assert [each.get("type") for each in page.all("script")] == ["application/json", None]
@@ -120,7 +120,9 @@ def test_hostile_names_stay_names() -> None:
 
 
 def test_the_same_results_give_the_same_bytes() -> None:
-    first, again = (report([watched([*SWEEP[:4], entry("mine", error=HOSTILE)])]).html for _ in range(2))
+    first, again = (
+        build_report([watched([*SWEEP[:4], entry("mine", error=HOSTILE)])]).html for _ in range(2)
+    )
     assert again == first
 
 
@@ -131,7 +133,7 @@ def test_fifty_runs_take_less_than_three_megabytes() -> None:
         for seed in range(25)
         for name in ("rapf", "rpf")
     ]
-    page = report([watched(entries, seconds=60.0, hz=60.0)])
+    page = build_report([watched(entries, seconds=60.0, hz=60.0)])
     assert page.shown == (50,)
     assert len(page.html.encode()) < 3_000_000
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page.html)[1])
@@ -144,7 +146,7 @@ def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
     result = watched(entries[:1], seconds=300.0, hz=5.0)
     (saved,) = result.loaded.values()
     loaded = {each.folder: SavedRun(each.folder, saved.record, saved.history) for each in entries}
-    page = report([result_of(entries, loaded=loaded, maps={"rooms": ROOMS})])
+    page = build_report([result_of(entries, loaded=loaded, maps={"rooms": ROOMS})])
     assert page.shown == (50,) and len(page.html.encode()) < 3_000_000
 
 
@@ -152,7 +154,7 @@ def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
 def test_several_results_are_sections_that_share_nothing() -> None:
     one = watched([entry(), entry("rpf", final=3.0)])
     other = watched([entry("lloyd", map_name="hall")], HALL)
-    page = report(
+    page = build_report(
         [replace(one, kind="comparison"), replace(other, kind="run"), replace(one, kind="comparison")]
     )
     parsed = Page(page.html)
@@ -164,9 +166,9 @@ def test_several_results_are_sections_that_share_nothing() -> None:
 
 
 def test_what_there_is_nothing_of_has_no_section() -> None:
-    headings = re.findall(r"<h2[^>]*>([^<]+)", report([replace(watched([entry()]), kind="run")]).html)
+    headings = re.findall(r"<h2[^>]*>([^<]+)", build_report([replace(watched([entry()]), kind="run")]).html)
     assert headings == ["What was run", "Results", "Replay", "Cost over time", "Metrics"]
-    failed = report([result_of([entry(error="it broke")])]).html
+    failed = build_report([result_of([entry(error="it broke")])]).html
     assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["What was run", "Failures"]
     assert "it broke" in failed and "No run has a result." in failed
 
@@ -183,14 +185,14 @@ def test_sections_are_there_where_they_tell_something(html) -> None:
 
 @pytest.mark.parametrize("theme", ["auto", "light", "dark"])
 def test_themes(theme) -> None:
-    html = report([watched([entry()])], theme=theme).html
+    html = build_report([watched([entry()])], theme=theme).html
     assert ("prefers-color-scheme" in html.partition("</style>")[0]) == (theme == "auto")
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: report([watched([entry()])], theme="sepia"), "unknown theme 'sepia'"),
+        (lambda: build_report([watched([entry()])], theme="sepia"), "unknown theme 'sepia'"),
     ],
 )
 def test_bad_input_is_named(call, message) -> None:
@@ -219,21 +221,21 @@ def test_variants_have_their_own_marks_and_names_in_tables_pictures_and_the_repl
 def test_a_long_name_is_cut_and_stands_whole_beside() -> None:
     name = "<b>" + "ü" * 297
     whole = name.replace("<", "&lt;").replace(">", "&gt;")
-    html = report([watched([entry(map_name=name)], replace(ROOMS, name=name))], title=name).html
+    html = build_report([watched([entry(map_name=name)], replace(ROOMS, name=name))], title=name).html
     page = Page(html)
     cut = [word for words in page.words for word in words.split() if "…" in word]
-    assert len(cut) >= 3 and max(map(len, cut)) <= MOST_LETTERS and f'title="{whole}"' in html
+    assert len(cut) >= 3 and max(map(len, cut)) <= MAX_WORD_CHARS and f'title="{whole}"' in html
 
 
 def test_a_result_all_of_whose_runs_are_damaged_is_a_section_that_says_so() -> None:
     lost = replace(result_of([]), damaged=(Damaged("run", "record.npz: no zip file"),), wanted=1)
-    html = report([watched([entry()]), lost]).html
+    html = build_report([watched([entry()]), lost]).html
     assert "1 run cannot be read and is left out: run (record.npz: no zip file)." in html
 
 
 def test_a_page_knows_its_own(tmp_path) -> None:
     path = tmp_path / "page.html"
-    path.write_text(report([watched([entry()])]).html)
+    path.write_text(build_report([watched([entry()])]).html)
     assert is_report(path)
     path.write_text("<!doctype html><title>mine</title>")
     assert not is_report(path) and not is_report(tmp_path / "none.html")
@@ -251,7 +253,7 @@ def test_marks_are_those_of_the_plots() -> None:
 def test_the_replay_explains_obstacles_that_move() -> None:
     cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
     words = [
-        "paler obstacles move" in report([watched([entry()], environment)]).html
+        "paler obstacles move" in build_report([watched([entry()], environment)]).html
         for environment in (ROOMS, replace(ROOMS, obstacles=(cart,)))
     ]
     assert words == [False, True]

@@ -16,26 +16,27 @@ from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov.team import Team
 from robocov.text import escape_controls
 from robocov_app.look.curve_styles import choose_controller_styles
-from robocov_app.report.pictures import has_path, lives
-from robocov_app.report.replay import (
-    NONE,
-    RATE,
+from robocov_app.report.descriptions import list_lifetimes
+from robocov_app.report.embedding import (
+    MAX_RATE_HZ,
+    NO_NUMBER,
     ReplayRun,
-    embedded,
-    embedded_map,
-    embedded_run,
-    even_times,
-    quantized,
-    script_json,
+    embed_map,
+    embed_replay,
+    embed_run,
+    format_script_json,
+    list_even_times,
+    quantize,
 )
+from robocov_app.report.pictures import has_path
 
 STYLE = choose_controller_styles(["rapf"])["rapf"]
 
 
 def read_back(text: str, low: float, high: float) -> np.ndarray:
-    """Return what `quantized` was given: an implementation of its own."""
+    """Return what `quantize` was given: an implementation of its own."""
     words = np.frombuffer(base64.b64decode(text), dtype="<u2").astype(float)
-    return np.where(words == NONE, np.nan, low + words / (NONE - 1) * (high - low))
+    return np.where(words == NO_NUMBER, np.nan, low + words / (NO_NUMBER - 1) * (high - low))
 
 
 def run_of(seconds: float = 6.0, **walking) -> ReplayRun:
@@ -56,7 +57,7 @@ def test_speeds_are_there_where_cells_are_by_time() -> None:
     mixed = replace(run.record, team=replace(run.record.team, max_speed=speeds))
     timed = replace(mixed, gains={**mixed.gains, "cells": "time"})
     found = [
-        embedded_run(replace(run, record=record), 0, STYLE, 5.0, goals=True)
+        embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)
         for record in (run.record, mixed, timed)
     ]
     assert ["speeds" in data for data in found] == [False, False, True]
@@ -67,18 +68,18 @@ def test_speeds_are_there_where_cells_are_by_time() -> None:
 def test_numbers_come_back_to_within_half_a_step(values) -> None:
     array = np.array(values)
     low, high = float(array.min()), float(array.max())
-    back = read_back(quantized(array, low, high), low, high)
-    assert np.abs(back - array).max() <= 0.51 * (high - low) / (NONE - 1) + 1e-12
+    back = read_back(quantize(array, low, high), low, high)
+    assert np.abs(back - array).max() <= 0.51 * (high - low) / (NO_NUMBER - 1) + 1e-12
 
 
 def test_what_is_not_there_stays_so() -> None:
-    back = read_back(quantized(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
+    back = read_back(quantize(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
     assert np.isnan(back).tolist() == [False, True, True, False]
 
 
 @given(st.floats(0.0, 500.0), st.sampled_from([0.05, 1.0, 1.25, 2.5, 5.0]))
 def test_even_times_begin_at_zero_and_end_at_the_end(end, rate) -> None:
-    times = even_times(end, rate)
+    times = list_even_times(end, rate)
     assert times[0] == 0.0 and times[-1] == pytest.approx(end, abs=1e-8)
     steps = np.diff(times)
     assert (steps > 0.0).all() and (steps <= 1.0 / rate + 1e-9).all()
@@ -89,7 +90,7 @@ def test_even_times_begin_at_zero_and_end_at_the_end(end, rate) -> None:
 @pytest.mark.parametrize("seconds", [6.0, 4.35])
 def test_positions_are_those_of_the_record(hz, seconds) -> None:
     run = run_of(seconds, hz=hz)
-    data = embedded_run(run, 0, STYLE, RATE, goals=True)
+    data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
     record = run.record
     times = np.minimum(np.arange(data["count"]) * data["step"], data["end"])
     wanted = np.stack(
@@ -106,7 +107,7 @@ def test_positions_are_those_of_the_record(hz, seconds) -> None:
 
 def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
     run = run_of()
-    cost = embedded_run(run, 0, STYLE, RATE, goals=True)["cost"]
+    cost = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)["cost"]
     assert run.history is not None
     times = np.minimum(np.arange(cost["count"]) * cost["step"], 6.0)
     wanted = np.interp(times, run.history.time, run.history.mean_distance)
@@ -116,13 +117,13 @@ def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
 
 def test_a_run_without_goals_cost_or_path() -> None:
     record = walk(controller="rpf")
-    data = embedded_run(ReplayRun(record, None, "x"), 0, STYLE, RATE, goals=True)
+    data = embed_run(ReplayRun(record, None, "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
     assert data["goals"] is None and data["cost"] is None and data["path"]
     ends = replace(
         record, **{name: getattr(record, name)[[0, -1]] for name in ("time", "positions", "goals")}
     )
     assert not has_path(ends)
-    data = embedded_run(ReplayRun(ends, falling(record, 2.0), "x"), 0, STYLE, RATE, goals=True)
+    data = embed_run(ReplayRun(ends, falling(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
     assert data["count"] == 2 and not data["path"]
     assert data["cost"]["count"] > 20  # of the cost there is more
     assert np.abs(places_of(data, record) - record.positions[[0, -1]]).max() < 1e-3
@@ -132,30 +133,32 @@ def test_goals_that_come_and_go_are_none_where_they_are_not() -> None:
     record = walk(hz=5.0)
     record.goals[:10] = np.nan
     run = ReplayRun(record, None, "x")
-    data = embedded_run(run, 0, STYLE, RATE, goals=True)
+    data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
     gone = np.isnan(places_of(data, record, "goals")).all(axis=(1, 2))
     assert gone.tolist() == [k < 10 for k in range(data["count"])]
 
 
 def test_it_is_told_when_robots_are_there_and_when_they_fail() -> None:
     run = run_of()
-    assert "lives" not in embedded_run(run, 0, STYLE, 5.0, goals=True)
+    assert "lives" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
     bad = Conditions(failures=((2, 2.0), (4, 5.0)), joins=((3, 1.5), (4, 3.0)))
     record = replace(run.record, conditions=bad)
-    assert lives(record) == [(0.0, None), (0.0, 2.0), (1.5, None), (3.0, 5.0)]
-    assert embedded_run(replace(run, record=record), 0, STYLE, 5.0, goals=True)["lives"] == lives(record)
+    assert list_lifetimes(record) == [(0.0, None), (0.0, 2.0), (1.5, None), (3.0, 5.0)]
+    assert embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)["lives"] == list_lifetimes(
+        record
+    )
     # who never comes is there after the end
     late = replace(run.record, conditions=Conditions(joins=((1, 99.0),)))
-    assert lives(late)[0] == (7.0, None)
+    assert list_lifetimes(late)[0] == (7.0, None)
 
 
 def test_obstacles_that_move_are_apart_from_those_that_stand() -> None:
     path = ObstaclePath(((2.0, 3.0), (4.0, 3.0), (4.0, 5.0)), 0.5, "back-and-forth")
     cart = PolygonObstacle(((1.5, 2.5), (2.5, 2.5), (2.5, 3.5)), path=path)
     environment = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
-    data = embedded_map(environment)
-    assert data["blocked"] == embedded_map(ROOMS)["blocked"]
-    assert "movers" not in embedded_map(ROOMS)
+    data = embed_map(environment)
+    assert data["blocked"] == embed_map(ROOMS)["blocked"]
+    assert "movers" not in embed_map(ROOMS)
     (mover,) = data["movers"]
     assert (np.array(mover["line"]) * data["unit"]).tolist() == [2, 3, 4, 3, 4, 5, 4, 3, 2, 3]
     assert mover["speed"] == 0.5
@@ -166,14 +169,14 @@ def test_obstacles_that_move_are_apart_from_those_that_stand() -> None:
 
 def test_a_run_of_a_single_moment() -> None:
     record = walk(seconds=0.0)
-    data = embedded_run(ReplayRun(record, falling(record, 2.0), "x"), 0, STYLE, RATE, goals=True)
+    data = embed_run(ReplayRun(record, falling(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
     assert data["end"] == 0.0 and data["count"] == 1
     json.dumps(data, allow_nan=False)
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
 def test_maps_are_rounded_to_millimeters(environment) -> None:
-    data = embedded_map(environment)
+    data = embed_map(environment)
     assert data["unit"] == 1e-3
     ring = np.array(data["region"]).reshape(-1, 2) * data["unit"]
     assert np.abs(ring - environment.region.vertices).max() <= 0.51e-3
@@ -183,22 +186,22 @@ def test_maps_are_rounded_to_millimeters(environment) -> None:
 
 def test_tiny_maps_are_rounded_less() -> None:
     tiny = Environment("tiny", ((0, 0), (0.05, 0), (0.05, 0.02), (0, 0.02)))
-    data = embedded_map(tiny)
+    data = embed_map(tiny)
     assert np.array(data["bounds"]) * data["unit"] == pytest.approx([0, 0, 0.05, 0.02], abs=1e-5)
 
 
 def test_runs_of_one_map_share_it() -> None:
     runs = [run_of(), run_of(seed=1), run_of(environment=HALL)]
-    data = embedded(runs, [STYLE] * 3, [0, 2])
+    data = embed_replay(runs, [STYLE] * 3, [0, 2])
     assert [each["map"] for each in data["runs"]] == [0, 0, 1]
-    assert data["panes"] == [0, 2] and len(data["maps"]) == 2 and data["rate"] == RATE
+    assert data["panes"] == [0, 2] and len(data["maps"]) == 2 and data["rate"] == MAX_RATE_HZ
 
 
 def test_what_is_too_much_is_thinned() -> None:
     runs = [run_of(60.0) for _ in range(4)]
     sizes = []
     for budget in (1_000_000, 60_000, 20_000, 4_000, 500):
-        data = embedded(runs, [STYLE] * 4, [0], budget)
+        data = embed_replay(runs, [STYLE] * 4, [0], budget)
         sizes.append(len(json.dumps(data["runs"])))
         assert sizes[-1] < budget + 4 * 450  # names and numbers come on top
         assert data["runs"][0]["end"] == 60.0
@@ -206,19 +209,19 @@ def test_what_is_too_much_is_thinned() -> None:
 
 
 def test_no_name_ends_its_script_element() -> None:
-    text = script_json({"name": HOSTILE, "more": "\u2029<&>"})
+    text = format_script_json({"name": HOSTILE, "more": "\u2029<&>"})
     assert not set(text) & set("<>&\u2028\u2029")
     assert json.loads(text)["name"] == escape_controls(HOSTILE)
 
 
 def test_headings_come_along_where_robots_turn() -> None:
     run = run_of()
-    assert "headings" not in embedded_run(run, 0, STYLE, 5.0, goals=True)
+    assert "headings" not in embed_run(run, 0, STYLE, 5.0, has_goals=True)
     count, n = run.record.positions.shape[:2]
     angles = np.linspace(0.0, 3.0, count)[:, None] + np.arange(n)
     turning = Team.homogeneous(n, kinematics="unicycle")
     record = replace(run.record, team=turning, steering=np.stack([angles, 0.0 * angles], axis=2))
-    data = embedded_run(replace(run, record=record), 0, STYLE, 5.0, goals=True)
+    data = embed_run(replace(run, record=record), 0, STYLE, 5.0, has_goals=True)
     x, y = read_back(data["headings"], -1.0, 1.0).reshape(data["count"], -1, 2).transpose(2, 0, 1)
     off = np.angle(np.exp(1j * (np.arctan2(y, x)[[0, -1]] - angles[[0, -1]])))
     assert np.abs(off).max() < 1e-3

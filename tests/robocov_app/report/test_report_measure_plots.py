@@ -10,9 +10,9 @@ from reported_results import entry, falling, result_of, walk
 from robocov.metrics import CostHistory
 from robocov.metrics.run_metrics import compute_run_metrics
 from robocov.team import Team
+from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.groups import styles
 from robocov_app.report.plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
-from robocov_app.report.replay import ReplayRun
 
 ENTRIES = [entry("rapf"), entry("rpf")]
 RESULT = replace(result_of(ENTRIES), kind="comparison")

@@ -5,12 +5,12 @@ import pytest
 from reported_results import entry, result_of
 
 from robocov_app.figures.statistics import bootstrap, mean_with_t_interval
-from robocov_app.report.document import template
+from robocov_app.report.document import load_template
 from robocov_app.report.groups import compared_groups, comparisons
 
 
 def method(comparisons, chosen):
-    return template("pairs.jinja").module.method(comparisons, chosen)
+    return load_template("pairs.jinja").module.method(comparisons, chosen)
 
 
 def found(entries):

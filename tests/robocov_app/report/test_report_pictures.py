@@ -14,7 +14,7 @@ from reported_results import HOSTILE, falling, walk
 
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
-from robocov_app.report.pictures import MOST_ROBOTS, Frame, _path, map_picture, run_picture
+from robocov_app.report.pictures import MAX_ROBOTS, PictureFrame, _format_path, draw_map, draw_run
 
 
 def drawn(svg: str) -> ElementTree.Element:
@@ -27,9 +27,9 @@ def of_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
 
 @given(arrays(float, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(-500, 500)))
 def test_relative_steps_of_a_path_add_up(points) -> None:
-    words = re.findall(r"-?[\d.]+(?:e-?\d+)?", _path([points]))
+    words = re.findall(r"-?[\d.]+(?:e-?\d+)?", _format_path([points]))
     numbers = np.array([float(word) for word in words])
-    if "h0" in _path([points]):
+    if "h0" in _format_path([points]):
         numbers = numbers[:-1]
     walked = np.cumsum(numbers.reshape(-1, 2), axis=0)
     assert np.abs(walked[0] - points[0]).max() <= 0.051
@@ -39,24 +39,24 @@ def test_relative_steps_of_a_path_add_up(points) -> None:
 def test_who_failed_is_crossed_out_and_who_never_joined_is_not_there() -> None:
     record = walk(robots=5)
     bad = Conditions(failures=((2, 2.0),), joins=((4, 3.0), (5, 99.0)))
-    picture = run_picture(replace(record, conditions=bad), None, numbers=True)
+    picture = draw_run(replace(record, conditions=bad), None, has_numbers=True)
     root = drawn(picture)
     assert [each.text for each in root.iter() if each.tag.endswith("text")] == ["1", "3", "4"]
     assert len(of_class(root, "robot")) == 3
     assert [each.tag.rpartition("}")[2] for each in of_class(root, "failed")] == ["circle", "path"]
     assert len(of_class(root, "start")) == 4
     assert "Robot 2 fails at 2.0 s, robot 4 joins at 3.0 s." in picture
-    assert "fails" not in run_picture(record, None)
+    assert "fails" not in draw_run(record, None)
 
 
 def test_a_run_has_its_robots_where_they_ended() -> None:
     record = walk(robots=5)
-    root = drawn(run_picture(record, falling(record, 2.0), 400, 300, numbers=True))
-    frame = Frame(ROOMS, 400, 300)
+    root = drawn(draw_run(record, falling(record, 2.0), 400, 300, has_numbers=True))
+    frame = PictureFrame(ROOMS, 400, 300)
     places = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "robot")])
-    assert places == pytest.approx(frame.at(record.positions[-1]), abs=0.06)
+    assert places == pytest.approx(frame.to_pixels(record.positions[-1]), abs=0.06)
     starts = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "start")])
-    assert starts == pytest.approx(frame.at(record.positions[0]), abs=0.06)
+    assert starts == pytest.approx(frame.to_pixels(record.positions[0]), abs=0.06)
     assert [each.text for each in root if each.tag == "text"] == ["1", "2", "3", "4", "5"]
     assert len(of_class(root, "cell")) == 5
     assert of_class(root, "way")[0].get("d").count("M") == 5
@@ -65,33 +65,33 @@ def test_a_run_has_its_robots_where_they_ended() -> None:
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
 @pytest.mark.parametrize("room", [(300.0, 200.0), (200.0, 300.0)])
 def test_a_map_fits_into_its_picture(environment, room) -> None:
-    frame = Frame(environment, *room)
-    points = frame.at(environment.region.vertices)
+    frame = PictureFrame(environment, *room)
+    points = frame.to_pixels(environment.region.vertices)
     assert (points >= 2.9).all() and (points <= np.array([frame.width, frame.height]) - 2.9).all()
     assert frame.width == pytest.approx(room[0], abs=0.1) or frame.height == pytest.approx(room[1], abs=0.1)
-    root = drawn(map_picture(environment, *room))
+    root = drawn(draw_map(environment, *room))
     assert root.get("viewBox") == f"0 0 {frame.width:g} {frame.height:g}"
     assert of_class(root, "blocked") and of_class(root, "region")
 
 
 def test_every_picture_says_what_it_shows() -> None:
     record = walk()
-    said = drawn(run_picture(record, falling(record, 2.345))).get("aria-label")
+    said = drawn(draw_run(record, falling(record, 2.345))).get("aria-label")
     assert said == (
         "RAPF on map rooms: trajectories of 4 robots from start spread over 6 s. "
         "The mean distance to the nearest robot falls from 6.000 m to 2.345 m."
     )
-    assert "cost" not in drawn(run_picture(record, None)).get("aria-label")
-    assert drawn(map_picture(HALL)).get("aria-label") == (
+    assert "cost" not in drawn(draw_run(record, None)).get("aria-label")
+    assert drawn(draw_map(HALL)).get("aria-label") == (
         "Map hall: 14 m by 11 m without obstacles, 98 m² free, 22 % of the known region blocked."
     )
-    hidden = drawn(run_picture(record, None, hidden=True))
+    hidden = drawn(draw_run(record, None, is_hidden=True))
     assert hidden.get("aria-hidden") == "true" and hidden.get("aria-label") is None
 
 
 def test_names_are_words() -> None:
     record = walk(replace(ROOMS, name=HOSTILE), label=HOSTILE)
-    root = drawn(run_picture(record, None))  # is XML in spite of them
+    root = drawn(draw_run(record, None))  # is XML in spite of them
     assert HOSTILE in root.get("aria-label")
     assert not [each for each in root.iter() if each.tag in ("img", "script")]
 
@@ -100,21 +100,21 @@ def test_a_record_without_a_path_has_no_lines() -> None:
     record = walk()
     names = ("time", "positions", "goals")
     ends = replace(record, **{name: getattr(record, name)[[0, -1]] for name in names})
-    root = drawn(run_picture(ends, None))
+    root = drawn(draw_run(ends, None))
     assert not of_class(root, "way") and of_class(root, "robot")
 
 
 def test_a_very_large_team_makes_no_very_large_picture() -> None:
-    record = walk(robots=MOST_ROBOTS + 1, hz=2.0)
-    root = drawn(run_picture(record, None))
+    record = walk(robots=MAX_ROBOTS + 1, hz=2.0)
+    root = drawn(draw_run(record, None))
     assert not of_class(root, "cell") and not of_class(root, "way")
-    assert len(of_class(root, "robot")) == MOST_ROBOTS + 1
+    assert len(of_class(root, "robot")) == MAX_ROBOTS + 1
 
 
 def test_moving_obstacles_are_drawn_apart():
     cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
-    plain = map_picture(ROOMS)
+    plain = draw_map(ROOMS)
     assert "moving" not in plain
-    moving = map_picture(replace(ROOMS, obstacles=(cart,)))
+    moving = draw_map(replace(ROOMS, obstacles=(cart,)))
     assert all(f'class="{each}"' in moving for each in ("blocked moving", "motion", "heading"))
     assert "with one obstacle (1 moving)" in moving

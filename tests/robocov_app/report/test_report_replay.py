@@ -8,7 +8,14 @@ from drawn_run import ROOMS
 from reported_results import HOSTILE, Page, falling, walk
 
 from robocov.text import escape_controls
-from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
+from robocov_app.report.embedding import ReplayRun
+from robocov_app.report.replay import (
+    MAX_PANES,
+    build_replay_html,
+    build_replay_part,
+    read_replay_css,
+    read_replay_js,
+)
 
 
 def runs_of(count: int = 2, name: str = "run") -> list[ReplayRun]:
@@ -24,7 +31,7 @@ def data_of(html: str) -> dict:
 
 
 def test_a_fragment_brings_all_that_it_needs() -> None:
-    html = replay_html(runs_of())
+    html = build_replay_html(runs_of())
     page = Page(html)
     assert [attributes for name, attributes in page.elements if "id" in attributes] == []
     assert not re.findall(r"\b(?:src|href)=|https?:|@import|url\(", html)
@@ -37,21 +44,23 @@ def test_a_fragment_brings_all_that_it_needs() -> None:
 
 def test_runs_of_one_controller_with_other_gains_look_different() -> None:
     runs = [ReplayRun(walk(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
-    looks = [(run["style"], run["mark"], tuple(run["dashes"])) for run in data_of(replay_html(runs))["runs"]]
+    looks = [
+        (run["style"], run["mark"], tuple(run["dashes"])) for run in data_of(build_replay_html(runs))["runs"]
+    ]
     assert looks[0] == looks[2] and all(a != b for a, b in zip(*looks[:2], strict=True))
 
 
 def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
-    page = Page(replay_part(runs_of(6)))
+    page = Page(build_replay_part(runs_of(6)))
     pictures = page.all("svg")
-    assert len(pictures) == MOST_PANES
+    assert len(pictures) == MAX_PANES
     assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in pictures)
     assert not page.all("style")
 
 
 def test_no_name_gets_out_of_its_place() -> None:
     record = replace(walk(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
-    html = replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
+    html = build_replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
     assert len(page.all("script")) == 2 and not page.all("img")
     data = data_of(html)
@@ -64,22 +73,22 @@ def test_no_name_gets_out_of_its_place() -> None:
 
 
 def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:
-    assert data_of(replay_html(runs_of(6)))["panes"] == [0, 1, 2, 3]
-    assert data_of(replay_part(runs_of(6), [5, 2]))["panes"] == [5, 2]
+    assert data_of(build_replay_html(runs_of(6)))["panes"] == [0, 1, 2, 3]
+    assert data_of(build_replay_part(runs_of(6), [5, 2]))["panes"] == [5, 2]
 
 
 def test_the_same_runs_give_the_same_bytes() -> None:
-    assert replay_html(runs_of()) == replay_html(runs_of())
+    assert build_replay_html(runs_of()) == build_replay_html(runs_of())
 
 
 def test_style_and_script_meet_nothing_else() -> None:
-    css = replay_css()
+    css = read_replay_css()
     for selector in re.findall(r"([^{}]+)\{", re.sub(r"@[^{]+\{", "", css)):
         for part in re.sub(r":is\([^)]*\)", "", selector).split(","):
             assert part.strip().startswith((".robocov-replay", ".robocov-picture")), part
-    html = replay_html(runs_of(1))
+    html = build_replay_html(runs_of(1))
     script = html[html.rindex("<script>") : html.rindex("</script>")]
     assert script.startswith('<script>(() => {\n"use strict";') and script.rstrip().endswith("})();")
-    assert "window." not in replay_js().replace("window.devicePixelRatio", "").replace(
+    assert "window." not in read_replay_js().replace("window.devicePixelRatio", "").replace(
         "window.innerHeight", ""
     )

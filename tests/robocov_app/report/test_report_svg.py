@@ -19,7 +19,7 @@ from robocov_app.figures.results import (
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report.svg import inline_svg
-from robocov_app.report.theme_css import named_colors
+from robocov_app.report.theme_css import list_css_colors
 
 RNG = np.random.default_rng(5)
 TIME = np.linspace(0.0, 10.0, 40)
@@ -64,7 +64,7 @@ def test_all_colors_are_the_pages(kind) -> None:
     svg = inline_svg(FIGURES[kind](), "k", "what it shows")
     assert not re.findall(r"#[0-9a-fA-F]{3,6}\b|rgb\(", svg.replace("#k-", "="))
     used = set(re.findall(r"var\(--rc-([\w-]+)\)", svg))
-    assert used and used <= named_colors(LIGHT).keys()
+    assert used and used <= list_css_colors(LIGHT).keys()
 
 
 @pytest.mark.parametrize("kind", FIGURES)

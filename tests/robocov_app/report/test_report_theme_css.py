@@ -1,13 +1,13 @@
-"""The project's colors as CSS variables: the same names in light and dark, and readable in both."""
+"""The project's colors as CSS format_variables: the same names in light and dark, and readable in both."""
 
 import re
 
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.look.colors import compute_contrast, parse_hex_color
+from robocov_app.look.colors import compute_contrast, format_hex_color, parse_hex_color
 from robocov_app.look.theme import DARK, HEAT_LEVELS, LIGHT
-from robocov_app.report.theme_css import hex_code, named_colors, theme_rules, variables
+from robocov_app.report.theme_css import build_theme_rules, format_variables, list_css_colors
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
@@ -17,16 +17,16 @@ def declared(css: str) -> dict[str, str]:
 
 
 def test_both_themes_have_the_same_names() -> None:
-    assert list(named_colors(LIGHT)) == list(named_colors(DARK))
-    assert declared(variables(DARK)).keys() == named_colors(DARK).keys()
-    assert declared(variables(DARK))["ink"] == hex_code(DARK.ink)
-    assert parse_hex_color(hex_code((1, 171, 255))[1:]) == (1, 171, 255)
+    assert list(list_css_colors(LIGHT)) == list(list_css_colors(DARK))
+    assert declared(format_variables(DARK)).keys() == list_css_colors(DARK).keys()
+    assert declared(format_variables(DARK))["ink"] == format_hex_color(DARK.ink)
+    assert parse_hex_color(format_hex_color((1, 171, 255))[1:]) == (1, 171, 255)
 
 
 @THEMES
 @pytest.mark.parametrize("ground", ["background", "panel"])
 def test_all_that_is_written_can_be_read(theme, ground) -> None:
-    colors = named_colors(theme)
+    colors = list_css_colors(theme)
     curves = [*theme.controllers, *(f"other-{k}" for k in range(len(theme.others)))]
     for name in ("ink", "faint", "accent", *curves):
         assert compute_contrast(colors[name], colors[ground]) >= 4.5, (theme.name, name, ground)
@@ -36,7 +36,7 @@ def test_all_that_is_written_can_be_read(theme, ground) -> None:
 
 @THEMES
 def test_what_is_written_on_colors_can_be_read(theme) -> None:
-    colors = named_colors(theme)
+    colors = list_css_colors(theme)
     assert compute_contrast(colors["on-accent"], colors["accent"]) >= 4.5
     assert compute_contrast(colors["on-final"], colors["final"]) >= 4.5
     for k in range(HEAT_LEVELS):
@@ -46,15 +46,15 @@ def test_what_is_written_on_colors_can_be_read(theme) -> None:
 
 
 def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:
-    css = theme_rules(":root", "dark")
+    css = build_theme_rules(":root", "dark")
     screen, _, paper = css.partition("@media print")
-    assert declared(screen)["background"] == hex_code(DARK.background)
-    assert declared(paper)["background"] == hex_code(LIGHT.background)
+    assert declared(screen)["background"] == format_hex_color(DARK.background)
+    assert declared(paper)["background"] == format_hex_color(LIGHT.background)
     assert "prefers-color-scheme" not in css
 
 
 def test_auto_follows_the_reader_and_the_notebook() -> None:
-    css = theme_rules(".scope")
+    css = build_theme_rules(".scope")
     for words in (
         "prefers-color-scheme:dark",
         'data-jp-theme-light="false"',
@@ -67,4 +67,4 @@ def test_auto_follows_the_reader_and_the_notebook() -> None:
 
 def test_another_theme_is_an_error() -> None:
     with pytest.raises(ParameterError, match="unknown theme 'sepia'"):
-        theme_rules(":root", "sepia")
+        build_theme_rules(":root", "sepia")

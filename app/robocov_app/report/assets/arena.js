@@ -5,9 +5,7 @@ const COLORS = [
   "final", "on-final", "trajectory", "ring", "rapf", "rpf", "lloyd", "other-0", "other-1", "other-2",
   ...Array.from({ length: 9 }, (_, k) => `cell-${k}`),
 ];
-const ONE_HUE_EACH = 9;
-const MAP_COLORS = 6;
-const MOST_CELLS = 400; // of more, a picture takes too long to move
+const MAX_CELLS = 400; // more would take too long in each frame
 const FONT = "system-ui, sans-serif";
 
 function lookOf(element) {
@@ -109,7 +107,7 @@ function drawArena(canvas, run, time, look, show) {
   context.lineJoin = "round";
   context.fillStyle = look.background;
   context.fill(region);
-  if (show.cells && run.robots <= MOST_CELLS) drawCells(context, run, places, states, frame, look);
+  if (show.cells && run.robots <= MAX_CELLS) drawCells(context, run, run.huesAt(time), places, states, frame, look);
   const { density, left, high, width, height } = run.plan;
   if (density?.complete) {
     context.drawImage(density, frame.x(left), frame.y(high), width * frame.zoom, height * frame.zoom);
@@ -179,7 +177,7 @@ function drawMotion(context, mover, time, frame, look) {
 }
 
 /** Cells by travel time: those of fast robots first, for those of slow ones are holes in them. */
-function drawTimedCells(context, run, places, states, frame, hues, look) {
+function drawTimedCells(context, run, hues, places, states, frame, look) {
   const { speeds } = run;
   for (const i of [...speeds.keys()].filter((k) => states[k] === WORKS).sort((a, b) => speeds[b] - speeds[a])) {
     const equal = traced(frame, [cellOf(run.plan.region, places, i, (j) => states[j] === WORKS && speeds[j] === speeds[i])]);
@@ -196,7 +194,7 @@ function drawTimedCells(context, run, places, states, frame, hues, look) {
     }
     context.save();
     for (const path of [equal, ...circles]) context.clip(path);
-    context.fillStyle = look[`cell-${i % hues}`];
+    context.fillStyle = look[`cell-${hues[i]}`];
     context.fill(equal);
     context.stroke(equal);
     context.lineWidth = 2; // of which only the inner half is seen
@@ -205,18 +203,17 @@ function drawTimedCells(context, run, places, states, frame, hues, look) {
   }
 }
 
-function drawCells(context, run, places, states, frame, look) {
-  const hues = run.robots <= ONE_HUE_EACH ? ONE_HUE_EACH : MAP_COLORS;
+function drawCells(context, run, hues, places, states, frame, look) {
   context.lineWidth = 1;
   context.strokeStyle = look["cell-edge"];
   if (run.speeds) {
-    drawTimedCells(context, run, places, states, frame, hues, look);
+    drawTimedCells(context, run, hues, places, states, frame, look);
     return;
   }
   for (let i = 0; i < run.robots; i += 1) {
     if (states[i] !== WORKS) continue;
     const path = traced(frame, [cellOf(run.plan.region, places, i, (j) => states[j] === WORKS)]);
-    context.fillStyle = look[`cell-${i % hues}`];
+    context.fillStyle = look[`cell-${hues[i]}`];
     context.fill(path);
     context.stroke(path);
   }

@@ -2,11 +2,11 @@
 
 const SMALL = 11.5;
 
-/** Round numbers within [low, high], about `wanted` of them; none where there is no room for them. */
-function roundTicks(low, high, wanted) {
-  const rough = (high - low) / Math.max(wanted, 1);
+/** Round numbers within [low, high], in at most `most` intervals; none if there is no room for them. */
+function roundTicks(low, high, most, factors) {
+  const rough = (high - low) / Math.max(most, 1);
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((value) => value >= rough * 0.999);
+  const step = factors.map((factor) => factor * power).find((value) => value >= rough * 0.999);
   const first = Math.ceil(low / step - 1e-9);
   const count = Math.floor(high / step + 1e-9) - first + 1;
   // where the steps are below a rounding error, or nothing is finite, they could not be counted
@@ -18,23 +18,29 @@ function plain(value) {
   return String(Number(value.toPrecision(6)));
 }
 
-/** Heights at least `gap` apart, in the same order, within [low, high] as far as there is room. */
-function spreadApart(heights, gap, low, high) {
+/** Heights at least `gap` apart, nearest to the given ones, within [low, high]: look/labels.py, spread_labels. */
+function spreadLabels(heights, gap, low, high) {
   const order = heights.map((_, k) => k).sort((a, b) => heights[a] - heights[b]);
+  const blocks = []; // of labels that are moved together: mean and number
+  order.forEach((k, rank) => {
+    let block = { mean: heights[k] - gap * rank, size: 1 };
+    while (blocks.length && blocks.at(-1).mean > block.mean) {
+      const { mean, size } = blocks.pop();
+      block = { mean: (mean * size + block.mean * block.size) / (size + block.size), size: size + block.size };
+    }
+    blocks.push(block);
+  });
+  const levels = blocks.flatMap(({ mean, size }) => Array(size).fill(mean));
   const result = [...heights];
   order.forEach((k, rank) => {
-    const floor = rank ? result[order[rank - 1]] + gap : low;
-    result[k] = Math.max(result[k], floor);
-  });
-  [...order].reverse().forEach((k, rank, reversed) => {
-    const ceiling = rank ? result[reversed[rank - 1]] - gap : high;
-    result[k] = Math.min(result[k], ceiling);
+    const height = Math.max(levels[rank], low) + gap * rank;
+    result[k] = Math.min(height, high - gap * (order.length - 1 - rank));
   });
   return result;
 }
 
-/** Limits of the chart in data, as the plots have them. */
-function limitsOf(runs) {
+/** Limits of the chart, by the rule of look/axes.py, whose numbers are in the data. */
+function limitsOf(runs, rules) {
   let [low, high, end] = [Infinity, -Infinity, 0];
   for (const run of runs) {
     end = Math.max(end, run.end);
@@ -44,8 +50,9 @@ function limitsOf(runs) {
   }
   if (!(low <= high)) return { low: 0, high: 1, end };
   const size = Math.max(Math.abs(low), Math.abs(high), 1e-3);
-  const room = high - low > 1e-9 * size ? 0.08 * (high - low) : 0.1 * size;
-  return { low: low < 0.4 * high ? 0 : low - room, high: high + room, end };
+  const room = high - low > 1e-9 * size ? rules.margin * (high - low) : 0.1 * size;
+  const fromZero = low >= 0 && low < rules.maxLowFraction * high;
+  return { low: fromZero ? 0 : low - room, high: high + room, end };
 }
 
 function labelOf(run, number, numbered) {
@@ -53,18 +60,18 @@ function labelOf(run, number, numbered) {
 }
 
 /** Draws the chart; returns what turns a pixel into a time. */
-function drawChart(canvas, runs, time, look) {
+function drawChart(canvas, runs, time, look, rules) {
   const context = prepared(canvas);
   if (!context) return () => time;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  const { low, high, end } = limitsOf(runs);
+  const { low, high, end } = limitsOf(runs, rules);
   context.font = `600 ${SMALL}px ${FONT}`;
   const labels = runs.map((run, k) => (run.cost ? labelOf(run, k + 1, runs.length > 1) : ""));
   const wide = Math.max(...labels.map((label) => context.measureText(`${label}  00.000`).width), 0);
   const box = { left: 36, top: 10, right: width - Math.min(wide + 22, 0.42 * width), bottom: height - 22 };
   const x = (value) => box.left + (value / (end || 1)) * (box.right - box.left);
   const y = (value) => box.bottom - ((value - low) / (high - low)) * (box.bottom - box.top);
-  drawAxes(context, box, x, y, { low, high, end }, look);
+  drawAxes(context, box, x, y, { low, high, end }, look, rules);
   runs.forEach((run, k) => {
     if (run.cost) drawCurve(context, run, x, y, look, Math.min(runs.length - 1 - k, 3));
   });
@@ -81,7 +88,7 @@ function drawChart(canvas, runs, time, look) {
     if (Number.isFinite(values[k])) drawMark(context, run.mark, x(Math.min(time, run.end)), y(values[k]), 4, look[run.style], look);
   });
   const wanted = values.map((value) => (Number.isFinite(value) ? y(value) : box.bottom));
-  const heights = spreadApart(wanted, 15, box.top + 4, box.bottom - 2);
+  const heights = spreadLabels(wanted, 15, box.top + 4, box.bottom - 2);
   context.font = `600 ${SMALL}px ${FONT}`;
   context.textAlign = "left";
   context.textBaseline = "middle";
@@ -130,13 +137,13 @@ function cutTo(context, text, room) {
   return `${kept}…`;
 }
 
-function drawAxes(context, box, x, y, { low, high, end }, look) {
+function drawAxes(context, box, x, y, { low, high, end }, look, rules) {
   context.lineWidth = 1;
   context.font = `${SMALL}px ${FONT}`;
   context.fillStyle = look.faint;
   context.textAlign = "right";
   context.textBaseline = "middle";
-  for (const value of roundTicks(low, high, Math.max((box.bottom - box.top) / 24, 2))) {
+  for (const value of roundTicks(low, high, Math.max((box.bottom - box.top) / 24, 2), rules.tickFactors)) {
     const level = Math.round(y(value)) + 0.5;
     context.strokeStyle = value === 0 ? look.faint : look.line;
     context.beginPath();
@@ -147,7 +154,7 @@ function drawAxes(context, box, x, y, { low, high, end }, look) {
   }
   context.textAlign = "center";
   context.textBaseline = "alphabetic";
-  const ticks = roundTicks(0, end, Math.max((box.right - box.left) / 48, 2));
+  const ticks = roundTicks(0, end, Math.max((box.right - box.left) / 48, 2), rules.tickFactors);
   ticks.forEach((value, k) => {
     context.fillText(k === ticks.length - 1 ? `${plain(value)} s` : plain(value), x(value), box.bottom + 16);
   });

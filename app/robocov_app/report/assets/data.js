@@ -1,4 +1,4 @@
-// What is embedded, read back: see embedding.py.
+// Reads what embedding.py writes.
 
 const NONE = 65535;
 
@@ -93,7 +93,7 @@ class Run {
       ...(begin > 0 && begin <= this.end ? [{ time: begin, words: `+ ${this.numbers[i]}`, said: `robot ${this.numbers[i]} joins` }] : []),
       ...(end !== null ? [{ time: end, words: `× ${this.numbers[i]}`, said: `robot ${this.numbers[i]} fails` }] : []),
     ]).sort((a, b) => a.time - b.time);
-    this.speeds = data.speeds ?? null; // where cells are by time
+    this.speeds = data.speeds ?? null; // if cells are by travel time
     this.radii = Array.from({ length: this.robots }, (_, k) => (Array.isArray(data.radius) ? data.radius[k] : data.radius));
   }
 
@@ -108,6 +108,17 @@ class Run {
   /** Places in meters, x and y in turn. Where the record tells no path, robots stay until they are there. */
   placesAt(time, series = this.where) {
     return this.meters(series.at(this.path || time >= this.end ? time : 0));
+  }
+
+  /** The hue of each robot's cell: neighbors differ. Hues change at moments of the run, seldom. */
+  huesAt(time) {
+    const moment = this.path || time >= this.end ? this.where.before(time) : 0;
+    const hues = [...this.hues.first];
+    for (const [since, robot, hue] of this.hues.changes) {
+      if (since > moment) break;
+      hues[robot] = hue;
+    }
+    return hues;
   }
 
   meters(row) {

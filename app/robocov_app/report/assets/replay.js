@@ -1,6 +1,6 @@
 // The replay: up to four runs in lockstep, their costs, and what moves them.
 
-const MOST_PANES = 4;
+const MAX_PANES = 4;
 const GAP = 16;
 const WORDS = 68; // height of what stands above and below a picture
 const SPEEDS = [0.5, 1, 2, 4, 8, 16];
@@ -64,7 +64,8 @@ class Replay {
     this.root = root;
     this.plans = data.maps.map((map) => new Plan(map, () => this.draw()));
     this.runs = data.runs.map((run) => new Run(run, this.plans[run.map]));
-    this.shown = data.panes.slice(0, MOST_PANES);
+    this.axes = data.axes;
+    this.shown = data.panes.slice(0, MAX_PANES);
     this.playing = false;
     this.show = { cells: true, trajectories: true, goals: true };
     this.time = Infinity;
@@ -147,7 +148,7 @@ class Replay {
     this.time = Math.min(this.time, this.end);
     this.panes = shown.map((k, place) => this.pane(runs[k], k, place));
     this.stage.replaceChildren(...this.panes.map((pane) => pane.element));
-    this.add.hidden = shown.length >= Math.min(MOST_PANES, runs.length);
+    this.add.hidden = shown.length >= Math.min(MAX_PANES, runs.length);
     this.controls.querySelector(".goals").hidden = !shown.some((k) => runs[k].goals);
     this.slider.max = String(this.end);
     this.chart.parentElement.hidden = !shown.some((k) => runs[k].cost);
@@ -198,8 +199,8 @@ class Replay {
   /** Shows one run in place of the last pane, unless it is there. */
   present(k) {
     if (!this.shown.includes(k)) {
-      if (this.shown.length < MOST_PANES) this.shown.push(k);
-      else this.shown[MOST_PANES - 1] = k;
+      if (this.shown.length < MAX_PANES) this.shown.push(k);
+      else this.shown[MAX_PANES - 1] = k;
       this.fill();
     }
     this.stage.focus();
@@ -330,7 +331,7 @@ class Replay {
       if (context) drawMark(context, run.mark, 8, 8, 4.5, this.look[run.style], this.look);
     }
     const runs = this.panes.map(({ run }) => run);
-    this.timeAt = drawChart(this.chart, runs, this.time, this.look);
+    this.timeAt = drawChart(this.chart, runs, this.time, this.look, this.axes);
   }
 }
 

@@ -1,0 +1,101 @@
+"""Descriptions of pictures in words, for readers who cannot see them, and the lives of robots."""
+
+import numpy as np
+
+from robocov.environment import Environment
+from robocov.errors import format_count
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov_app.render.density import density_label
+from robocov_app.runs.saved_runs import build_roster
+
+
+def list_lifetimes(record: Record) -> list[tuple[float, float | None]]:
+    """List when each robot joins and fails.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    list of (float, float or None)
+        Seconds since the start of the record. A robot that never joins has a time after the end, and one that
+        never fails has None.
+    """
+    times = record.time - record.time[0]
+    lifetimes: list[tuple[float, float | None]] = []
+    for present, working in zip(record.present.T, record.working.T, strict=True):
+        present_rows = np.flatnonzero(present)
+        failed_rows = np.flatnonzero(present & ~working)
+        joins = float(times[present_rows[0]]) if len(present_rows) else float(times[-1]) + 1.0
+        fails = float(times[failed_rows[0]]) if len(failed_rows) else None
+        lifetimes.append((joins, fails))
+    return lifetimes
+
+
+def describe_map(environment: Environment) -> str:
+    """Describe a map in one sentence."""
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
+    density = density_label(environment)
+    return (
+        f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m "
+        f"{_describe_obstacles(environment)}, "
+        f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked"
+        f"{', ' if density else ''}{density}."
+    )
+
+
+def _describe_obstacles(environment: Environment) -> str:
+    """Return how many obstacles a map has, and how many of them move."""
+    count = len(environment.obstacles)
+    moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
+    text = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
+    return f"{text} ({moving} moving)" if moving else text
+
+
+def describe_run(record: Record, history: CostHistory | None) -> str:
+    """Describe a run in a few sentences: robots, duration, failures, and how the cost changes."""
+    robots = format_count(len(record.team), "robot")
+    duration = record.time[-1] - record.time[0]
+    start = f" from start {record.start}" if record.start else ""
+    sentences = [
+        f"{record.label} on map {record.environment.name}: trajectories of {robots}{start} "
+        f"over {duration:.4g} s."
+    ]
+    events = _list_events(record) if record.conditions is not None else []
+    if events:
+        text = ", ".join(event for _, event in sorted(events))
+        sentences.append(f"{text[0].upper()}{text[1:]}.")
+    if history is not None:
+        sentences += _describe_costs(record.environment, history)
+    return " ".join(sentences)
+
+
+def _list_events(record: Record) -> list[tuple[float, str]]:
+    """Return when robots join and fail, with a text for each."""
+    duration = record.time[-1] - record.time[0]
+    events = []
+    for number, (joins, fails) in zip(build_roster(record).numbers, list_lifetimes(record), strict=True):
+        if 0.0 < joins <= duration:
+            events.append((joins, f"robot {number} joins at {joins:.1f} s"))
+        if fails is not None:
+            events.append((fails, f"robot {number} fails at {fails:.1f} s"))
+    return events
+
+
+def _describe_costs(environment: Environment, history: CostHistory) -> list[str]:
+    """Return sentences about the first and the final cost; none if they are not known."""
+    first, final = history.mean_distance[[0, -1]]
+    if not np.isfinite([first, final]).all():
+        return []
+    verb = "falls" if final < first else "goes"
+    weighted = ", weighed by φ," if density_label(environment) else ""
+    sentences = [
+        f"The mean distance to the nearest robot{weighted} {verb} from {first:.3f} m to {final:.3f} m."
+    ]
+    if history.mean_time is not None and np.isfinite(history.mean_time[[0, -1]]).all():
+        first, final = history.mean_time[[0, -1]]
+        sentences.append(f"The mean time until the first is there goes from {first:.3f} s to {final:.3f} s.")
+    return sentences

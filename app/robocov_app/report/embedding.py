@@ -1,0 +1,387 @@
+"""Runs and maps as small JSON in a page, read by ``data.js``.
+
+Positions and costs are quantized numbers at even times. Coordinates of maps are rounded.
+"""
+
+import base64
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+
+from robocov.arrays import Array, BoolArray
+from robocov.environment import Environment
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov.text import escape_controls
+from robocov_app.look import axes
+from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle
+from robocov_app.report.cell_hues import embed_hues
+from robocov_app.report.descriptions import list_lifetimes
+from robocov_app.report.pictures import build_density_image, extract_rings, has_path
+from robocov_app.runs.saved_runs import build_roster
+
+MAX_RATE_HZ = 5.0
+"""Moments of a run per simulated second, if there is space."""
+MAX_BYTES = 1_500_000
+"""Bytes of all runs of a page. Beyond, they are embedded at a lower rate."""
+NO_NUMBER = 65535
+"""Stands for a number that is missing."""
+MAX_OBSTACLE_VERTICES = 4000
+"""Obstacles of a map with more vertices are simplified."""
+_RATES_HZ = (MAX_RATE_HZ, 4.0, 2.5, 2.0, 1.25, 1.0)
+_MIN_RATE_HZ = 0.05
+_TIME_TOLERANCE_S = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayRun:
+    """A run that can be replayed.
+
+    Attributes
+    ----------
+    record : Record
+    history : CostHistory or None
+    title : str
+        Above the pane of the run.
+    facts : str
+        Below the title.
+    label : str
+        Of its curve; by default that of the record.
+    style : CurveStyle or None
+        Of its curve; by default one that no other controller has.
+    """
+
+    record: Record
+    history: CostHistory | None
+    title: str
+    facts: str = ""
+    label: str = ""
+    style: CurveStyle | None = None
+
+
+def embed_replay(
+    runs: Sequence[ReplayRun],
+    styles: Sequence[CurveStyle],
+    panes: Sequence[int],
+    max_bytes: int = MAX_BYTES,
+) -> dict[str, Any]:
+    """Build all that a replay needs as JSON content.
+
+    Parameters
+    ----------
+    runs : sequence of ReplayRun
+    styles : sequence of CurveStyle
+        Style of the curve of each run.
+    panes : sequence of int
+        Runs that are shown first.
+    max_bytes : int
+        The rate, and whether goals are included, are chosen so that the runs take no more.
+
+    Returns
+    -------
+    dict
+    """
+    rate, has_goals = _choose_detail(runs, max_bytes)
+    environments = [build_roster(run.record).environment for run in runs]
+    maps = list(dict.fromkeys(environments))
+    embedded_runs = []
+    for run, style, environment in zip(runs, styles, environments, strict=True):
+        map_number = maps.index(environment)
+        embedded_runs.append(embed_run(run, map_number, style, rate, has_goals=has_goals))
+    return {
+        "version": 1,
+        "rate": rate,
+        "axes": embed_axis_rules(),
+        "maps": [embed_map(environment) for environment in maps],
+        "runs": embedded_runs,
+        "panes": list(panes),
+    }
+
+
+def embed_axis_rules() -> dict[str, Any]:
+    """Build the rules for axes, which depend on the runs that the reader chooses, as JSON content."""
+    return {
+        "maxLowFraction": axes.MAX_LOW_FRACTION,
+        "margin": axes.VALUE_MARGIN,
+        "tickFactors": list(axes.TICK_FACTORS),
+    }
+
+
+def embed_map(environment: Environment) -> dict[str, Any]:
+    """Build a map as JSON content.
+
+    Parameters
+    ----------
+    environment : Environment
+
+    Returns
+    -------
+    dict
+        ``region``: a ring. ``blocked``: polygons, each a list of rings. ``density``, if it is not uniform:
+        the address of an image. ``movers``, if obstacles move: for each its rings, the line of one round and
+        its speed, m/s. Rings and lines are flat lists x, y, x, y, ... in multiples of ``unit`` meters: a
+        millimeter or, for tiny maps, less.
+    """
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    extent = max(high_x - low_x, high_y - low_y)
+    unit = 10.0 ** min(-3, math.floor(math.log10(extent)) - 3)
+    blocked = environment.static.blocked
+    if shapely.get_num_coordinates(blocked) > MAX_OBSTACLE_VERTICES:
+        blocked = shapely.simplify(blocked, extent / 2000)
+    content: dict[str, Any] = {
+        "name": environment.name,
+        "unit": unit,
+        "bounds": _round_points([[low_x, low_y], [high_x, high_y]], unit),
+        "region": _round_points(environment.region.vertices, unit),
+    }
+    density_image = build_density_image(environment)
+    if density_image:
+        content["density"] = density_image
+    content["blocked"] = [_round_rings(extract_rings(part), unit) for part in shapely.get_parts(blocked)]
+    movers = _embed_moving_obstacles(environment, unit)
+    if movers:
+        content["movers"] = movers
+    return content
+
+
+def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[str, Any]]:
+    """Build the obstacles that move as JSON content."""
+    movers = []
+    for obstacle in environment.obstacles:
+        path = obstacle.path
+        if path is None:
+            continue
+        way_back = path.points[:1] if path.repeat == "loop" else path.points[-2::-1]
+        mover = {
+            "rings": _round_rings(extract_rings(obstacle.polygon), unit),
+            "line": _round_points([*path.points, *way_back], unit),
+            "speed": path.speed,
+        }
+        movers.append(mover)
+    return movers
+
+
+def _round_points(points: ArrayLike, unit: float) -> list[int]:
+    """Return points as a flat list of multiples of a unit, m."""
+    return [int(value) for value in np.rint(np.asarray(points) / unit).ravel()]
+
+
+def _round_rings(rings: Iterable[Array], unit: float) -> list[list[int]]:
+    """Return each ring as a flat list of multiples of a unit, m."""
+    return [_round_points(ring, unit) for ring in rings]
+
+
+def embed_run(
+    run: ReplayRun, map_number: int, style: CurveStyle, rate: float, *, has_goals: bool
+) -> dict[str, Any]:
+    """Build a run as JSON content.
+
+    Parameters
+    ----------
+    run : ReplayRun
+    map_number : int
+        Index of its map.
+    style : CurveStyle
+        Of its curve.
+    rate : float
+        Moments per simulated second.
+    has_goals : bool
+        Whether goals are included.
+
+    Returns
+    -------
+    dict
+    """
+    record = run.record
+    start = float(record.time[0])
+    duration = float(record.time[-1]) - start
+    is_path_known = has_path(record)
+    times = list_even_times(duration, rate) if is_path_known else np.unique([0.0, duration])
+    positions = _interpolate_points(record, record.positions, times + start)
+    content: dict[str, Any] = {
+        "title": run.title,
+        "facts": run.facts,
+        "label": run.label or record.label,
+        "style": style.name,
+        "dashes": [] if isinstance(style.dashes, str) else list(style.dashes[1]),
+        "mark": MARKER_PATHS[style.mark],
+        "map": map_number,
+        **_embed_team(record),
+        "path": is_path_known,
+        "step": 1.0 / rate if is_path_known else max(duration, 1e-9),
+        "end": duration,
+        "count": len(times),
+        "hues": embed_hues(record, positions, _find_working(record, times)),
+        "positions": _quantize_points(record, positions),
+        "goals": None,
+        "cost": _embed_cost(run.history, start, list_even_times(duration, rate), 1.0 / rate),
+    }
+    if has_goals and np.isfinite(record.goals).any():
+        goals = _interpolate_points(record, record.goals, times + start)
+        content["goals"] = _quantize_points(record, goals)
+    if record.steering is not None:
+        content["headings"] = _embed_headings(record, record.steering, times + start)
+    return content
+
+
+def _embed_team(record: Record) -> dict[str, Any]:
+    """Build the properties of the robots of a run as JSON content."""
+    radii = record.team.radius.tolist()
+    start = float(record.time[0])
+    content: dict[str, Any] = {
+        "radius": radii[0] if len(set(radii)) == 1 else radii,
+        "numbers": list(build_roster(record).numbers),
+    }
+    if record.has_travel_time_cells:
+        content["speeds"] = record.team.max_speed.tolist()
+    if start and record.environment.has_moving_obstacles:
+        content["begin"] = start
+    lifetimes = list_lifetimes(record) if record.conditions is not None else []
+    if any(lifetime != (0.0, None) for lifetime in lifetimes):
+        content["lives"] = lifetimes
+    return content
+
+
+def _find_working(record: Record, times: Array) -> BoolArray:
+    """Return which robots work at times since the start, (T, n)."""
+    working = np.ones((len(times), len(record.team)), dtype=bool)
+    if record.conditions is None:
+        return working
+    for robot, (joins, fails) in enumerate(list_lifetimes(record)):
+        working[:, robot] = times >= joins - _TIME_TOLERANCE_S
+        if fails is not None:
+            working[times >= fails - _TIME_TOLERANCE_S, robot] = False
+    return working
+
+
+def _embed_headings(record: Record, steering: Array, times: Array) -> str:
+    """Return the directions of unicycles as quantized unit vectors, which interpolate well."""
+    angles = np.where(record.team.is_unicycle, steering[:, :, 0], np.nan)
+    vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
+    return quantize(_interpolate_rows(record.time, vectors, times), -1.0, 1.0)
+
+
+def _embed_cost(
+    history: CostHistory | None, start: float, times: Array, step: float
+) -> dict[str, Any] | None:
+    """Build the mean distances at times since the start as JSON content; None if there are none."""
+    if history is None:
+        return None
+    values = _interpolate_rows(history.time - start, history.mean_distance[:, None], times)[:, 0]
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return None
+    low = float(finite.min())
+    high = float(finite.max())
+    last = float(history.mean_distance[-1])
+    return {
+        "step": step,
+        "count": len(times),
+        "low": low,
+        "high": high,
+        "values": quantize(values, low, high),
+        "last": last if np.isfinite(last) else None,
+    }
+
+
+def list_even_times(end: float, rate: float) -> Array:
+    """Return the multiples of ``1 / rate`` seconds from 0 to `end`, and `end` itself, s."""
+    times = np.arange(math.floor(end * rate + 1e-9) + 1) / rate
+    if end - times[-1] > 1e-9:
+        return np.append(times, end)
+    return times
+
+
+def quantize(values: Array, low: float, high: float) -> str:
+    """Return numbers as text.
+
+    Parameters
+    ----------
+    values : array
+        Numbers; those that are not finite are marked as missing.
+    low, high : float
+        Limits of the numbers.
+
+    Returns
+    -------
+    str
+        Base64 of 16 bits a number, 0 for `low`, 65534 for `high` and `NO_NUMBER` for a missing one.
+    """
+    span = high - low if high > low else 1.0
+    with np.errstate(invalid="ignore"):
+        steps = np.rint(np.clip((values - low) / span, 0.0, 1.0) * (NO_NUMBER - 1))
+    words = np.where(np.isfinite(values), steps, NO_NUMBER).astype("<u2")
+    return base64.b64encode(words.tobytes()).decode("ascii")
+
+
+def _quantize_points(record: Record, points: Array) -> str:
+    """Return (T, n, 2) points, m, as text, between the corners of the region."""
+    low, high = np.array(record.environment.region.bounds).reshape(2, 2)
+    return quantize((points - low) / (high - low), 0.0, 1.0)
+
+
+def _interpolate_points(record: Record, points: Array, times: Array) -> Array:
+    """Return points of a record, (k, n, 2) m, at other times, (T, n, 2) m."""
+    rows = _interpolate_rows(record.time, points.reshape(len(record), -1), times)
+    return rows.reshape(len(times), -1, 2)
+
+
+def _interpolate_rows(time: Array, rows: Array, times: Array) -> Array:
+    """Return (k, m) rows at other times, (T, m), linear in between; nan if either neighbor is."""
+    if len(time) == 1:
+        return np.asarray(np.repeat(rows, len(times), axis=0))
+    after = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
+    before = after - 1
+    fraction = ((times - time[before]) / (time[after] - time[before]))[:, None]
+    mixed = (1.0 - fraction) * rows[before] + fraction * rows[after]
+    # At a moment of the record only that moment counts: its neighbor may be nan.
+    mixed = np.where(fraction >= 1.0 - 1e-9, rows[after], mixed)
+    return np.where(fraction <= 1e-9, rows[before], mixed)
+
+
+def _choose_detail(runs: Sequence[ReplayRun], max_bytes: int) -> tuple[float, bool]:
+    """Return the rate, Hz, and whether goals are embedded, for runs that must fit in some bytes."""
+    for has_goals, rate in product((True, False), _RATES_HZ):
+        if _estimate_bytes(runs, rate, has_goals=has_goals) <= max_bytes:
+            return rate, has_goals
+    rate = max_bytes / _estimate_bytes(runs, 1.0, has_goals=False)
+    return max(min(rate, 1.0), _MIN_RATE_HZ), False
+
+
+def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) -> float:
+    """Return how many bytes runs take at a rate, Hz."""
+    total = 0.0
+    for run in runs:
+        record = run.record
+        moments = 2.0
+        if has_path(record):
+            moments += float(record.time[-1] - record.time[0]) * rate
+        points_per_robot = 2 if has_goals and np.isfinite(record.goals).any() else 1
+        bytes_per_moment = 4 * len(record.team) * points_per_robot + 2
+        total += moments * bytes_per_moment * 4 / 3
+    return total
+
+
+def format_script_json(content: Any) -> str:
+    """Return JSON that may stand in a script element, whatever names are in it."""
+    # JSON of ASCII characters has no U+2028, which ends a line in older scripts.
+    text = json.dumps(_escape_texts(content), separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _escape_texts(content: Any) -> Any:
+    """Return JSON content whose texts a page can display as they are, see `escape_controls`."""
+    if isinstance(content, str):
+        return escape_controls(content)
+    if isinstance(content, dict):
+        return {key: _escape_texts(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_escape_texts(value) for value in content]
+    return content

@@ -1,0 +1,30 @@
+"""Teams that move a lot, and the hues of their cells in the data of a replay."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from reported_results import walk
+
+from robocov import load_map
+from robocov.environment import UniformStart
+from robocov.record import Record
+
+
+def build_moving_record(robots: int, seconds: float = 6.0) -> Record:
+    """Build a record of robots that cross the map "rooms" between random places."""
+    environment = load_map("rooms")
+    starts = {**environment.starts, "spread": UniformStart()}
+    return walk(replace(environment, starts=starts), robots=robots, seconds=seconds)
+
+
+def list_hues(hues: dict[str, Any], moments: Iterable[int]) -> list[list[int]]:
+    """Return the hue of each robot at moments, from the content of `embed_hues`."""
+    listed = []
+    for moment in moments:
+        current = list(hues["first"])
+        for since, robot, hue in hues["changes"]:
+            if since <= moment:
+                current[robot] = hue
+        listed.append(current)
+    return listed
