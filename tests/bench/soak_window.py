@@ -48,7 +48,7 @@ def main(minutes: int, robots: int) -> None:
             for _ in range(60 * FPS):
                 if rng.random() < 1 / (20 * FPS):
                     touch(viewer, rng)
-                window.frame(1.0 / FPS)
+                window.run_frame(1.0 / FPS)
             if minute == WARM:
                 warm = resident()
             if minute % 5 == 0:

@@ -88,7 +88,7 @@ class Hands(Driver):
         if self.window.trial is None:
             super().settle()
         for _ in range(4 if self.window.trial is not None else 0):
-            self.window.frame(0.0)
+            self.window.run_frame(0.0)
 
     @property
     def sketch(self) -> Sketch:
@@ -123,22 +123,22 @@ class Hands(Driver):
         self.click_at(point)
 
     def wait(self, seconds: float = 0.5) -> None:
-        self.window.frame(seconds)
+        self.window.run_frame(seconds)
 
     def answer(self, text: str) -> None:
         """Click a button of the question that is asked."""
         self.settle()
-        shown = self.window.dialogs._ui.shown
+        shown = self.window.dialogs.ui.widgets
         found = next(each for each in shown.values() if each.kind == "button" and each.text == text)
         self.click(*found.rect.center)
 
     def refused(self) -> str:
         """Return why the dialog that is open refuses what was typed, which stays; and leave it."""
-        asked = self.editor.dialogs.asked
-        assert isinstance(asked, Choice) and asked.trouble, "nothing was refused"
+        asked = self.editor.dialogs.current
+        assert isinstance(asked, Choice) and asked.error, "nothing was refused"
         self.key("escape")
-        assert self.editor.dialogs.asked is None
-        return asked.trouble
+        assert self.editor.dialogs.current is None
+        return asked.error
 
     def select(self, *keys: Any) -> None:
         self.editor.select(Selection.of(*keys))

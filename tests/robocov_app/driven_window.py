@@ -13,9 +13,9 @@ from sample_sessions import HALL, RAPF, start_session
 
 from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
-from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.display import open_display
-from robocov_app.toolkit.ui import Shown
+from robocov_app.toolkit.page import Widget
 from robocov_app.viewer.commands import list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
@@ -82,20 +82,20 @@ def key_event(name: str) -> dict[str, Any]:
     return {"key": KEYS.get(last) or pygame.key.key_code(last), "mod": mod, "unicode": text, "scancode": 0}
 
 
-def listed(viewer: Presenter) -> Commands:
+def listed(viewer: Presenter) -> CommandTable:
     """Return the commands without a window."""
     titles = {layer.name: layer.title for layer in standard_layers()}
-    return Commands(
+    return CommandTable(
         list_viewer_commands(viewer, titles), viewer.attempt, lambda: list_parameter_commands(viewer)
     )
 
 
 def do(viewer: Presenter, name: str) -> None:
-    listed(viewer).do(name)
+    listed(viewer).run(name)
 
 
 def typed(viewer: Presenter, text: str) -> None:
-    listed(viewer).typed(text)
+    listed(viewer).run_text(text)
 
 
 class Driver:
@@ -113,13 +113,13 @@ class Driver:
 
     def frames(self, count: int = 1, seconds: float = FRAME) -> None:
         for _ in range(count):
-            self.window.frame(seconds)
+            self.window.run_frame(seconds)
 
     def settle(self) -> None:
         """Let what was posted arrive, and what that posted."""
         for _ in range(3):
             self.window.advance(0.0)
-        self.window.frame(0.0)
+        self.window.run_frame(0.0)
 
     def post(self, kind: int, **what: Any) -> None:
         pygame.event.post(pygame.event.Event(kind, **what))
@@ -201,14 +201,14 @@ class Driver:
 
     # the panel
 
-    def widget(self, kind: str, name: str) -> Shown:
+    def widget(self, kind: str, name: str) -> Widget:
         self.window.draw()
         assert not self.window.panel.hidden, "the panel is hidden"
         found = self.find(kind, name)
         assert found is not None, f"no {kind} {name}"
         return found
 
-    def find(self, kind: str, name: str) -> Shown | None:
+    def find(self, kind: str, name: str) -> Widget | None:
         return self.window.panel.ui.find(kind, name)
 
     def push(self, name: str) -> None:
@@ -226,12 +226,12 @@ class Driver:
         self.click(*self.widget("menu", menu).rect.center)
         found = self.window.panel.ui.open_list
         assert found is not None and option in found.options, f"no {option} in {menu}"
-        item = found.item(found.options.index(option))
+        item = found.get_item_rect(found.options.index(option))
         for _ in range(100):
             if found.rect.contains(item):
                 break
             self.wheel(*found.rect.center, 1 if item.top < found.rect.top else -1)
-            item = found.item(found.options.index(option))
+            item = found.get_item_rect(found.options.index(option))
         self.click(*item.center)
 
     def write(self, field: str, text: str) -> None:

@@ -57,7 +57,7 @@ SCENES: dict[str, tuple[str, Callable[[object], None]]] = {
 
 def played(window, frames: int) -> None:
     for _ in range(frames):
-        window.frame(1.0 / FPS)
+        window.run_frame(1.0 / FPS)
 
 
 def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:

@@ -189,7 +189,7 @@ class RandomEvents:
         for number in range(count):
             self.random.choices(actions, weights)[0]()
             if number % EVENTS_PER_FRAME == 0:
-                self.window.frame(self.random.choice(SECONDS))
+                self.window.run_frame(self.random.choice(SECONDS))
                 self.window.closed = False
                 after_frame()
 
@@ -206,7 +206,7 @@ class RandomEvents:
 
     def press_key_of_command(self) -> None:
         commands: Any = (self.window.inner or self.window).commands  # type: ignore[attr-defined]
-        pairs = [(command.name, key) for command in commands.listed for key in command.keys]
+        pairs = [(command.name, key) for command in commands.commands for key in command.keys]
         name, key = self.random.choice(pairs)
         self.pressed[name] = self.pressed.get(name, 0) + 1
         if self.pressed[name] <= RARE_COMMANDS.get(name, math.inf):
@@ -248,8 +248,8 @@ class RandomEvents:
         if dice < 0.04:
             return self.random.choice((-(2**15), -1, 0, 10**5)), self.random.choice((-(2**15), -1, 0, 10**5))
         panel = getattr(self.window.inner or self.window, "panel", None)
-        if dice < 0.45 and panel is not None and panel.ui.shown:
-            box = self.random.choice(list(panel.ui.shown.values())).rect
+        if dice < 0.45 and panel is not None and panel.ui.widgets:
+            box = self.random.choice(list(panel.ui.widgets.values())).rect
             return self.random.randint(box.left, box.right), self.random.randint(box.top, box.bottom)
         return self.random.randint(-10, width + 10), self.random.randint(-10, height + 10)
 
@@ -288,7 +288,9 @@ class RandomEvents:
         self.post(kind, size=size, w=size[0], h=size[1], x=size[0], y=size[1])
         if self.random.random() < 0.3:
             theme = self.random.choice(("light", "dark"))
-            self.window.suit(self.random.choice(SCALES), theme, panel=self.random.choice((None, True, False)))
+            self.window.set_appearance(
+                self.random.choice(SCALES), theme, panel=self.random.choice((None, True, False))
+            )
 
     def post_other(self) -> None:
         pygame.key.set_mods(self.random.choice((0, 0, 0, *MODIFIERS.values())))

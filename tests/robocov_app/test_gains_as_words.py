@@ -186,10 +186,10 @@ def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
         driver.push("target:median")
         assert target() == "median" and driver.session.timeline.events[-1].text.endswith("target = median")
         assert chosen("median") and not chosen("centroid")
-        driver.viewer.attempt(lambda: driver.window.commands.typed("target sens"))
+        driver.viewer.attempt(lambda: driver.window.commands.run_text("target sens"))
         driver.settle()
         assert target() == "sensing" and chosen("sensing")
-        driver.viewer.attempt(lambda: driver.window.commands.typed("target 3"))
+        driver.viewer.attempt(lambda: driver.window.commands.run_text("target 3"))
         assert driver.viewer.has_error_message and "one of centroid, sensing, median" in driver.viewer.message
         driver.push("reset:target")
         assert target() == "centroid"

@@ -110,7 +110,7 @@ def _use_window(window: ViewerWindow, seconds: float) -> _Measurements:
     clock = pygame.time.Clock()
     # The first frames prepare the cost of the map, and draw everything that is stored afterwards.
     for _ in range(FPS):
-        window.frame(clock.tick(FPS) / 1000.0)
+        window.run_frame(clock.tick(FPS) / 1000.0)
     curve = window.viewer.pane.distance_curve
     known_costs = len(curve)
     measured = _Measurements()

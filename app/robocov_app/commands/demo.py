@@ -261,6 +261,6 @@ def _draw_frames(
         is_tour_over = is_whole_tour and window.lesson.player is None
         if interruption.requested or is_tour_over:
             return
-        window.frame(1.0 / HEADLESS_FPS)
+        window.run_frame(1.0 / HEADLESS_FPS)
         yield copy_pixels(window.screen)
         update(number)

@@ -120,6 +120,6 @@ def _save_screenshot(window: EditorWindow, path: Path, page: str) -> None:
     window.panel.show_tab(page)
     window.editor.message = ""
     for _ in range(_SCREENSHOT_FRAMES):
-        window.frame(_SCREENSHOT_FRAME_S)
+        window.run_frame(_SCREENSHOT_FRAME_S)
     with replace_file(path) as temporary:
         temporary.write_bytes(encode_png(copy_pixels(window.screen)))

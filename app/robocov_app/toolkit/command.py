@@ -1,245 +1,290 @@
-"""Commands: one list a window, read by its keys, menus, buttons, help, tool tips and palette."""
+"""Commands: one table for each window. Keys, menus, buttons, help, tool tips and palette come from it."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import pygame
-from pygame import Rect, Surface
 
 from robocov.errors import InputError, describe_unknown_name
-from robocov_app.look.colors import mix
-from robocov_app.look.theme import Theme
-from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.toolkit.dialogs import Choice, Dialog, Option
-from robocov_app.toolkit.input import key_of, key_words
-from robocov_app.toolkit.overlay import card, dim
-from robocov_app.toolkit.ui import SMALL, TEXT, Ui
+from robocov_app.toolkit.input import format_key, get_key_name
+
+Action = Callable[..., object]
+
+
+def _list_nothing() -> Iterable[str]:
+    return ()
+
+
+def _give_no_reason() -> str:
+    return ""
 
 
 @dataclass(frozen=True)
-class Takes:
-    """Argument that is typed after a command's name."""
+class Argument:
+    """Argument that is typed after the name of a command.
 
-    name: str  # for the palette: "number of robots"
-    read: Callable[[str], object] = str  # makes a value of what was typed; InputError
-    options: Callable[[], Iterable[str]] = tuple  # the words that can be typed, if they can be listed
+    Attributes
+    ----------
+    description : str
+        For the palette, such as "number of robots".
+    parse : callable
+        Converts the typed text; raises InputError if it is not valid.
+    list_values : callable
+        Lists the texts that can be typed, if there are few.
+    """
+
+    description: str
+    parse: Callable[[str], object] = str
+    list_values: Callable[[], Iterable[str]] = _list_nothing
 
 
 @dataclass(frozen=True)
 class Command:
-    """Something that can be done in a window."""
+    """Something that can be done in a window.
 
-    name: str  # unique; what is typed where it takes something, "kind:what" otherwise
+    Attributes
+    ----------
+    name : str
+        Unique name: the word that is typed for a command with an argument, else as in "save:run".
+    title : str
+        Text in menus, tool tips and help.
+    group : str
+        Heading in the help.
+    run : callable
+        Called with the argument, if there is one. If it returns a text, that is shown as message.
+    keys : tuple of str
+        Keys, such as "ctrl+shift+z"; the last part is pygame's name of the key.
+    get_disabled_reason : callable
+        Returns why the command cannot be run now; an empty text if it can.
+    argument : Argument or None
+    repeats : bool
+        Whether it is run again and again while its key is held down.
+    hidden : bool
+        Whether palette and help leave it out.
+    """
+
+    name: str
     title: str
-    group: str  # the heading under which people read of it
-    run: Callable[..., object]  # called with what was typed where it takes something; returned words are told
-    keys: tuple[str, ...] = ()  # as "ctrl+shift+z"; the last part is what pygame calls the key
-    when: Callable[[], str] = str  # returns why it cannot be done now, an empty text where it can
-    takes: Takes | None = None
-    repeats: bool = False  # whether it is done again and again while its key is held down
-    hidden: bool = False  # left out of palette and help
+    group: str
+    run: Action
+    keys: tuple[str, ...] = ()
+    get_disabled_reason: Callable[[], str] = _give_no_reason
+    argument: Argument | None = None
+    repeats: bool = False
+    hidden: bool = False
+
+    @property
+    def key_text(self) -> str:
+        """The first key, for people; empty if there is none."""
+        return format_key(self.keys[0]) if self.keys else ""
 
     @property
     def tip(self) -> str:
-        keys = " or ".join(key_words(key) for key in self.keys)
+        """Title and keys, for a tool tip."""
+        keys = " or ".join(format_key(key) for key in self.keys)
         return f"{self.title} ({keys})" if keys else self.title
 
+    def run_now(self, *texts: str) -> object:
+        """Run the command.
 
-class Commands:
-    """The list of a window's commands."""
+        Parameters
+        ----------
+        *texts : str
+            The typed argument, if the command has one.
+
+        Raises
+        ------
+        InputError
+            If the command cannot be run now, or if the argument is not valid.
+        """
+        reason = self.get_disabled_reason()
+        if reason:
+            raise InputError(reason)
+        if self.argument is None:
+            return self.run()
+        return self.run(*[self.argument.parse(text) for text in texts])
+
+
+class CommandGroup:
+    """Builds commands with the same heading.
+
+    Parameters
+    ----------
+    heading : str
+        Heading in the help.
+
+    Attributes
+    ----------
+    commands : list of Command
+        The commands that were added.
+    """
+
+    def __init__(self, heading: str) -> None:
+        self.heading = heading
+        self.commands: list[Command] = []
+
+    def add(
+        self,
+        name: str,
+        title: str,
+        action: Action,
+        *keys: str,
+        repeats: bool = False,
+        argument: Argument | None = None,
+        hidden: bool = False,
+    ) -> None:
+        """Add a command.
+
+        Parameters
+        ----------
+        name : str
+            Unique name.
+        title : str
+            What it does, for people; empty to leave it out of palette and help.
+        action : callable
+            Does it; a text that it returns is shown as message.
+        *keys : str
+            Keys, such as ``ctrl+z``.
+        repeats : bool
+            Whether it is repeated while the key is held down.
+        argument : Argument, optional
+            Argument that is typed after the name.
+        hidden : bool
+            Whether palette and help leave it out.
+        """
+        is_hidden = hidden or not title
+        command = Command(
+            name, title, self.heading, action, keys, argument=argument, repeats=repeats, hidden=is_hidden
+        )
+        self.commands.append(command)
+
+
+def _list_no_commands() -> Iterable[Command]:
+    return ()
+
+
+class CommandTable:
+    """The commands of a window.
+
+    Parameters
+    ----------
+    commands : iterable of Command
+    attempt : callable
+        Calls a function, and shows the text that it returns, or the message of an error that it raises.
+    list_temporary : callable, optional
+        Lists commands that come and go, such as the gains of the present controller.
+
+    Attributes
+    ----------
+    commands : list of Command
+        The commands that always exist.
+    """
 
     def __init__(
         self,
-        listed: Iterable[Command],
-        attempt: Callable[[Callable[[], object]], object],  # calls it, and tells returned words or the error
-        more: Callable[[], Iterable[Command]] = tuple,  # that come and go, as gains of the controller in use
+        commands: Iterable[Command],
+        attempt: Callable[[Callable[[], object]], object],
+        list_temporary: Callable[[], Iterable[Command]] = _list_no_commands,
     ) -> None:
-        self.listed = list(listed)
-        self._attempt, self._more = attempt, more
-        self._named = {each.name: each for each in self.listed}
-        self._keyed = {key: each for each in self.listed for key in each.keys}
-        self._down: set[int] = set()
+        self.commands = list(commands)
+        self._attempt = attempt
+        self._list_temporary = list_temporary
+        self._by_name = {command.name: command for command in self.commands}
+        self._by_key = {key: command for command in self.commands for key in command.keys}
+        self._held_keys: set[int] = set()
 
     def __getitem__(self, name: str) -> Command:
-        return self._named[name]
+        return self._by_name[name]
 
-    def do(self, name: str) -> None:
-        self._attempt(partial(_done, self._named[name]))
+    def run(self, name: str) -> None:
+        """Run a command, and show its message or error."""
+        self.attempt(self._by_name[name])
 
-    def of_key(self, event: pygame.event.Event) -> Command | None:
-        """Return the command of a key that goes down; None while it is held and does not repeat."""
-        command, held = self._keyed.get(key_of(event)), event.key in self._down
-        self._down.add(event.key)
-        return None if command is None or (held and not command.repeats) else command
+    def attempt(self, command: Command) -> object:
+        """Run a command, which may be temporary, and show its message or error."""
+        return self._attempt(command.run_now)
 
-    def release(self, event: pygame.event.Event) -> None:
-        self._down.discard(event.key)
+    def press_key(self, event: pygame.event.Event) -> Command | None:
+        """Return the command of a key that was pressed; None while it is held, unless the command repeats."""
+        command = self._by_key.get(get_key_name(event))
+        is_held = event.key in self._held_keys
+        self._held_keys.add(event.key)
+        if command is None or (is_held and not command.repeats):
+            return None
+        return command
 
-    def forget_keys(self, *held: int) -> None:
-        self._down = set(held)
+    def release_key(self, event: pygame.event.Event) -> None:
+        """Note that a key was released."""
+        self._held_keys.discard(event.key)
 
-    def _typable(self) -> dict[str, Command]:
-        return {each.name: each for each in [*self._more(), *self.listed] if each.takes is not None}
+    def reset_keys(self, *held: int) -> None:
+        """Forget the keys that are held down, except for the given ones."""
+        self._held_keys = set(held)
 
-    def typed(self, text: str) -> object:
-        word, rest = parted(text)
-        known = self._typable()
-        if word not in known:
-            raise InputError(describe_unknown_name("command", word, list(known)))
-        return _done(known[word], rest)
+    def list_all(self) -> list[Command]:
+        """List the temporary commands and those that always exist."""
+        return [*self._list_temporary(), *self.commands]
 
-    def offered(self, text: str, most: int = 9) -> list[Option]:
-        """Return the palette's lines for a text, with what does them as value; None: more is to be typed."""
-        word, rest = parted(text)
-        command = self._typable().get(word)
-        if command is not None and command.takes is not None and (rest or text.rstrip() != text):
-            return self._completions(command, command.takes, rest, text)[:most]
-        commands = [*self.listed, *(self._more() if text.strip() else ())]
-        found = matching([each for each in commands if not each.hidden], text)
-        return [self._offer(each) for each in found[:most]]
+    def find_with_argument(self, name: str) -> Command | None:
+        """Return the command with an argument that has this name; None if there is none."""
+        return self._list_with_argument().get(name)
 
-    def _completions(self, command: Command, takes: Takes, rest: str, text: str) -> list[Option]:
-        options, low, why = list(takes.options()), rest.lower(), command.when()
-        begun = [each for each in options if each.lower().startswith(low)]
-        begun += [each for each in options if low in each.lower() and each not in begun]
-        found = []
-        if rest in options or not begun:
-            found.append(Option(text.strip(), takes.name, text, why, lambda: self.typed(text)))
-        for option in begun:
-            if option != rest:
-                whole = f"{command.name} {option}"
-                found.append(Option(whole, "", whole, why, partial(self.typed, whole)))
-        return found
+    def _list_with_argument(self) -> dict[str, Command]:
+        return {command.name: command for command in self.list_all() if command.argument is not None}
 
-    def _offer(self, command: Command) -> Option:
-        if command.takes is not None:
-            return Option(command.title, f"{command.name} …", f"{command.name} ", command.when())
-        keys = " or ".join(key_words(key) for key in command.keys[:2])
-        do = partial(self._attempt, partial(_done, command))
-        return Option(command.title, keys, command.title, command.when(), do)
+    def run_text(self, text: str) -> object:
+        """Run a command that was typed with its argument.
 
+        Parameters
+        ----------
+        text : str
+            As in "robots 8".
 
-def _done(command: Command, *typed: str) -> object:
-    if why := command.when():
-        raise InputError(why)
-    return command.run(*(command.takes.read(text) for text in typed if command.takes is not None))
+        Returns
+        -------
+        object
+            What the command returns.
 
+        Raises
+        ------
+        InputError
+            If there is no such command, if it cannot be run now, or if the argument is not valid.
+        """
+        name, argument = split_command(text)
+        commands = self._list_with_argument()
+        if name not in commands:
+            raise InputError(describe_unknown_name("command", name, list(commands)))
+        return commands[name].run_now(argument)
 
-def parted(text: str) -> tuple[str, str]:
-    """Return the word and what follows it, after a blank or an equals sign: ``k_rep = 0.5``."""
-    word, *rest = re.split(r"\s*=\s*|\s+", text.strip(), maxsplit=1)
-    return word, "".join(rest)
-
-
-def matching(commands: Sequence[Command], typed: str) -> list[Command]:
-    """Return the commands whose titles or names hold all words typed, those that begin with them first."""
-    words, begun = typed.lower().split(), typed.lower().strip()
-    found = [each for each in commands if all(word in f"{each.title} {each.name}".lower() for word in words)]
-    return sorted(found, key=lambda each: not (each.name == begun or each.title.lower().startswith(begun)))
+    def search(self, text: str) -> list[Command]:
+        """Return the commands that palette and help do not leave out and that match a typed text."""
+        commands = list(self.commands)
+        if text.strip():
+            commands += self._list_temporary()
+        return find_commands([command for command in commands if not command.hidden], text)
 
 
-def palette(commands: Commands, ghost: str, told: Callable[[str], object]) -> Choice:
-    """Return the dialog that finds and does commands; `told` gets the words of what was done, if any."""
+def split_command(text: str) -> tuple[str, str]:
+    """Split a typed text into the name of a command and its argument, at a blank or an equals sign.
 
-    def accept(text: str, option: Option | None) -> object:
-        if option is not None and option.value is None:
-            return option.fills
-        if option is not None and option.why:
-            raise InputError(option.why)
-        words = option.value() if option is not None and callable(option.value) else commands.typed(text)
-        told(words if isinstance(words, str) else "")
-        return None
-
-    hint = "↑ ↓ choose · Tab completes · Enter does it · Esc closes"
-    return Choice("", commands.offered, accept, ghost, hint)
+    >>> split_command("k_rep = 0.5")
+    ('k_rep', '0.5')
+    """
+    name, *argument = re.split(r"\s*=\s*|\s+", text.strip(), maxsplit=1)
+    return name, "".join(argument)
 
 
-class Menu(Dialog):
-    """Commands to choose from at a place of the window, None for a line between groups."""
+def find_commands(commands: Sequence[Command], text: str) -> list[Command]:
+    """Return the commands whose titles or names contain all words of a text, the best matches first."""
+    words = text.lower().split()
+    start = text.lower().strip()
 
-    margin = 5.0, 5.0
-    veils, closes_beside = False, True
+    def is_match(command: Command) -> bool:
+        line = f"{command.title} {command.name}".lower()
+        return all(word in line for word in words)
 
-    def __init__(
-        self, rows: Sequence[Command | None], at: tuple[int, int], do: Callable[[str], object]
-    ) -> None:
-        self.commands, self.at, self._do = rows, at, do
-        self.chosen = -1
+    def is_worse(command: Command) -> bool:
+        return command.name != start and not command.title.lower().startswith(start)
 
-    def page(self, ui: Ui) -> None:
-        for k, command in enumerate(self.commands):
-            ui.row(height=7 if command is None else 24, below=0)
-            if command is None:
-                ui.cell()
-                continue
-            why, chosen = command.when(), k == self.chosen
-            if ui.option(command.title, _keys(command), key=command.name, chosen=chosen, why=why):
-                self._choose(command)
-
-    def _choose(self, command: Command | None) -> None:
-        self.done = True
-        if command is not None:
-            self._do(command.name)
-
-    def key(self, name: str, ui: Ui) -> bool:
-        usable = [k for k, each in enumerate(self.commands) if each is not None and not each.when()]
-        by = {"up": -1, "down": 1}.get(name, 0)
-        if by and usable:
-            k = usable.index(self.chosen) + by if self.chosen in usable else (0 if by > 0 else -1)
-            self.chosen = usable[k % len(usable)]
-        elif name in ("return", "enter") and self.chosen in usable:
-            self._choose(self.commands[self.chosen])
-        return True
-
-    def place(self, box: Rect, screen: Rect, scale: float) -> None:
-        title, keys = round(TEXT * scale), round(SMALL * scale)
-        listed = [each for each in self.commands if each is not None]
-        widths = [text_width(each.title, title) + text_width(_keys(each), keys) for each in listed]
-        box.update(self.at, (round(50 * scale) + max(widths), box.height))
-        box.clamp_ip(screen)
-
-
-def _keys(command: Command) -> str:
-    return key_words(command.keys[0]) if command.keys else ""
-
-
-def draw_keys(
-    screen: Surface, theme: Theme, scale: float, commands: list[Command], groups: Sequence[str], words: str
-) -> None:
-    dim(screen, theme)
-    lines: list[str | Command] = []
-    for group in groups:
-        lines.append(group)
-        lines += [each for each in commands if each.group == group and each.keys and not each.hidden]
-    width, height = screen.get_size()
-    columns = 4 if width >= 1150 * scale else 3
-    # small windows get smaller letters rather than a page that does not fit
-    rows = -(-(len(lines) + len(groups)) // columns) + 1
-    row = min(16.5 * scale, (height - 90 * scale) / rows)
-    size = max(8, round(row * 0.66))
-    box = Rect(0, 0, round(min(width - 24 * scale, 1240 * scale)), round(rows * row + 66 * scale))
-    box.center = width // 2, height // 2
-    card(screen, box, theme, scale)
-    title = label("Keys", round(16 * scale), theme.ink, True)
-    screen.blit(title, (box.left + round(20 * scale), box.top + round(12 * scale)))
-    hint = label(words, round(11 * scale), theme.faint)
-    screen.blit(hint, hint.get_rect(midright=(box.right - round(20 * scale), box.top + round(22 * scale))))
-    wide = (box.width - 40 * scale) / columns
-    x, y, limit = box.left + 20 * scale, box.top + 44 * scale, box.bottom - 14 * scale
-    for line in lines:
-        # a heading does not stand alone at the foot of a column
-        if y + row * (2.6 if isinstance(line, str) else 1.0) > limit:
-            x, y = x + wide, box.top + 44 * scale
-        if isinstance(line, str):
-            if y > box.top + 45 * scale:
-                y += 0.5 * row
-            heading = label(line.upper(), max(8, round(size * 0.92)), theme.final, True)
-            screen.blit(heading, (round(x), round(y)))
-        else:
-            screen.blit(label(key_words(line.keys[0]), size, theme.ink, True), (round(x), round(y)))
-            told = shortened(line.title.partition(":")[0], size, wide - 92 * scale)
-            meaning = label(told, size, mix(theme.panel, theme.ink, 0.8))
-            screen.blit(meaning, (round(x + 84 * scale), round(y)))
-        y += row
+    return sorted(filter(is_match, commands), key=is_worse)

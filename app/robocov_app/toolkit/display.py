@@ -12,8 +12,8 @@ from pygame import Surface
 
 from robocov.errors import InputError
 from robocov.text import remove_controls
-from robocov_app.toolkit.input import KEY_REPEAT
-from robocov_app.toolkit.layout import SMALLEST
+from robocov_app.toolkit.input import KEY_REPEAT_MS
+from robocov_app.toolkit.layout import MIN_SIZE_PX
 
 _DRIVER_VARIABLE = "SDL_VIDEODRIVER"
 _DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", _DRIVER_VARIABLE)
@@ -49,7 +49,7 @@ def open_display(*, headless: bool, missing_message: str = "no display") -> Iter
     try:
         _start_display(missing_message, may_be_invisible=headless)
         pygame.font.init()
-        pygame.key.set_repeat(*KEY_REPEAT)
+        pygame.key.set_repeat(*KEY_REPEAT_MS)
         try:
             yield
         finally:
@@ -107,7 +107,7 @@ def open_window(size: tuple[int, int]) -> Surface:
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():
         # There is no other way yet to give a window of the display module a minimum size.
         warnings.simplefilter("ignore", DeprecationWarning)
-        pygame.Window.from_display_module().minimum_size = SMALLEST
+        pygame.Window.from_display_module().minimum_size = MIN_SIZE_PX
     return screen
 
 

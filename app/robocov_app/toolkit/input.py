@@ -1,23 +1,44 @@
-"""Names of keys, events without control characters, and the state of the mouse that every window keeps."""
+"""Names of keys, events without control characters, and notches of the wheel."""
 
 import math
-from contextlib import suppress
 
 import pygame
 
 from robocov.text import remove_controls
 
-KEY_REPEAT = (350, 40)  # milliseconds until a held key is pressed again, the first time and from then on
-DOUBLE = 0.35  # seconds between the two clicks of a double click, at most
-SLIP = 5.0  # pixels that a click may move
-WHEEL = 1.15  # magnification of one notch of the wheel
-OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+KEY_REPEAT_MS = (350, 40)
+"""Time until a held key is repeated, the first time and from then on."""
+DOUBLE_CLICK_S = 0.35
+"""Maximum time between the two clicks of a double click."""
+MAX_CLICK_MOVE_PX = 5.0
+"""Distance that the mouse may move during a click."""
+ZOOM_PER_NOTCH = 1.15
+"""Magnification of one notch of the wheel."""
+MOUSE_EVENTS = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+ENTER_KEYS = ("return", "enter")
+
+_MAX_NOTCHES = 5.0
+_MODIFIERS = {
+    "ctrl": pygame.KMOD_CTRL | pygame.KMOD_META,
+    "alt": pygame.KMOD_ALT,
+    "shift": pygame.KMOD_SHIFT,
+}
+_KEY_SYMBOLS = {"left": "←", "right": "→", "up": "↑", "down": "↓", "return": "Enter"}
 
 
 def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
-    """Return an event without control characters in its text; None if nothing is left of that.
+    """Remove control characters from the text of an event.
 
-    The name of a dropped file may hold any character but NUL, and stays as it is otherwise.
+    The name of a dropped file may contain any character but NUL, and is otherwise not changed.
+
+    Parameters
+    ----------
+    event : pygame.event.Event
+
+    Returns
+    -------
+    pygame.event.Event or None
+        None if nothing is left of the text.
     """
     if event.type in (pygame.TEXTINPUT, pygame.TEXTEDITING):
         text = remove_controls(event.text, single_line=True)
@@ -29,41 +50,42 @@ def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
     return event
 
 
-def key_of(event: pygame.event.Event) -> str:
+def get_key_name(event: pygame.event.Event) -> str:
     """Return the name of a pressed key with its modifiers, as in ``ctrl+shift+z``."""
     name = pygame.key.name(event.key)
-    name = name.strip("[]") or name  # those of the key pad stand in brackets
-    ctrl = pygame.KMOD_CTRL | pygame.KMOD_META
-    modifiers = {"ctrl": ctrl, "alt": pygame.KMOD_ALT, "shift": pygame.KMOD_SHIFT}
-    return "+".join([*(held for held, mask in modifiers.items() if event.mod & mask), name])
+    name = name.strip("[]") or name  # Names of keys on the key pad are in brackets.
+    modifiers = [modifier for modifier, mask in _MODIFIERS.items() if event.mod & mask]
+    return "+".join([*modifiers, name])
 
 
-def key_words(key: str) -> str:
-    """Return a key as people write it: Ctrl Shift Z."""
-    arrows = {"left": "←", "right": "→", "up": "↑", "down": "↓", "return": "Enter"}
-    parts = [*key[:-1].split("+")[:-1], "+"] if key.endswith("++") or key == "+" else key.split("+")
-    return " ".join(arrows.get(part, part[:1].upper() + part[1:]) for part in parts)
+def is_function_key(name: str) -> bool:
+    """Return whether a key is one of F1 to F12."""
+    return name[:1] == "f" and name[1:].isdigit()
 
 
-def wheel_notches(event: pygame.event.Event) -> float:
-    """Return the number of notches that the wheel was turned by; touch pads turn it by fractions of one."""
+def split_key_name(name: str) -> list[str]:
+    """Split the name of a key into its modifiers and the key itself, which may be "+"."""
+    if name == "+" or name.endswith("++"):
+        return [*name[:-1].split("+")[:-1], "+"]
+    return name.split("+")
+
+
+def format_key(name: str) -> str:
+    """Return a key for people.
+
+    >>> format_key("ctrl+shift+z")
+    'Ctrl Shift Z'
+    """
+    parts = split_key_name(name)
+    return " ".join(_KEY_SYMBOLS.get(part, part[:1].upper() + part[1:]) for part in parts)
+
+
+def get_wheel_notches(event: pygame.event.Event) -> float:
+    """Return the number of notches by which the wheel was turned.
+
+    Touch pads turn it by fractions of a notch.
+    """
     notches = float(getattr(event, "precise_y", event.y) or event.y)
     if not math.isfinite(notches):
         notches = float(event.y)
-    return min(max(notches, -5.0), 5.0)
-
-
-_cursor = pygame.SYSTEM_CURSOR_ARROW
-
-
-def shown_cursor() -> int:
-    """Return the shape that the cursor has, or would have if the display had one."""
-    return _cursor
-
-
-def show_cursor(shape: int) -> None:
-    global _cursor
-    if shape != _cursor:
-        _cursor = shape
-        with suppress(pygame.error):  # not every display has cursors
-            pygame.mouse.set_cursor(shape)
+    return min(max(notches, -_MAX_NOTCHES), _MAX_NOTCHES)

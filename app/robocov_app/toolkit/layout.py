@@ -1,76 +1,141 @@
-"""Window layout: arena, panel, plot, time line and status line. Pure arithmetic."""
+"""Window layout: arena, panel, chart, timeline and status line. Pure arithmetic."""
 
 from math import floor
 from typing import NamedTuple, TypeAlias
 
 from robocov_app.render.layout import columns_for
 
-Box: TypeAlias = tuple[int, int, int, int]  # left, top, width and height in pixels
-PANEL, CHART, TRACK, STATUS, GAP, LEGEND_ROW = 320, 150, 26, 26, 2, 22
-SMALLEST = (900, 600)  # width and height at scale 1 that everything has room in,
-UPRIGHT = (460, 600)  # and on a telephone that is held upright, where the panel takes most of the width
+Box: TypeAlias = tuple[int, int, int, int]
+"""Left, top, width and height, px."""
+
+# Lengths in pixels at scale 1.
+PANEL_WIDTH_PX = 320
+CHART_HEIGHT_PX = 150
+TIMELINE_HEIGHT_PX = 26
+STATUS_HEIGHT_PX = 26
+PANE_GAP_PX = 2
+LEGEND_ROW_PX = 22
+MIN_SIZE_PX = (900, 600)
+"""Width and height of a window in which everything fits at scale 1."""
+MIN_PORTRAIT_SIZE_PX = (460, 600)
+"""The same for a telephone that is held upright, where the panel takes most of the width."""
+
+_MIN_SCALE = 0.25
+_SCALE_STEPS = 8
+"""Steps from one scale to the next integer, so that text does not tremble while the window is resized."""
 
 
 class Layout(NamedTuple):
-    """Boxes of a window of some size."""
+    """Boxes of a window.
+
+    Attributes
+    ----------
+    size : (width, height), px
+    scale : float
+        The requested scale, or the largest for which the window is large enough.
+    arena, chart, track, status : Box
+        The track is the timeline below the chart.
+    panel : Box
+        Of width 0 while it is hidden.
+    panes : tuple of Box
+        Parts of the arena.
+    legend : Box
+        Above several panes, which share it; of height 0 above a single one.
+    """
 
     size: tuple[int, int]
-    scale: float  # as it was asked for, or what of it the window has room for
+    scale: float
     arena: Box
-    panel: Box  # of no width while it is hidden
+    panel: Box
     chart: Box
     track: Box
     status: Box
     panes: tuple[Box, ...]
-    legend: Box  # above several panes, which share it; of no height above a single one
+    legend: Box
 
 
-def laid_out(
+def build_layout(
     size: tuple[int, int],
     scale: float,
     panes: int = 1,
     aspect: float = 1.0,
     *,
-    panel: bool = True,  # whether it is shown
-    legend_rows: int = 1,  # of the legend that several panes share
-    plot: bool = True,  # whether it is shown
+    panel: bool = True,
+    legend_rows: int = 1,
+    plot: bool = True,
 ) -> Layout:
-    """Lay a window out, for panes of a map whose width by height is `aspect`."""
+    """Lay out a window.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    scale : float
+        Requested size of texts and widgets.
+    panes : int
+        Number of panes, which all show the same map.
+    aspect : float
+        Width of the map by its height.
+    panel : bool
+        Whether the panel is shown.
+    legend_rows : int
+        Rows of the legend that several panes share.
+    plot : bool
+        Whether chart and timeline are shown.
+
+    Returns
+    -------
+    Layout
+    """
     width, height = size
-    scale = min(scale, largest_scale(size))
-    wide = min(round(PANEL * scale), width - 1) if panel else 0
-    left, status = width - wide, round(STATUS * scale)
-    track = round(TRACK * scale) if plot else 0
-    chart = min(round(CHART * scale), height // 3) if plot else 0
-    arena: Box = (0, 0, left, max(height - status - track - chart, 1))
-    legend = round((6 + LEGEND_ROW * legend_rows) * scale) if panes > 1 else 0
-    free = left, max(arena[3] - legend, 1)
-    columns = columns_for(panes, aspect, free, around=68 * scale, beside=31 * scale)
-    rows, pane_width = -(-panes // columns), (left - GAP * (columns - 1)) // columns
-    pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows
-    boxes: list[Box] = []
-    for row, k in (divmod(k, columns) for k in range(panes)):
-        top = legend + row * (pane_height + GAP)
-        boxes.append((k * (pane_width + GAP), top, pane_width, max(pane_height, 1)))
+    scale = min(scale, find_max_scale(size))
+    panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1) if panel else 0
+    left_width = width - panel_width
+    status_height = round(STATUS_HEIGHT_PX * scale)
+    timeline_height = round(TIMELINE_HEIGHT_PX * scale) if plot else 0
+    chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3) if plot else 0
+    arena_height = max(height - status_height - timeline_height - chart_height, 1)
+    legend_height = round((6 + LEGEND_ROW_PX * legend_rows) * scale) if panes > 1 else 0
     return Layout(
         size=size,
         scale=scale,
-        arena=arena,
-        panel=(left, 0, wide, height),
-        chart=(0, arena[3], left, chart),
-        track=(0, arena[3] + chart, left, track),
-        status=(0, arena[3] + chart + track, left, status),
-        panes=tuple(boxes),
-        legend=(0, 0, left, legend),
+        arena=(0, 0, left_width, arena_height),
+        panel=(left_width, 0, panel_width, height),
+        chart=(0, arena_height, left_width, chart_height),
+        track=(0, arena_height + chart_height, left_width, timeline_height),
+        status=(0, arena_height + chart_height + timeline_height, left_width, status_height),
+        panes=_arrange_panes(panes, aspect, scale, left_width, arena_height, legend_height),
+        legend=(0, 0, left_width, legend_height),
     )
 
 
-def largest_scale(size: tuple[int, int]) -> float:
-    """Return the largest scale that a window has room for: in steps, so that text does not tremble."""
-    least = SMALLEST if size[0] >= size[1] else UPRIGHT
-    return max(floor(8 * min(size[0] / least[0], size[1] / least[1])) / 8, 0.25)
+def _arrange_panes(
+    count: int, aspect: float, scale: float, width: int, arena_height: int, legend_height: int
+) -> tuple[Box, ...]:
+    """Arrange panes in rows below the legend."""
+    free_size = width, max(arena_height - legend_height, 1)
+    columns = columns_for(count, aspect, free_size, around=68 * scale, beside=31 * scale)
+    rows = -(-count // columns)
+    pane_width = (width - PANE_GAP_PX * (columns - 1)) // columns
+    pane_height = (arena_height - legend_height - PANE_GAP_PX * (rows - 1)) // rows
+    boxes: list[Box] = []
+    for number in range(count):
+        row, column = divmod(number, columns)
+        left = column * (pane_width + PANE_GAP_PX)
+        top = legend_height + row * (pane_height + PANE_GAP_PX)
+        boxes.append((left, top, pane_width, max(pane_height, 1)))
+    return tuple(boxes)
 
 
-def inside(box: tuple[float, float, float, float], pixel: tuple[float, float]) -> bool:
+def find_max_scale(size: tuple[int, int]) -> float:
+    """Return the largest scale at which everything fits into a window."""
+    width, height = size
+    min_width, min_height = MIN_SIZE_PX if width >= height else MIN_PORTRAIT_SIZE_PX
+    scale = floor(_SCALE_STEPS * min(width / min_width, height / min_height)) / _SCALE_STEPS
+    return max(scale, _MIN_SCALE)
+
+
+def is_inside(box: tuple[float, float, float, float], pixel: tuple[float, float]) -> bool:
+    """Return whether a pixel is in a box."""
     left, top, width, height = box
-    return left <= pixel[0] < left + width and top <= pixel[1] < top + height
+    x, y = pixel
+    return left <= x < left + width and top <= y < top + height

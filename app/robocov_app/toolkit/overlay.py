@@ -1,4 +1,4 @@
-"""Overlays of a window: cards, tags, messages, a veil."""
+"""Drawings over a window: cards, tags, messages, the status line, a veil."""
 
 import numpy as np
 import pygame
@@ -13,16 +13,27 @@ from robocov_app.render.surface_cache import kept
 from robocov_app.toolkit.layout import Box
 
 _FINE = 4
+"""Factor by which rounded boxes are drawn larger, and then smoothly reduced."""
+_BOX_CACHE_BYTES = 4_000_000
+_VEIL_ALPHA = 150
+_FACT_SEPARATOR = "    "
+
+# Lengths in pixels at scale 1.
+_CARD_RADIUS_PX = 8
+_MESSAGE_TEXT_PX = 12.5
+_MESSAGE_LINE_PX = 18
+_MAX_MESSAGE_WIDTH_PX = 620
+_STATUS_MARGIN_PX = 12
 
 
-def flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
-    """Return a canvas for strokes and words that are placed in pixels alone."""
+def create_flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
+    """Create a canvas for lines and texts whose positions are in pixels."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
     return Canvas(surface, camera, theme, scale, np.zeros(1, dtype=np.intp))
 
 
-@kept(4_000_000)
-def _rounded(size: tuple[int, int], fill: Color, edge: Color, radius: int, width: int) -> Surface:
+@kept(_BOX_CACHE_BYTES)
+def _render_rounded_box(size: tuple[int, int], fill: Color, edge: Color, radius: int, width: int) -> Surface:
     large = Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
     box = large.get_rect()
     pygame.draw.rect(large, edge, box, border_radius=radius * _FINE)
@@ -31,22 +42,52 @@ def _rounded(size: tuple[int, int], fill: Color, edge: Color, radius: int, width
     return pygame.transform.smoothscale(large.premul_alpha(), size)
 
 
-def rounded(screen: Surface, box: Rect, fill: Color, edge: Color, radius: int, width: int = 1) -> None:
+def draw_rounded_box(
+    screen: Surface, box: Rect, fill: Color, *, edge: Color, radius: int, width: int = 1
+) -> None:
+    """Draw a box with rounded corners.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    box : pygame.Rect
+    fill, edge : color
+    radius : int
+        Radius of the corners, px.
+    width : int
+        Width of the edge, px.
+    """
     if box.width > 0 and box.height > 0:
-        picture = _rounded(box.size, fill, edge, min(radius, min(box.size) // 2), width)
-        screen.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+        image = _render_rounded_box(box.size, fill, edge, min(radius, min(box.size) // 2), width)
+        screen.blit(image, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def on_accent(theme: Theme) -> Color:
+def get_accent_ink(theme: Theme) -> Color:
+    """Return the color of texts on the accent color."""
     return (255, 255, 255) if theme is LIGHT else theme.background
 
 
-def field_color(theme: Theme) -> Color:
+def get_field_color(theme: Theme) -> Color:
+    """Return the color of buttons and text fields."""
     return theme.background if theme is LIGHT else mix(theme.panel, theme.background, 0.8)
 
 
-def wrapped(text: str, size: int, width: float, bold: bool = False) -> list[str]:
-    """Break text into lines of at most `width` pixels; a word that is wider is broken too."""
+def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[str]:
+    """Break a text into lines.
+
+    Parameters
+    ----------
+    text : str
+    size : int
+        Height of the text, px.
+    width : float
+        Maximum width of a line, px. A word that is wider is broken, too.
+    bold : bool
+
+    Returns
+    -------
+    list of str
+    """
     lines: list[str] = []
     for word in text.split():
         if lines and text_width(f"{lines[-1]} {word}", size, bold) <= width:
@@ -60,51 +101,108 @@ def wrapped(text: str, size: int, width: float, bold: bool = False) -> list[str]
     return lines
 
 
-def card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
+def draw_card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
+    """Draw the background of something that lies over the window."""
     edge = mix(theme.panel, theme.ink, 0.28)
-    rounded(screen, box, theme.panel, edge, round(8 * scale), max(1, round(scale)))
+    radius = round(_CARD_RADIUS_PX * scale)
+    draw_rounded_box(screen, box, theme.panel, edge=edge, radius=radius, width=max(1, round(scale)))
 
 
-def dim(screen: Surface, theme: Theme) -> None:
+def draw_veil(screen: Surface, theme: Theme) -> None:
+    """Let everything that was drawn fade into the background."""
     veil = Surface(screen.get_size(), pygame.SRCALPHA, 32)
-    veil.fill((*theme.background, 150))
+    veil.fill((*theme.background, _VEIL_ALPHA))
     screen.blit(veil, (0, 0))
 
 
-def tag(screen: Surface, words: str, at: tuple[float, float], theme: Theme, scale: float) -> None:
+def draw_tag(screen: Surface, text: str, position: tuple[float, float], theme: Theme, scale: float) -> None:
+    """Draw a text in a small box, which stays inside the window.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    text : str
+    position : (x, y), px
+        Left end of the text, in the middle of its height.
+    theme : Theme
+    scale : float
+        Size of text and box.
+    """
     size = round(theme.text * scale)
-    box = Rect(0, 0, text_width(words, size) + round(12 * scale), round(20 * scale))
-    box.midleft = round(at[0] - 6 * scale), round(at[1])
+    box = Rect(0, 0, text_width(text, size) + round(12 * scale), round(20 * scale))
+    box.midleft = round(position[0] - 6 * scale), round(position[1])
     box.clamp_ip(screen.get_rect())
-    rounded(screen, box, theme.background, mix(theme.background, theme.ink, 0.3), round(4 * scale))
-    picture = label(words, size, theme.ink)
-    screen.blit(picture, picture.get_rect(center=box.center))
+    edge = mix(theme.background, theme.ink, 0.3)
+    draw_rounded_box(screen, box, theme.background, edge=edge, radius=round(4 * scale))
+    image = label(text, size, theme.ink)
+    screen.blit(image, image.get_rect(center=box.center))
 
 
-def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: list[str], hint: str) -> None:
+def draw_status(
+    screen: Surface, box: Box, theme: Theme, scale: float, *, facts: list[str], hint: str
+) -> None:
+    """Draw the status line.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    box : Box
+    theme : Theme
+    scale : float
+        Size of texts.
+    facts : list of str
+        Texts from the left; the last ones are left out if there is no space.
+    hint : str
+        Text at the right end.
+    """
     left, top, width, height = box
     screen.fill(mix(theme.panel, theme.ink, 0.06), Rect(box))
-    canvas, size, y = flat_canvas(screen, theme, scale), theme.small_text, top + height / 2
-    room, kept = width - 44 * scale - canvas.text_width(hint, size), list(facts)
-    while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
-        kept.pop()
-    canvas.text(shortened("    ".join(kept), canvas.text_size(size), room), (left + 12 * scale, y), size=size)
-    canvas.text(hint, (left + width - 12 * scale, y), size=size, color=theme.faint, anchor="right")
+    canvas = create_flat_canvas(screen, theme, scale)
+    size = theme.small_text
+    y = top + height / 2
+    max_width = width - 44 * scale - canvas.text_width(hint, size)
+    count = len(facts)
+    while count > 1 and canvas.text_width(_FACT_SEPARATOR.join(facts[:count]), size) > max_width:
+        count -= 1
+    text = shortened(_FACT_SEPARATOR.join(facts[:count]), canvas.text_size(size), max_width)
+    canvas.text(text, (left + _STATUS_MARGIN_PX * scale, y), size=size)
+    right = left + width - _STATUS_MARGIN_PX * scale
+    canvas.text(hint, (right, y), size=size, color=theme.faint, anchor="right")
 
 
-def draw_message(screen: Surface, words: str, arena: Box, theme: Theme, scale: float, trouble: bool) -> None:
-    if not words:
+def draw_message(
+    screen: Surface, text: str, arena: Box, theme: Theme, scale: float, *, is_error: bool
+) -> None:
+    """Draw a message at the foot of the arena; nothing if the text is empty.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    text : str
+        May have several lines.
+    arena : Box
+    theme : Theme
+    scale : float
+        Size of the text.
+    is_error : bool
+        Whether it stands out.
+    """
+    if not text:
         return
-    size = round(12.5 * scale)
+    size = round(_MESSAGE_TEXT_PX * scale)
     left, top, width, height = arena
-    room = min(width - 80 * scale, 620 * scale)
-    lines = [line for part in words.split("\n") for line in wrapped(part, size, room)]
-    wide = max(text_width(line, size) for line in lines) + 28 * scale
-    box = Rect(0, 0, round(wide), round((len(lines) * 18 + 14) * scale))
+    max_width = min(width - 80 * scale, _MAX_MESSAGE_WIDTH_PX * scale)
+    lines: list[str] = []
+    for paragraph in text.split("\n"):
+        lines += wrap_text(paragraph, size, max_width)
+    box_width = max(text_width(line, size) for line in lines) + 28 * scale
+    box = Rect(0, 0, round(box_width), round((len(lines) * _MESSAGE_LINE_PX + 14) * scale))
     box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
-    fill = mix(theme.panel, theme.trajectory, 0.14) if trouble else theme.panel
-    edge = theme.trajectory if trouble else mix(theme.panel, theme.ink, 0.3)
-    rounded(screen, box, fill, edge, round(8 * scale), max(1, round(scale)))
-    for k, line in enumerate(lines):
-        picture = label(line, size, theme.ink)
-        screen.blit(picture, picture.get_rect(center=(box.centerx, round(box.top + (16 + 18 * k) * scale))))
+    fill = mix(theme.panel, theme.trajectory, 0.14) if is_error else theme.panel
+    edge = theme.trajectory if is_error else mix(theme.panel, theme.ink, 0.3)
+    radius = round(_CARD_RADIUS_PX * scale)
+    draw_rounded_box(screen, box, fill, edge=edge, radius=radius, width=max(1, round(scale)))
+    for number, line in enumerate(lines):
+        image = label(line, size, theme.ink)
+        y = round(box.top + (16 + _MESSAGE_LINE_PX * number) * scale)
+        screen.blit(image, image.get_rect(center=(box.centerx, y)))

@@ -1,4 +1,4 @@
-"""The text of a one-line field: caret, selection, clipboard, undo, and what an input method composes."""
+"""The text of a one-line field: cursor, selection, clipboard, undo, and what an input method composes."""
 
 import re
 from dataclasses import dataclass, field
@@ -7,82 +7,138 @@ from typing import Self
 from robocov.text import remove_controls
 from robocov_app.toolkit import clipboard
 
-MAX_CHARS = 10_000  # characters of a field: as many as the longest texts in maps have
-_State = tuple[str, int, int]
+MAX_CHARS = 10_000
+"""Characters of a field: as many as the longest texts in maps have."""
+
+_State = tuple[str, int, int]  # text, caret and anchor
 
 
 @dataclass
 class TextEdit:
-    """A line of text that is being edited."""
+    """A line of text that is being edited.
+
+    Attributes
+    ----------
+    text : str
+    caret : int
+        Position of the text cursor, from 0 to the number of characters.
+    anchor : int
+        Other end of the selection, which is empty if it is the caret.
+    composed : str
+        Text that an input method is composing. It is shown at the caret, but not yet part of the text.
+    """
 
     text: str = ""
     caret: int = 0
-    anchor: int = 0  # what is between it and the caret is selected
-    composed: str = ""  # shown at the caret while an input method is still at it; not part of the text yet
+    anchor: int = 0
+    composed: str = ""
     _undo: list[_State] = field(default_factory=list)
     _redo: list[_State] = field(default_factory=list)
     _typing: bool = False
 
     @classmethod
-    def of(cls, text: str) -> Self:
+    def select_all(cls, text: str) -> Self:
+        """Start editing a text that is selected, so that typing replaces it."""
         return cls(text, len(text), 0)
+
+    @classmethod
+    def append_to(cls, text: str) -> Self:
+        """Start editing a text with the caret at its end."""
+        return cls(text, len(text), len(text))
 
     @property
     def selection(self) -> tuple[int, int]:
+        """Start and end of the selected text."""
         return min(self.caret, self.anchor), max(self.caret, self.anchor)
 
     def place(self, caret: int, *, extend: bool = False) -> None:
+        """Move the caret, and start a new selection there unless the present one is extended."""
         self.caret = min(max(caret, 0), len(self.text))
         if not extend:
             self.anchor = self.caret
         self._typing = False
 
-    def select_word(self, at: int) -> None:
+    def select_word(self, position: int) -> None:
+        """Select the word at a position."""
         for word in re.finditer(r"[\w.]+|\s+|[^\w.\s]+", self.text):
-            if word.start() <= at <= word.end():
+            if word.start() <= position <= word.end():
                 self.anchor, self.caret = word.span()
 
     def type(self, text: str) -> None:
-        """Replace the selection by a text on one line; line ends become blanks, what is too long is cut."""
+        """Replace the selection by a text.
+
+        Parameters
+        ----------
+        text : str
+            Line ends become blanks, and what is beyond `MAX_CHARS` is cut off.
+        """
         low, high = self.selection
-        free = MAX_CHARS - len(self.text) + (high - low)
-        text = remove_controls(" ".join(text.splitlines()), single_line=True)[: max(free, 0)]
-        if text:
-            self._replace(*self.selection, text, typing=len(text) == 1)
+        max_length = max(MAX_CHARS - len(self.text) + (high - low), 0)
+        line = remove_controls(" ".join(text.splitlines()), single_line=True)[:max_length]
+        if line:
+            self._replace(low, high, line, is_typing=len(line) == 1)
         self.composed = ""
 
-    def _replace(self, start: int, end: int, text: str, *, typing: bool = False) -> None:
-        if not (typing and self._typing and start == end):  # letters in a row are undone together
-            self._undo.append((self.text, self.caret, self.anchor))
-        self._redo.clear()
-        self._typing = typing
-        self.text = self.text[:start] + text + self.text[end:]
-        self.caret = self.anchor = start + len(text)
+    def press_key(self, name: str) -> None:
+        """Edit the text by a key; keys that mean nothing here are ignored.
 
-    def _word(self, by: int) -> int:
-        if by < 0:
-            before = re.search(r"\S+\s*$", self.text[: self.caret])
-            return before.start() if before else 0
-        after = re.match(r"\s*\S+", self.text[self.caret :])
-        return self.caret + after.end() if after else len(self.text)
+        Parameters
+        ----------
+        name : str
+            Name with modifiers, as in ``ctrl+z``.
+        """
+        key = name.replace("shift+", "")
+        if key == "ctrl+y" or name == "ctrl+shift+z":
+            self._swap(self._redo, self._undo)
+            return
+        targets = self._find_targets()
+        erase_key = key.replace("backspace", "left").replace("delete", "right")
+        if key in targets:
+            self._move(key, targets[key], extend="shift+" in name)
+        elif erase_key in targets:
+            self._erase(targets[erase_key])
+        else:
+            self._press_ctrl_key(key)
 
-    def key(self, name: str) -> None:
-        extend = "shift+" in name
-        key = name.replace("shift+", "") if name != "ctrl+shift+z" else name
-        (start, end), at = self.selection, self.caret
-        moves = {"left": at - 1, "right": at + 1, "home": 0, "end": len(self.text)}
-        moves |= {"ctrl+left": self._word(-1), "ctrl+right": self._word(1)}
-        erased = moves.get(key.replace("backspace", "left").replace("delete", "right"))
-        if key in moves:
-            if start != end and not extend and key in ("left", "right"):
-                moves |= {"left": start, "right": end}
-            self.place(moves[key], extend=extend)
-        elif erased is not None:
-            low, high = (start, end) if start != end else sorted((at, erased))
-            if 0 <= low < high <= len(self.text):
-                self._replace(low, high, "")
-        elif key == "ctrl+a":
-            self.anchor, self.caret = 0, len(self.text)
+    def _find_targets(self) -> dict[str, int]:
+        """Return where the keys that move the caret put it."""
+        return {
+            "left": self.caret - 1,
+            "right": self.caret + 1,
+            "home": 0,
+            "end": len(self.text),
+            "ctrl+left": self._find_word_start(),
+            "ctrl+right": self._find_word_end(),
+        }
+
+    def _find_word_start(self) -> int:
+        match = re.search(r"\S+\s*$", self.text[: self.caret])
+        return match.start() if match else 0
+
+    def _find_word_end(self) -> int:
+        match = re.match(r"\s*\S+", self.text[self.caret :])
+        return self.caret + match.end() if match else len(self.text)
+
+    def _move(self, key: str, target: int, *, extend: bool) -> None:
+        start, end = self.selection
+        if start != end and not extend:
+            # An arrow key leaves the selection at its end on that side.
+            target = {"left": start, "right": end}.get(key, target)
+        self.place(target, extend=extend)
+
+    def _erase(self, target: int) -> None:
+        """Erase the selection, or what is between the caret and a position."""
+        start, end = self.selection
+        if start == end:
+            start, end = sorted((self.caret, target))
+        if 0 <= start < end <= len(self.text):
+            self._replace(start, end, "")
+
+    def _press_ctrl_key(self, key: str) -> None:
+        start, end = self.selection
+        if key == "ctrl+a":
+            self.anchor = 0
+            self.caret = len(self.text)
         elif key in ("ctrl+c", "ctrl+x") and start != end:
             clipboard.put(self.text[start:end])
             if key == "ctrl+x":
@@ -91,10 +147,20 @@ class TextEdit:
             self.type(clipboard.get())
         elif key == "ctrl+z":
             self._swap(self._undo, self._redo)
-        elif key in ("ctrl+y", "ctrl+shift+z"):
-            self._swap(self._redo, self._undo)
+
+    def _replace(self, start: int, end: int, text: str, *, is_typing: bool = False) -> None:
+        # Characters that are typed one after the other are undone together.
+        continues_typing = is_typing and self._typing and start == end
+        if not continues_typing:
+            self._undo.append((self.text, self.caret, self.anchor))
+        self._redo.clear()
+        self._typing = is_typing
+        self.text = self.text[:start] + text + self.text[end:]
+        self.caret = start + len(text)
+        self.anchor = self.caret
 
     def _swap(self, source: list[_State], target: list[_State]) -> None:
+        """Return to the last state of one list, and add the present one to the other."""
         if source:
             target.append((self.text, self.caret, self.anchor))
             self.text, self.caret, self.anchor = source.pop()

@@ -18,7 +18,7 @@ from robocov_app.render.distance_field import round_limit
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.toolkit.layout import Layout, inside
+from robocov_app.toolkit.layout import Layout, is_inside
 from robocov_app.viewer.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.pane import Pane
@@ -129,7 +129,7 @@ class ViewerCanvas:
     def find_pane(self, pixel: tuple[float, float]) -> int | None:
         """Return the index of the pane at a pixel."""
         for pane, box in enumerate(self.layout.panes):
-            if inside(box, pixel):
+            if is_inside(box, pixel):
                 return pane
         return None
 

@@ -16,8 +16,8 @@ from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
 from robocov_app.render.fonts import shortened, text_width
-from robocov_app.toolkit.layout import Box, Layout, inside
-from robocov_app.toolkit.overlay import flat_canvas, tag
+from robocov_app.toolkit.layout import Box, Layout, is_inside
+from robocov_app.toolkit.overlay import create_flat_canvas, draw_tag
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.curves import DISTANCE, TIME, PlottedQuantity
 from robocov_app.viewer.session.pane import Pane
@@ -90,7 +90,7 @@ class Chart:
         return f"plotted: {self._wanted.title[:1].lower()}{self._wanted.title[1:]}"
 
     def offers(self, at: tuple[int, int]) -> bool:
-        return self._other is not None and inside(self._other, at)
+        return self._other is not None and is_inside(self._other, at)
 
     def ghost_at(self, at: tuple[int, int]) -> int | None:
         at = at[0], at[1] - self.layout.chart[1]
@@ -145,7 +145,7 @@ class Chart:
         if self._page is None or rest != self._key or (old and samples != self._samples):
             self._page = pygame.Surface((layout.chart[2], layout.chart[3] + layout.track[3]), 0, 32)
             self._key, self._samples, self._drawn_at = rest, samples, self.viewer.now
-            canvas = flat_canvas(self._page, self.theme, layout.scale)
+            canvas = create_flat_canvas(self._page, self.theme, layout.scale)
             self._plot(canvas)
             self._track(canvas)
         screen.blit(self._page, layout.chart[:2])
@@ -232,7 +232,7 @@ class Chart:
         """Write the captions' values, newer than the page, at the right, with the gaps; none over another."""
         session, theme, scale = self.viewer.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
-        canvas = flat_canvas(chart, theme, scale)
+        canvas = create_flat_canvas(chart, theme, scale)
         (_, right, _), colors = self._span, curve_colors(session.timeline.panes, theme)
         time, known = session.displayed.get_costs(self.plotted.name)
         best = min(known.values(), default=0.0)
@@ -281,7 +281,7 @@ class Chart:
 
     def _cursor(self, screen: pygame.Surface) -> None:
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
-        canvas = flat_canvas(screen, theme, scale)
+        canvas = create_flat_canvas(screen, theme, scale)
         middle, thick = self.layout.track[1] + 0.5 * self.layout.track[3], max(4, round(5 * scale))
         x, begin = self.column(session.displayed.time), round(self.column(0.0))
         bars = [(self.column(session.timeline.end_time), mix(theme.panel, theme.ink, 0.4))]
@@ -301,7 +301,7 @@ class Chart:
     def _hovered(self, screen: pygame.Surface) -> None:
         over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.viewer.session
         (left, right, _), boxes = self._span, (self.layout.chart, self.layout.track)
-        if over is None or not left <= over[0] <= right or not any(inside(box, over) for box in boxes):
+        if over is None or not left <= over[0] <= right or not any(is_inside(box, over) for box in boxes):
             return
         time = self.time_at(over[0])
         near = [
@@ -319,9 +319,9 @@ class Chart:
             words = "   ".join([f"{time:.1f} s", *known])
         x = round(self.column(time))
         self._rule(screen, x, mix(theme.panel, theme.ink, 0.35), self.layout.chart[1])
-        room = right - flat_canvas(screen, theme, scale).text_width(words)
+        room = right - create_flat_canvas(screen, theme, scale).text_width(words)
         at = min(x + 12 * scale, room), self.layout.chart[1] + (TOP + 16) * scale
-        tag(screen, words, at, theme, scale)
+        draw_tag(screen, words, at, theme, scale)
 
 
 def curve_colors(panes: Iterable[Pane], theme: Theme) -> dict[int, Color]:

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from robocov.errors import ParameterError
-from robocov_app.toolkit.command import Command, Takes
+from robocov_app.toolkit.command import Argument, Command
 from robocov_app.viewer.parameters import Parameter
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, format_speed
@@ -90,9 +90,10 @@ def _list_run_commands(viewer: Presenter) -> list[Command]:
     next_map = partial(files.open_next_map, 1)
     previous_map = partial(files.open_next_map, -1)
     speeds = [format_speed(speed).rstrip("×") for speed in SPEEDS]
-    takes_start = Takes("start", options=playback.list_starts)
-    takes_map = Takes("map or file", options=files.list_maps)
-    takes_speed = Takes("factor", _read_speed, lambda: speeds)
+    robots_argument = _build_whole_number_argument("robots")
+    start_argument = Argument("start", list_values=playback.list_starts)
+    map_argument = Argument("map or file", list_values=files.list_maps)
+    speed_argument = Argument("factor", _read_speed, lambda: speeds)
 
     def set_robots(robots: int) -> None:
         playback.restart(robots=robots)
@@ -120,11 +121,11 @@ def _list_run_commands(viewer: Presenter) -> list[Command]:
         Command("fewer", "Restart with one fewer robot", "Run", remove_robot, ("shift+-",), repeats=True),
         Command("map:next", "Next map", "Run", next_map, ("page down",)),
         Command("map:previous", "Previous map", "Run", previous_map, ("page up",)),
-        Command("robots", "Number of robots", "Run", set_robots, takes=_take_whole_number("robots")),
-        Command("seed", "Seed", "Run", set_seed, takes=_take_whole_number("seed")),
-        Command("start", "Start of the map", "Run", set_start, takes=takes_start),
-        Command("map", "Open a map", "Run", files.open_map, takes=takes_map),
-        Command("speed", "Speed", "Run", playback.set_speed, takes=takes_speed),
+        Command("robots", "Number of robots", "Run", set_robots, argument=robots_argument),
+        Command("seed", "Seed", "Run", set_seed, argument=_build_whole_number_argument("seed")),
+        Command("start", "Start of the map", "Run", set_start, argument=start_argument),
+        Command("map", "Open a map", "Run", files.open_map, argument=map_argument),
+        Command("speed", "Speed", "Run", playback.set_speed, argument=speed_argument),
     ]
 
 
@@ -137,8 +138,8 @@ def _list_time_commands(viewer: Presenter) -> list[Command]:
     go_to_start = partial(playback.look_at, 0.0)
     previous_branch = partial(playback.enter_next_branch, -1)
     next_branch = partial(playback.enter_next_branch, 1)
-    takes_time = Takes("seconds", partial(_read_positive_number, "time"))
-    takes_branch = Takes("branch", options=playback.list_branch_names)
+    time_argument = Argument("seconds", partial(_read_positive_number, "time"))
+    branch_argument = Argument("branch", list_values=playback.list_branch_names)
     return [
         Command("back", "Step back", "Time", step_back, ("left",), repeats=True),
         Command("forward", "Step forward", "Time", step_forward, ("right",), repeats=True),
@@ -151,14 +152,14 @@ def _list_time_commands(viewer: Presenter) -> list[Command]:
         Command("branch:here", "Continue from here", "Time", playback.branch, ("b",)),
         Command("branch:previous", "Previous branch", "Time", previous_branch, ("alt+left",)),
         Command("branch:next", "Next branch", "Time", next_branch, ("alt+right",)),
-        Command("time", "Go to a time", "Time", playback.look_at, takes=takes_time),
-        Command("branch", "Enter a branch", "Time", playback.enter_branch, takes=takes_branch),
+        Command("time", "Go to a time", "Time", playback.look_at, argument=time_argument),
+        Command("branch", "Enter a branch", "Time", playback.enter_branch, argument=branch_argument),
     ]
 
 
 def _list_compare_commands(viewer: Presenter) -> list[Command]:
     comparison = viewer.comparison
-    takes_controller = Takes("controller", options=lambda: viewer.controllers)
+    controller_argument = Argument("controller", list_values=lambda: viewer.controllers)
     return [
         Command(
             "controller:next",
@@ -170,7 +171,9 @@ def _list_compare_commands(viewer: Presenter) -> list[Command]:
         Command("pane:add", "Compare with one more controller", "Compare", comparison.add_pane, ("k",)),
         Command("pane:remove", "Remove this pane", "Compare", comparison.remove_pane, ("shift+k",)),
         Command("pane:next", "Next pane", "Compare", comparison.activate_next_pane, ("`",)),
-        Command("controller", "Controller", "Compare", comparison.use_controller, takes=takes_controller),
+        Command(
+            "controller", "Controller", "Compare", comparison.use_controller, argument=controller_argument
+        ),
     ]
 
 
@@ -181,7 +184,7 @@ def _list_edit_commands(viewer: Presenter) -> list[Command]:
     select_previous = partial(robots.select_next, -1)
     enlarge = partial(viewer.resize_tool, RESIZE_STEP)
     shrink = partial(viewer.resize_tool, 1 / RESIZE_STEP)
-    takes_robot = _take_whole_number("robot", lambda: map(str, viewer.robot_numbers))
+    robot_argument = _build_whole_number_argument("robot", lambda: map(str, viewer.robot_numbers))
     return [
         Command("undo", "Undo", "Edit", playback.undo, ("ctrl+z",), repeats=True),
         Command("redo", "Redo", "Edit", playback.redo, ("ctrl+y", "ctrl+shift+z"), repeats=True),
@@ -200,7 +203,7 @@ def _list_edit_commands(viewer: Presenter) -> list[Command]:
         Command("cancel", "Cancel", "Edit", viewer.cancel, ("escape",)),
         Command("wider", "Wider walls; a larger brush", "Edit", enlarge, ("]",), repeats=True),
         Command("narrower", "Narrower walls; a smaller brush", "Edit", shrink, ("[",), repeats=True),
-        Command("robot", "Inspect a robot", "Edit", robots.select, takes=takes_robot),
+        Command("robot", "Inspect a robot", "Edit", robots.select, argument=robot_argument),
     ]
 
 
@@ -216,14 +219,14 @@ def _list_view_commands(viewer: Presenter) -> list[Command]:
 
 def _list_file_commands(viewer: Presenter) -> list[Command]:
     files = viewer.files
-    takes_session = Takes("file", Path, files.list_sessions)
-    takes_target = Takes("file", _read_path)
+    session_argument = Argument("file", Path, files.list_sessions)
+    target_argument = Argument("file", _read_path)
     return [
         Command("save:session", "Save session", "File", files.save_session, ("ctrl+s",)),
         Command("recover", "Recover a session", "File", files.recover, ("ctrl+shift+o",)),
         Command("save:map", "Save map", "File", files.save_map, ("ctrl+shift+s",)),
-        Command("open", "Open a session", "File", files.open_session, takes=takes_session),
-        Command("save", "Save session as", "File", files.save_session, takes=takes_target),
+        Command("open", "Open a session", "File", files.open_session, argument=session_argument),
+        Command("save", "Save session as", "File", files.save_session, argument=target_argument),
     ]
 
 
@@ -253,25 +256,25 @@ def list_parameter_commands(viewer: Presenter) -> Iterator[Command]:
     for parameter in viewer.comparison.list_parameters():
         title = f"Set {parameter.label}"
         set_value = partial(viewer.comparison.set_parameter, parameter.name)
-        takes = _take_parameter(parameter)
+        argument = _build_parameter_argument(parameter)
         short_name = parameter.name.removeprefix("team.")
-        yield Command(short_name, title, "Run", set_value, takes=takes)
+        yield Command(short_name, title, "Run", set_value, argument=argument)
         if short_name != parameter.name:
-            yield Command(parameter.name, title, "Run", set_value, takes=takes, hidden=True)
+            yield Command(parameter.name, title, "Run", set_value, argument=argument, hidden=True)
 
 
-def _take_parameter(parameter: Parameter) -> Takes:
-    return Takes(f"now {parameter.format()}", parameter.parse, lambda: parameter.choices)
+def _build_parameter_argument(parameter: Parameter) -> Argument:
+    return Argument(f"now {parameter.format()}", parameter.parse, lambda: parameter.choices)
 
 
-def _take_whole_number(name: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
+def _build_whole_number_argument(name: str, options: Callable[[], Iterable[str]] = tuple) -> Argument:
     def read(text: str) -> int:
         try:
             return int(text)
         except ValueError:
             raise ParameterError(f"{name}: expected a whole number, got {text!r}") from None
 
-    return Takes("whole number", read, options)
+    return Argument("whole number", read, options)
 
 
 def _read_path(text: str) -> Path | None:

@@ -20,7 +20,7 @@ from robocov_app.storage.settings import (
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.layout import SMALLEST
+from robocov_app.toolkit.layout import MIN_SIZE_PX
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
@@ -193,8 +193,8 @@ class Launcher:
             costs.close()
             raise
         if self.scale is not None and window.layout.scale < self.scale:
-            width = round(SMALLEST[0] * self.scale)
-            height = round(SMALLEST[1] * self.scale)
+            width = round(MIN_SIZE_PX[0] * self.scale)
+            height = round(MIN_SIZE_PX[1] * self.scale)
             viewer.show_message(
                 f"scale {self.scale:g} needs a window of {width} × {height}; using {window.layout.scale:g}"
             )
@@ -231,7 +231,7 @@ class Launcher:
         size = (settings.width, settings.height)
         if self.scale is not None:
             # Text of that size needs a window that is large enough for it.
-            size = (max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale)))
+            size = (max(size[0], round(MIN_SIZE_PX[0] * scale)), max(size[1], round(MIN_SIZE_PX[1] * scale)))
         return size if self._needs_no_display else fit_to_screen(size)
 
     def _read_settings(self, window: ViewerWindow, before: WindowSettings) -> WindowSettings:
@@ -240,7 +240,7 @@ class Launcher:
         view = viewer.view
         usual = _list_usual_layers(before)
         layers = view.layers - (self.shown_layers - usual) | (self.hidden_layers & usual)
-        width, height = window.windowed or window.screen.get_size()
+        width, height = window.windowed_size or window.screen.get_size()
         changes = {
             "theme": view.theme,
             "fade": view.fades_trajectories,

@@ -75,7 +75,7 @@ class LessonGuide:
         return self.player is not None and self.shown is None
 
     @property
-    def look(self) -> object:
+    def visible_state(self) -> object:
         """All that decides how the lesson is drawn."""
         player = self.player
         return player and (player.state, player.number, player.progress)

@@ -12,7 +12,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.fonts import label, shortened
 from robocov_app.toolkit.layout import Layout
-from robocov_app.toolkit.overlay import card, flat_canvas, wrapped
+from robocov_app.toolkit.overlay import create_flat_canvas, draw_card, wrap_text
 from robocov_app.viewer.lessons import LessonPlayer, LessonState
 
 
@@ -55,10 +55,10 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     title_size = round(_CAPTION_TITLE_PX * scale)
     card_width = min(width - 40 * scale, _CAPTION_WIDTH_PX * scale)
     text = " ".join([lesson.chapter.text, *lesson.lines])
-    lines = wrapped(text, text_size, card_width - 44 * scale)
+    lines = wrap_text(text, text_size, card_width - 44 * scale)
     box = pygame.Rect(0, 0, round(card_width), round((44 + _CAPTION_LINE_PX * len(lines)) * scale))
     box.midbottom = (round(left + width / 2), round(top + height - 44 * scale))
-    card(screen, box, theme, scale)
+    draw_card(screen, box, theme, scale)
     x = box.left + round(22 * scale)
     title = f"{lesson.number + 1}  {lesson.chapter.title}"
     screen.blit(label(title, title_size, theme.final, True), (x, box.top + round(11 * scale)))
@@ -113,7 +113,7 @@ class _LessonPage:
         self._write("LESSON", 11, self.theme.faint, bold=True)
         self.y += 30 * scale
         title_size = round(_PAGE_TITLE_PX * scale)
-        for line in wrapped(lesson.chapter.title, title_size, self.width, True):
+        for line in wrap_text(lesson.chapter.title, title_size, self.width, True):
             self._write(line, _PAGE_TITLE_PX, self.theme.final, bold=True)
             self.y += 25 * scale
         self.y += 6 * scale
@@ -138,7 +138,7 @@ class _LessonPage:
     def _write_paragraph(self, text: str, color: Color, *, indent: float = 0.0) -> None:
         """Write wrapped text, indented on both sides, and continue below it."""
         width = self.width - 2 * indent * self.scale
-        for line in wrapped(text, round(_PAGE_TEXT_PX * self.scale), width):
+        for line in wrap_text(text, round(_PAGE_TEXT_PX * self.scale), width):
             self._write(line, _PAGE_TEXT_PX, color, indent=indent)
             self.y += _PAGE_LINE_PX * self.scale
 
@@ -171,7 +171,7 @@ class _LessonPage:
         lesson = self.lesson
         is_current = number == lesson.number
         fill = theme.final if number <= lesson.number else mix(theme.panel, theme.ink, 0.25)
-        canvas = flat_canvas(self.screen, theme, scale)
+        canvas = create_flat_canvas(self.screen, theme, scale)
         canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (self.x + 4 * scale, self.y + 8 * scale))
         size = round(_CHAPTER_TEXT_PX * scale)
         title = shortened(lesson.lesson.chapters[number].title, size, self.width - 18 * scale, is_current)

@@ -10,9 +10,10 @@ import numpy as np
 from robocov.controllers import get_controller_label, load_controller_class
 from robocov.errors import ParameterError
 from robocov_app.render.fonts import shortened
-from robocov_app.toolkit.command import Commands
-from robocov_app.toolkit.overlay import flat_canvas
-from robocov_app.toolkit.ui import SMALL, SidePanel, Ui
+from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.toolkit.ui import SidePanel, Ui
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.lines import ReportLine
 from robocov_app.viewer.explanation.text import MIN_FORCE_N
@@ -65,21 +66,25 @@ class ViewerPanel(SidePanel):
         The viewer.
     layer_titles : dict of str to str
         Titles of the layers by their names.
-    commands : Commands
+    commands : CommandTable
         The window's commands.
     do : callable
         Runs a command by its name.
 
     Attributes
     ----------
-    commands : Commands
+    commands : CommandTable
         The window's commands.
     report : RobotReport or None
         Explanation of the selected robot.
     """
 
     def __init__(
-        self, viewer: Presenter, layer_titles: dict[str, str], commands: Commands, do: Callable[[str], None]
+        self,
+        viewer: Presenter,
+        layer_titles: dict[str, str],
+        commands: CommandTable,
+        do: Callable[[str], None],
     ) -> None:
         self.viewer = viewer
         self.titles = layer_titles
@@ -102,19 +107,19 @@ class ViewerPanel(SidePanel):
     def update(self, seconds: float) -> None:
         """Redraw the panel if its content has changed."""
         self._age_s += seconds
-        if self.covered and self.ui.busy:
+        if self.is_covered and self.ui.is_busy:
             self.ui.stop_typing()
         viewer = self.viewer
         session = viewer.session
         content = (viewer.revision, self.tab, viewer.view.theme, session.playback.is_playing, id(self.report))
         is_running = session.playback.is_playing and not session.timeline.is_settled
         is_old = is_running and self._age_s >= _REDRAW_INTERVAL_S
-        if content != self._drawn or is_old:
-            self._drawn = content
+        if content != self.drawn_state or is_old:
+            self.drawn_state = content
             self._age_s = 0.0
-            self.ui.stale = True
+            self.ui.needs_redraw = True
 
-    def _page(self, ui: Ui) -> None:
+    def show_content(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
         self._show_environment(ui)
         self._show_controllers(ui)
@@ -136,7 +141,7 @@ class ViewerPanel(SidePanel):
     ) -> None:
         """Show a button that runs a command; `why` disables it."""
         tip = self.commands[command].tip
-        if ui.button(text, key=command, tip=tip, chosen=is_on, small=is_small, why=why):
+        if ui.button(text, key=command, tip=tip, chosen=is_on, small=is_small, disabled_reason=why):
             self._do(command)
 
     def _show_environment(self, ui: Ui) -> None:
@@ -155,16 +160,16 @@ class ViewerPanel(SidePanel):
             viewer.attempt(partial(viewer.playback.restart, start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
-        robots = ui.text_entry("robots", str(len(viewer.robot_numbers)))
+        robots = ui.text_field("robots", str(len(viewer.robot_numbers)))
         if robots is not None:
-            viewer.attempt(partial(self.commands.typed, f"robots {robots}"))
+            viewer.attempt(partial(self.commands.run_text, f"robots {robots}"))
         self._show_button(ui, "−", "fewer")
         self._show_button(ui, "+", "more")
         ui.cell()
         ui.label("Seed")
-        seed = ui.text_entry("seed", str(scenario.seed))
+        seed = ui.text_field("seed", str(scenario.seed))
         if seed is not None:
-            viewer.attempt(partial(self.commands.typed, f"seed {seed}"))
+            viewer.attempt(partial(self.commands.run_text, f"seed {seed}"))
         self._show_button(ui, "↻", "seed:next")
 
     def _show_controllers(self, ui: Ui) -> None:
@@ -256,7 +261,7 @@ class ViewerPanel(SidePanel):
         position = ui.slider(name, parameter.compute_position(), 0.0, 1.0)
         if position is not None:
             self._set(name, parameter.compute_value(position))
-        text = ui.text_entry(name, parameter.format())
+        text = ui.text_field(name, parameter.format())
         if text is not None:
             self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
         ui.label(unit, key=f"unit:{name}", style="unit")
@@ -267,9 +272,9 @@ class ViewerPanel(SidePanel):
         """Show the choices next to each other if they fit, else as a menu."""
         name = parameter.name
         choices = parameter.choices
-        free = ui.wide - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
+        free = ui.width - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
         width = (free - _PARAMETER_GAP_PX * (len(choices) - 1)) / len(choices)
-        fits = all(shortened(choice, round(SMALL), width - 6) == choice for choice in choices)
+        fits = all(shortened(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
         columns = [0.0] * (len(choices) if fits else 1)
         ui.row(_LABEL_PX, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
         ui.label(parameter.label, tip=parameter.meaning)
@@ -302,7 +307,7 @@ class ViewerPanel(SidePanel):
                     ui.cell()
                     continue
                 tip = self.commands[f"layer:{name}"].tip
-                if ui.check(self.titles[name], key=name, now=name in view.layers, tip=tip) is not None:
+                if ui.check_box(self.titles[name], key=name, value=name in view.layers, tip=tip) is not None:
                     self._do(f"layer:{name}")
             ui.space(5)
             ui.row(0, 0, 0)
@@ -322,7 +327,7 @@ class ViewerPanel(SidePanel):
         self._show_button(ui, "Remove", "robot:remove", why=why)
         with ui.scroll(f"robot:{number}"):
             if self.report is None:
-                ui.words(_NO_ROBOT_TEXT, color=ui.theme.faint)
+                ui.paragraph(_NO_ROBOT_TEXT, color=ui.theme.faint)
             else:
                 show_report(ui, self.report)
 
@@ -335,15 +340,15 @@ class ViewerPanel(SidePanel):
 
 def show_report(ui: Ui, report: RobotReport) -> None:
     """Show the explanation of a robot, with an arrow for each force."""
-    ui.words(report.title, size=14, bold=True)
+    ui.paragraph(report.title, size=14, bold=True)
     ui.space(3)
-    ui.words(report.verdict, size=12.5, bold=True, color=ui.theme.final)
+    ui.paragraph(report.verdict, size=12.5, bold=True, color=ui.theme.final)
     ui.space(4)
     sizes = [float(np.hypot(*line.vector)) for line in report.lines if line.vector is not None]
     largest = max(sizes, default=1.0)
     for line in report.lines:
         _draw_force(ui, line, largest)
-        ui.words(line.text, size=11.5, indent=_REPORT_INDENT_PX if line.vector is not None else 0.0)
+        ui.paragraph(line.text, size=11.5, indent=_REPORT_INDENT_PX if line.vector is not None else 0.0)
         ui.space(3)
 
 
@@ -358,7 +363,7 @@ def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
     length = _ARROW_PX * ui.scale * fraction
     half = np.array(line.vector) / size * (length, -length)
     center = np.array(ui.rest.topleft) + np.array(_ARROW_CENTER_PX) * ui.scale
-    canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
+    canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
     color = ui.theme.forces.get(line.kind, ui.theme.ink)
     canvas.arrow((center - half).tolist(), (center + half).tolist(), color, 2 * ui.scale)
 

@@ -6,8 +6,14 @@ from math import dist
 import pygame
 
 from robocov.environment import Point
-from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, show_cursor, wheel_notches
-from robocov_app.toolkit.layout import inside
+from robocov_app.toolkit.input import (
+    DOUBLE_CLICK_S,
+    MAX_CLICK_MOVE_PX,
+    ZOOM_PER_NOTCH,
+    get_wheel_notches,
+)
+from robocov_app.toolkit.layout import is_inside
+from robocov_app.toolkit.mouse_cursor import MouseCursor
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.panel import ViewerPanel
@@ -130,11 +136,11 @@ class ViewerPointer:
         self._last_click_s = -1.0
         self._last_click_at = (0, 0)
 
-    def take(self, event: pygame.event.Event, now: float) -> None:
+    def handle_event(self, event: pygame.event.Event, now: float) -> None:
         """Handle a mouse event at a time, s."""
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos
-        is_for_panel = self._gesture is None and self._panel.take(event)
+        is_for_panel = self._gesture is None and self._panel.handle_event(event)
         if event.type == pygame.MOUSEMOTION:
             self._move(event)
         elif event.type == pygame.MOUSEBUTTONUP:
@@ -147,7 +153,7 @@ class ViewerPointer:
         else:
             self._turn_wheel(event)
 
-    def show_action(self) -> None:
+    def show_action(self, cursor: MouseCursor) -> None:
         """Show what a press would do: by the cursor's shape, and a ring around the robot under it."""
         viewer = self._viewer
         inspection = viewer.inspection
@@ -163,7 +169,7 @@ class ViewerPointer:
         canvas.hovered = _NO_ROBOT
         if pane is not None and number is not None:
             canvas.hovered = (pane, number)
-        show_cursor(self._choose_cursor(pane, number))
+        cursor.show(self._choose_cursor(pane, number))
 
     def _choose_cursor(self, pane: int | None, number: int | None) -> int:
         viewer = self._viewer
@@ -177,12 +183,12 @@ class ViewerPointer:
 
     def _is_over_time(self) -> bool:
         layout = self._canvas.layout
-        return inside(layout.track, self.at) or inside(layout.chart, self.at)
+        return is_inside(layout.track, self.at) or is_inside(layout.chart, self.at)
 
     def _turn_wheel(self, event: pygame.event.Event) -> None:
         if self._canvas.find_pane(self.at) is None:
             return
-        factor = WHEEL ** wheel_notches(event)
+        factor = ZOOM_PER_NOTCH ** get_wheel_notches(event)
         if self._viewer.tool.uses_wheel:
             self._viewer.resize_tool(factor)
         else:
@@ -233,7 +239,8 @@ class ViewerPointer:
         if viewer.active_pane != pane:
             viewer.inspection.active_pane = pane
             viewer.revision += 1
-        is_double = now - self._last_click_s < DOUBLE and dist(self._last_click_at, pixel) < SLIP
+        is_quick = now - self._last_click_s < DOUBLE_CLICK_S
+        is_double = is_quick and dist(self._last_click_at, pixel) < MAX_CLICK_MOVE_PX
         self._last_click_s = now
         self._last_click_at = pixel
         if is_double and viewer.tool.ends_on_double_click:
@@ -255,7 +262,7 @@ class ViewerPointer:
         inspection = viewer.inspection
         pane = self._canvas.find_pane(event.pos)
         inspection.cursor = None
-        if pane is not None and not inside(self._canvas.layout.panel, event.pos):
+        if pane is not None and not is_inside(self._canvas.layout.panel, event.pos):
             inspection.cursor = self._canvas.to_world(event.pos, pane)
             inspection.cursor_pane = pane
         self._chart.hover = event.pos if self._gesture is None else None
@@ -271,4 +278,4 @@ class ViewerPointer:
         gesture = self._gesture
         self._gesture = None
         if gesture is not None:
-            gesture.release(event, is_click=dist(event.pos, self._pressed_at) < SLIP)
+            gesture.release(event, is_click=dist(event.pos, self._pressed_at) < MAX_CLICK_MOVE_PX)

@@ -7,7 +7,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.toolkit.layout import Layout
-from robocov_app.toolkit.overlay import flat_canvas
+from robocov_app.toolkit.overlay import create_flat_canvas
 
 
 class SharedLegend:
@@ -34,7 +34,7 @@ class SharedLegend:
     def count_rows(self, entries: list[LegendEntry], layout: Layout, layers: frozenset[str]) -> int:
         """Return how many rows are needed; never fewer than before in a layout, so that panes do not jump."""
         page = pygame.Surface((layout.arena[2], 1))
-        rows = len(legend_rows(flat_canvas(page, self.theme, layout.scale), entries))
+        rows = len(legend_rows(create_flat_canvas(page, self.theme, layout.scale), entries))
         key = (layout.size, layout.scale, len(layout.panes), layers)
         if key == self._rows_key:
             rows = max(rows, self._rows)
@@ -51,7 +51,7 @@ class SharedLegend:
         if key != self._picture_key:
             page = pygame.Surface((width, max(height, 1)), 0, 32)
             page.fill(self.theme.background)
-            camera = flat_canvas(page, self.theme, layout.scale).camera
+            camera = create_flat_canvas(page, self.theme, layout.scale).camera
             canvas = Canvas(page, camera, self.theme, layout.scale, choose_robot_hues(1), layers)
             page.blit(legend_strip(entries, canvas), (0, 0))
             self._picture = page

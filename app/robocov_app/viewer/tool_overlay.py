@@ -12,7 +12,7 @@ from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
-from robocov_app.toolkit.overlay import tag
+from robocov_app.toolkit.overlay import draw_tag
 from robocov_app.viewer.tools.tool import Preview
 
 # Lengths in pixels at scale 1.
@@ -73,7 +73,7 @@ def draw_preview(canvas: Canvas, preview: Preview) -> None:
         x, y = points[-1].tolist()
         dx, dy = _LABEL_OFFSET_PX
         position = (x + dx * canvas.scale, y + dy * canvas.scale)
-        tag(canvas.surface, preview.label, position, canvas.theme, canvas.scale)
+        draw_tag(canvas.surface, preview.label, position, canvas.theme, canvas.scale)
 
 
 def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:

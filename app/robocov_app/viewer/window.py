@@ -10,10 +10,11 @@ from robocov_app.look.theme import get_theme
 from robocov_app.render.picture import standard_layers
 from robocov_app.storage.autosave import Draft
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.command import Commands, draw_keys
+from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.dialogs import Dialogs
-from robocov_app.toolkit.input import OF_THE_MOUSE
-from robocov_app.toolkit.layout import laid_out
+from robocov_app.toolkit.help_page import draw_help_page
+from robocov_app.toolkit.input import MOUSE_EVENTS
+from robocov_app.toolkit.layout import build_layout
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.window import FPS, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
@@ -73,7 +74,7 @@ class ViewerWindow(BaseWindow):
         The panel.
     dialogs : Dialogs
         Open dialogs.
-    commands : Commands
+    commands : CommandTable
         All commands.
     lesson : LessonGuide
         The lesson, if there is one.
@@ -111,7 +112,7 @@ class ViewerWindow(BaseWindow):
         titles = {layer.name: layer.title for layer in standard_layers()}
         window_commands = list_window_commands(self.canvas, self.chart, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands]
-        self.commands = Commands(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
+        self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.pointer = ViewerPointer(viewer, self.canvas, self.chart, self.panel, self.lesson.leave)
         self._cost_curves = CostCurves(viewer)
@@ -154,7 +155,7 @@ class ViewerWindow(BaseWindow):
         """Offer to recover unsaved work, the newest first."""
         self.dialogs.ask(build_recovery_offer(self.viewer, drafts, self.offer_recovery))
 
-    def save_point(self) -> Callable[[], None]:
+    def create_save_point(self) -> Callable[[], None]:
         """Return a function that takes back all changes since now."""
         viewer = self.viewer
         session = viewer.session
@@ -172,7 +173,7 @@ class ViewerWindow(BaseWindow):
         """Show a message on an unexpected exception; close what may be the cause if drawing raised it."""
         if in_drawing:
             self.is_help_open = False
-            self.dialogs.drop()
+            self.dialogs.discard()
             self.lesson.end()
             self.canvas.fit()
         self.viewer.show_message(message, is_error=True)
@@ -188,7 +189,7 @@ class ViewerWindow(BaseWindow):
             self.viewer.attempt(self.toggle_recording)
         self.viewer.costs.close()
 
-    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
+    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
         """Take the look of where the window is shown."""
         self.scale = scale
         view = self.viewer.view
@@ -205,11 +206,11 @@ class ViewerWindow(BaseWindow):
         self._cost_curves.update()
         self._arrange()
         self._explain_selected_robot()
-        self.panel.covered = self.lesson.shown is not None
+        self.panel.is_covered = self.lesson.shown is not None
         self.panel.update(seconds)
-        self.pointer.show_action()
+        self.pointer.show_action(self.cursor)
 
-    def look(self) -> object:
+    def get_visible_state(self) -> object:
         """Return all that decides what is drawn; None while something moves."""
         viewer = self.viewer
         session = viewer.session
@@ -230,8 +231,8 @@ class ViewerWindow(BaseWindow):
             self._cost_curves.answer_count,
             viewer.costs.state,
             self._arranged,
-            self.panel.ui.stale,
-            self.lesson.look,
+            self.panel.ui.needs_redraw,
+            self.lesson.visible_state,
         )
 
     def _pass_time(self, seconds: float) -> None:
@@ -257,7 +258,7 @@ class ViewerWindow(BaseWindow):
         """Let the simulation advance, and show its errors; return the number of steps."""
         session = self.viewer.session
         # A window that waited for events has let many frames pass at once.
-        slices = max(round(seconds * FPS), 1) if self.resting else 1
+        slices = max(round(seconds * FPS), 1) if self.is_resting else 1
         try:
             steps = sum(session.playback.advance(seconds / slices) for _ in range(slices))
             # Controllers decide as part of the simulation, not of drawing.
@@ -293,7 +294,9 @@ class ViewerWindow(BaseWindow):
             return
         self._arranged = arranged
         self.theme = get_theme(view.theme)
-        self.layout = laid_out(size, self.scale, panes, aspect, panel=view.has_panel, legend_rows=legend_rows)
+        self.layout = build_layout(
+            size, self.scale, panes, aspect, panel=view.has_panel, legend_rows=legend_rows
+        )
         self.canvas.arrange(self.layout, self.theme)
         self.chart.arrange(self.layout, self.theme)
         if before is None or frame != before[0]:
@@ -312,7 +315,8 @@ class ViewerWindow(BaseWindow):
             self.panel.draw(self.screen)
         self._draw_message(can_suggest=not has_lesson)
         if self.is_help_open:
-            draw_keys(self.screen, self.theme, layout.scale, self.commands.listed, GROUPS, _KEYS_HINT)
+            commands = self.commands.commands
+            draw_help_page(self.screen, self.theme, layout.scale, commands, groups=GROUPS, hint=_KEYS_HINT)
         self.dialogs.draw(self.screen, self.theme, layout.scale)
         self.show_screen()
         if self.video is not None:
@@ -321,13 +325,13 @@ class ViewerWindow(BaseWindow):
 
     def _draw_status(self) -> None:
         duration = None if self.video is None else self.video.duration
-        facts = list_facts(self.viewer, self.rate, self._steps_per_s, duration)
+        facts = list_facts(self.viewer, self.frame_rate, self._steps_per_s, duration)
         hint = self.hint
         if self.lesson.is_waiting:
             hint = _LESSON_HINT
         elif not self.viewer.session.playback.is_playing:
             hint = hint.replace("Space pause", "Space play")
-        draw_status(self.screen, self.layout.status, self.theme, self.layout.scale, facts, hint)
+        draw_status(self.screen, self.layout.status, self.theme, self.layout.scale, facts=facts, hint=hint)
 
     def _draw_message(self, *, can_suggest: bool) -> None:
         viewer = self.viewer
@@ -335,7 +339,8 @@ class ViewerWindow(BaseWindow):
         is_error = bool(message) and viewer.has_error_message
         if not message and can_suggest and not self.is_unattended:
             message = suggest_actions(viewer)
-        draw_message(self.screen, message, self.layout.arena, self.theme, self.layout.scale, is_error)
+        arena = self.layout.arena
+        draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
 
     def _explain_selected_robot(self) -> None:
         """Bring the explanation of the selected robot up to date, if it is visible."""
@@ -358,7 +363,7 @@ class ViewerWindow(BaseWindow):
         if name == "cancel" and self.is_help_open:
             self.is_help_open = False
             return
-        self.commands.do(name)
+        self.commands.run(name)
         self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")
@@ -399,15 +404,15 @@ class ViewerWindow(BaseWindow):
         skipped = f", {video.skipped_count} frames left out" if video.skipped_count else ""
         return f"video saved: {video.path} ({video.duration:.1f} s{skipped})"
 
-    def take(self, event: pygame.event.Event) -> None:
+    def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event."""
         if event.type == pygame.KEYUP:
-            self.commands.release(event)
+            self.commands.release_key(event)
         elif event.type == pygame.WINDOWFOCUSLOST:
-            self.commands.forget_keys()
+            self.commands.reset_keys()
         if event.type == pygame.QUIT:
             self.closed = True
-        elif not self.dialogs.take(event):
+        elif not self.dialogs.handle_event(event):
             self._take_below_dialogs(event)
 
     def _take_below_dialogs(self, event: pygame.event.Event) -> None:
@@ -415,23 +420,23 @@ class ViewerWindow(BaseWindow):
             self.viewer.attempt(lambda: self.viewer.files.open_file(Path(event.file)))
         elif event.type == pygame.KEYDOWN:
             self._press_key(event)
-        elif event.type in OF_THE_MOUSE:
+        elif event.type in MOUSE_EVENTS:
             self._take_mouse(event)
         elif event.type == pygame.WINDOWLEAVE:
             self.viewer.inspection.cursor = None
             self.chart.hover = None
         else:
-            self.panel.take(event)
+            self.panel.handle_event(event)
 
     def _press_key(self, event: pygame.event.Event) -> None:
         """Give a key to the lesson's question, else to a text field of the panel, else to a command."""
-        if self.lesson.handle_key(event.unicode) or self.panel.take(event):
+        if self.lesson.handle_key(event.unicode) or self.panel.handle_event(event):
             return
-        command = self.commands.of_key(event)
+        command = self.commands.press_key(event)
         if command is not None:
             self.do(command.name)
         # The text of the key comes as an event of its own, and is not meant for a dialog that has opened.
-        self.dialogs.swallow(event.unicode)
+        self.dialogs.ignore_letter(event.unicode)
 
     def _take_mouse(self, event: pygame.event.Event) -> None:
         if event.type == pygame.MOUSEBUTTONDOWN:
@@ -440,4 +445,4 @@ class ViewerWindow(BaseWindow):
                 return
             if event.button == LEFT_BUTTON and self.lesson.click(event.pos):
                 return
-        self.pointer.take(event, self._now)
+        self.pointer.handle_event(event, self._now)

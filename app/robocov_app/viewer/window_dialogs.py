@@ -5,8 +5,16 @@ from functools import partial
 from pathlib import Path
 
 from robocov_app.storage.autosave import Draft, remove_draft
-from robocov_app.toolkit.command import Commands, palette
-from robocov_app.toolkit.dialogs import Answer, Choice, Option, Question, file_choice, list_choice
+from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.dialogs import (
+    Answer,
+    Choice,
+    Option,
+    Question,
+    create_file_choice,
+    create_list_choice,
+)
+from robocov_app.toolkit.palette import create_palette
 from robocov_app.viewer.file_actions import FileActions
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.file import SUFFIX
@@ -15,17 +23,17 @@ from robocov_app.viewer.session.workspace import describe_draft
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 
 
-def build_palette(commands: Commands, show_result: Callable[[str], None]) -> Choice:
+def build_palette(commands: CommandTable, show_result: Callable[[str], None]) -> Choice:
     """Return the dialog that finds and runs commands by their names.
 
     Parameters
     ----------
-    commands : Commands
+    commands : CommandTable
         The window's commands.
     show_result : callable
         Gets the message of a command; empty for none.
     """
-    return palette(commands, PALETTE_HINT, show_result)
+    return create_palette(commands, PALETTE_HINT, show_result)
 
 
 def build_file_dialog(files: FileActions) -> Choice:
@@ -33,7 +41,7 @@ def build_file_dialog(files: FileActions) -> Choice:
     recent = [Path(name) for name in files.recent if Path(name).exists()]
     endings = (SUFFIX, ".json")
     title = "Open a session or a map"
-    return file_choice(title, files.folder, files.open_file, endings=endings, recent=recent)
+    return create_file_choice(title, files.folder, files.open_file, suffixes=endings, recent=recent)
 
 
 def build_branch_dialog(viewer: Presenter) -> Choice:
@@ -52,7 +60,7 @@ def build_branch_dialog(viewer: Presenter) -> Choice:
     def enter(option: Option) -> None:
         viewer.playback.enter_node(int(str(option.value)))
 
-    return list_choice("Branches", list_options, enter)
+    return create_list_choice("Branches", list_options, enter)
 
 
 def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:

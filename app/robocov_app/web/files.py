@@ -12,7 +12,7 @@ from robocov.errors import InputError, OutputError, RobocovError, describe_error
 from robocov.files.result_folder import MANIFEST_FILE
 from robocov.files.writing import replace_file
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.dialogs import MOST_LISTED
+from robocov_app.toolkit.dialogs import MAX_FOLDER_ENTRIES
 
 MAX_DOWNLOAD_BYTES = 1 << 28
 MAX_NAME_BYTES = 200
@@ -112,7 +112,7 @@ def check_name(name: str) -> None:
 def list_saved(folder: Path, since: float) -> tuple[str, ...]:
     """Return the names of what windows saved to a folder since a time, the newest first."""
     try:
-        offered = [path for path in islice(folder.iterdir(), MOST_LISTED) if _is_offered(path)]
+        offered = [path for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES) if _is_offered(path)]
         changed = [(path.stat().st_mtime, path.name) for path in offered]
     except OSError:
         return ()

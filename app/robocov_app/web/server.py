@@ -23,7 +23,6 @@ import pygame
 
 from robocov.errors import InputError
 from robocov_app.toolkit import clipboard
-from robocov_app.toolkit.input import shown_cursor
 from robocov_app.web import events
 from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
@@ -147,7 +146,7 @@ class WebDisplay:
         """Fit the window to the controlling page, and post the input of that page."""
         self.shared.window_input.post(window)
 
-    def send(self, surface: pygame.Surface) -> None:
+    def send(self, surface: pygame.Surface, cursor: int = pygame.SYSTEM_CURSOR_ARROW) -> None:
         """Send the content of the window to the pages, if it has changed."""
         delivery = self.shared.delivery
         previous = delivery.newest
@@ -160,7 +159,7 @@ class WebDisplay:
             self._files_listed_at = monotonic()
             self.saved_files = list_saved(self.shared.folder, self._created_at)
         state = {
-            "cursor": _CSS_CURSORS.get(shown_cursor(), "default"),
+            "cursor": _CSS_CURSORS.get(cursor, "default"),
             "title": next(iter(pygame.display.get_caption()), "robocov"),
             "saved": self.saved_files,
             "copied": clipboard.get()[:MAX_COPIED_CHARACTERS],

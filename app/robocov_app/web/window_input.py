@@ -85,4 +85,4 @@ class WindowInput:
         was_narrow = self._is_narrow
         self._is_narrow = page.width < NARROW_PAGE_PX * page.ratio
         shows_panel = None if self._is_narrow == was_narrow else not self._is_narrow
-        window.suit(page.ratio, "dark" if page.dark else "light", panel=shows_panel)
+        window.set_appearance(page.ratio, "dark" if page.dark else "light", panel=shows_panel)

@@ -150,7 +150,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
 
     def run(window: ViewerWindow) -> None:
         for _ in range(10):
-            window.frame(1 / 30)
+            window.run_frame(1 / 30)
         sessions.append(window.viewer.session)
         window.close()
 

@@ -87,10 +87,10 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
             window.panel.show_tab(tab)
             window.do("robot:next")
             for _ in range(10):
-                window.frame(1 / 30)
+                window.run_frame(1 / 30)
         for deed in ("live", "step", "restart", "first", "branch:here", "more", "save:run"):
             window.do(deed)
-            window.frame(1 / 30)
+            window.run_frame(1 / 30)
         sessions.append(window.viewer.session)
         window.close()
 

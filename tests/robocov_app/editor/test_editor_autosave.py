@@ -95,7 +95,7 @@ def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
         obstacles = (*session.displayed.environment.obstacles, circle)
         session.edit_map(replace(session.displayed.environment, obstacles=obstacles), "drawn")
         if ends == "killed":
-            hands.window.frame(0.1)
+            hands.window.run_frame(0.1)
         else:
             hands.window.close()
         assert hands.editor.document.flush()
@@ -114,7 +114,7 @@ def test_a_file_can_be_opened_after_leaving_for_it_was_canceled(tmp_path):
         for answer in ("escape", "escape", "d"):
             hands.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
             hands.settle()
-            assert hands.editor.dialogs.asked is not None, hands.said
+            assert hands.editor.dialogs.current is not None, hands.said
             hands.key(answer)
         assert hands.editor.document.title == "hall.json"
         assert len(list((tmp_path / "drafts").iterdir())) == 1

@@ -17,6 +17,7 @@ from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, list_typed_commands
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import Choice
+from robocov_app.toolkit.palette import list_options
 
 LOW = PolygonObstacle(((1, 1), (4, 1), (4, 4), (1, 4)))
 HIGH = PolygonObstacle(((3, 3), (6, 3), (6, 6), (3, 6)))
@@ -34,7 +35,7 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 
 def test_no_key_does_two_things_and_every_command_has_a_group(hands: Hands) -> None:
-    listed = hands.window.commands.listed
+    listed = hands.window.commands.commands
     keys = [key for command in listed for key in command.keys]
     assert len(keys) == len(set(keys))
     names = [command.name for command in listed]
@@ -44,9 +45,9 @@ def test_no_key_does_two_things_and_every_command_has_a_group(hands: Hands) -> N
 
 def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> None:
     with opened_viewer(tmp_path) as driver:
-        theirs = {command.name: command.keys for command in driver.window.commands.listed}
+        theirs = {command.name: command.keys for command in driver.window.commands.commands}
     with opened_editor(tmp_path) as hands:
-        ours = {command.name: command.keys for command in hands.window.commands.listed}
+        ours = {command.name: command.keys for command in hands.window.commands.commands}
     same = {
         *(
             "undo",
@@ -69,7 +70,7 @@ def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> 
 
 
 def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
-    known = {command.name for command in hands.window.commands.listed}
+    known = {command.name for command in hands.window.commands.commands}
     vertex = frozenset({Vertex(0, 0, 1)})
     for selection in (
         Selection(),
@@ -252,12 +253,12 @@ def test_typed_commands_name_note_array_and_set(hands: Hands) -> None:
 
 def test_commands_that_take_a_value_are_found_by_typing(hands: Hands) -> None:
     for word in TYPED_COMMANDS:
-        assert f"{word} " in [offer.fills for offer in hands.window.commands.offered(word)]
+        assert f"{word} " in [option.completion for option in list_options(hands.window.commands, word)]
     assert {command.name for command in list_typed_commands(hands.editor)} == set(TYPED_COMMANDS)
 
 
 def palette(hands: Hands) -> Choice:
-    asked = hands.editor.dialogs.asked
+    asked = hands.editor.dialogs.current
     assert isinstance(asked, Choice)
     return asked
 
@@ -285,4 +286,4 @@ def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
 def test_what_was_typed_and_cannot_be_done_stays_to_be_corrected(tmp_path: Path) -> None:
     with opened_editor(tmp_path) as hands:
         hands.command("grid 99999")
-        assert "99999" in palette(hands).trouble and palette(hands).text == "grid 99999"
+        assert "99999" in palette(hands).error and palette(hands).text == "grid 99999"

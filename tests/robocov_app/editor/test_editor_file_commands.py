@@ -38,19 +38,19 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 
 def asked(hands: Hands) -> str:
-    return hands.editor.dialogs.asked.title if hands.editor.dialogs.asked is not None else ""
+    return hands.editor.dialogs.current.title if hands.editor.dialogs.current is not None else ""
 
 
 def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
     hands.key("ctrl+s")
-    assert asked(hands) == "Save as" and hands.editor.dialogs.asked.text == "untitled.json"
+    assert asked(hands) == "Save as" and hands.editor.dialogs.current.text == "untitled.json"
     hands.key("ctrl+a")
     hands.type("plan")
     hands.key("return")
-    assert hands.editor.dialogs.asked is None and load_map(tmp_path / "plan.json").obstacles
+    assert hands.editor.dialogs.current is None and load_map(tmp_path / "plan.json").obstacles
     hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
-    assert hands.editor.dialogs.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
+    assert hands.editor.dialogs.current is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
     assert hands.editor.recent == [str(tmp_path / "plan.json")]
 
 
@@ -73,7 +73,7 @@ def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path:
 
 def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
     hands.editor.apply(create.add_polygon(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
-    hands.window.frame(0.0)
+    hands.window.run_frame(0.0)
     hands.key("ctrl+s")
     hands.key("return")
     assert "as a draft" in hands.said
@@ -117,7 +117,7 @@ def test_answers_are_clicked_too(hands: Hands) -> None:
     hands.editor.apply(create.add_circle(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.answer("Cancel")
-    assert hands.editor.dialogs.asked is None and len(hands.shapes) == 2
+    assert hands.editor.dialogs.current is None and len(hands.shapes) == 2
     hands.key("ctrl+n")
     hands.answer("Discard")
     assert hands.shapes == []
@@ -126,13 +126,13 @@ def test_answers_are_clicked_too(hands: Hands) -> None:
 def test_opening_a_map_a_bundled_one_and_something_else(hands: Hands, tmp_path: Path) -> None:
     save_map(load_map("l-shape"), tmp_path / "ell.json")
     hands.key("ctrl+o")
-    assert isinstance(hands.editor.dialogs.asked, Choice)
+    assert isinstance(hands.editor.dialogs.current, Choice)
     hands.type("ell")
     hands.key("tab")
     hands.key("return")
     assert hands.editor.document.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
     hands.key("ctrl+shift+o")
-    assert isinstance(hands.editor.dialogs.asked, Choice)
+    assert isinstance(hands.editor.dialogs.current, Choice)
     hands.type("rooms")
     hands.key("return")
     assert hands.editor.document.path is None and len(hands.shapes) == 18
@@ -154,23 +154,23 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Pat
     document = json.loads(path.read_text())
     document["obstacles"] = []
     touched(path, json.dumps(document))
-    hands.window.frame(2.0)
-    hands.window.frame(2.0)
+    hands.window.run_frame(2.0)
+    hands.window.run_frame(2.0)
     assert asked(hands) == "The file has changed"
     hands.key("r")
     assert hands.shapes == [] and not hands.editor.document.history.has_unsaved_changes
     hands.key("ctrl+z")
     assert len(hands.shapes) == 1
     touched(path, json.dumps({**document, "name": "Again"}))
-    hands.window.frame(2.0)
-    hands.window.frame(2.0)
+    hands.window.run_frame(2.0)
+    hands.window.run_frame(2.0)
     hands.key("k")
     assert len(hands.shapes) == 1 and hands.editor.document.history.has_unsaved_changes
     hands.key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
     path.unlink()
-    hands.window.frame(2.0)
-    hands.window.frame(2.0)
+    hands.window.run_frame(2.0)
+    hands.window.run_frame(2.0)
     assert "no longer there" in hands.said
 
 
@@ -198,7 +198,7 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands: Hands, tmp_path: Path
 ) -> None:
     hands.key("ctrl+e")
-    assert hands.editor.dialogs.asked.text == "untitled.svg"
+    assert hands.editor.dialogs.current.text == "untitled.svg"
     hands.key("return")
     first = (tmp_path / "untitled.svg").read_text()
     assert "<svg" in first and "exported" in hands.said and hands.editor.document.path is None
@@ -215,7 +215,7 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     assert "unknown format" in hands.refused()
     hands.editor.apply(create.add_polygon(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.key("ctrl+e")
-    assert hands.editor.has_error_message and hands.editor.dialogs.asked is None
+    assert hands.editor.has_error_message and hands.editor.dialogs.current is None
 
 
 def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_path: Path) -> None:
@@ -288,13 +288,13 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
     lost.flush()
     lost.close(discard=False)
     with opening(places) as window:
-        asked = window.editor.dialogs.asked
+        asked = window.editor.dialogs.current
         assert isinstance(asked, Question) and "Recover" in asked.title
         Hands(window).key("r")
         assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.has_unsaved_changes
     # the window went without a decision: it is offered again
     with opening(places) as window:
-        assert window.editor.dialogs.asked is not None
+        assert window.editor.dialogs.current is not None
         Hands(window).key("l")
         offer_recovery(window, find_recoverable(places / "drafts"))
         Hands(window).key("d")
@@ -376,12 +376,12 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
     (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
     with opening(places, places / "flat.json") as window:
-        asked = window.editor.dialogs.asked
+        asked = window.editor.dialogs.current
         assert isinstance(asked, ImportDialog) and asked.path.name == "flat.json"
         asked.accepted = True
         end = time.monotonic() + 60.0
-        while window.editor.dialogs.asked is not None and time.monotonic() < end:
-            window.frame(0.01)
+        while window.editor.dialogs.current is not None and time.monotonic() < end:
+            window.run_frame(0.01)
         assert window.editor.document.path is None and window.editor.document.history.has_unsaved_changes
         assert window.editor.sketch.build_environment().free_area == 12.0
         window.documents.leaving = True
@@ -409,7 +409,7 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
     (path,) = tmp_path.glob("*.json")
     hands.editor.apply(create.set_boundary(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
     hands.key("ctrl+s")
-    assert hands.editor.dialogs.asked is not None and "valid map" in hands.editor.dialogs.asked.words
+    assert hands.editor.dialogs.current is not None and "valid map" in hands.editor.dialogs.current.text
     hands.key("c")
     load_map(path)
     hands.key("ctrl+s")
@@ -418,4 +418,4 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
         load_map(path)
     hands.editor.apply(create.set_boundary(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
     hands.key("ctrl+s")
-    assert hands.editor.dialogs.asked is None and not hands.editor.document.history.has_unsaved_changes
+    assert hands.editor.dialogs.current is None and not hands.editor.document.history.has_unsaved_changes

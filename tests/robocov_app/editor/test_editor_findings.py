@@ -28,7 +28,7 @@ def near(picture: np.ndarray, at: tuple[float, float], color: tuple[int, int, in
 def without_message(hands: Hands) -> np.ndarray:
     hands.editor.message = ""
     hands.move(5, 590)
-    hands.window.frame(0.0)
+    hands.window.run_frame(0.0)
     return hands.picture()
 
 
@@ -127,7 +127,7 @@ def await_that(hands: Hands, seen: Callable[[], bool]) -> None:
     """Let the window run until a thread beside it has done something."""
     end = time.monotonic() + 30.0
     while not seen():
-        hands.window.frame(0.02)
+        hands.window.run_frame(0.02)
         time.sleep(0.001)
         assert time.monotonic() < end, "nothing happens"
 

@@ -95,7 +95,7 @@ class Monkey:
         return int(min(max(x, 0), width - 1)), int(min(max(y, 0), height - 1))
 
     def key(self) -> None:
-        commands = self.hands.window.commands.listed
+        commands = self.hands.window.commands.commands
         name, key = self.random.choice([(each.name, key) for each in commands for key in each.keys])
         self.done[name] = self.done.get(name, 0) + 1
         if self.done[name] > MOST.get(name, 10**9):
@@ -195,7 +195,7 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
                 monkey.act()
             window = hands.window
             if window.trial is not None or step % DRAWN == 0:
-                window.frame(1 / 50)
+                window.run_frame(1 / 50)
             else:
                 window.advance(1 / 50)
             if window.closed:
@@ -208,7 +208,7 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
         pygame.event.clear()
         if hands.window.trial is not None:
             hands.window.trial.ended = True
-            hands.window.frame(0.0)
+            hands.window.run_frame(0.0)
         history = hands.editor.document.history
         last = history.sketch
         undone = 0

@@ -143,9 +143,9 @@ def hands(request: Any, tmp_path: Path) -> Iterator[Hands]:
 
 def shown(hands: Hands) -> tuple[ImportDialog, Any]:
     hands.frames(2)
-    asked = hands.editor.dialogs.asked
+    asked = hands.editor.dialogs.current
     assert isinstance(asked, ImportDialog)
-    return asked, hands.window.dialogs._ui.shown
+    return asked, hands.window.dialogs.ui.widgets
 
 
 def pixel(hands: Hands, point: Any) -> tuple[int, ...]:
@@ -175,7 +175,7 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(hands: Hands) ->
 
 def test_colors_are_reached_by_the_keyboard(hands: Hands) -> None:
     shown(hands)
-    ui = hands.window.dialogs._ui
+    ui = hands.window.dialogs.ui
     for _ in range(60):
         if ui.focus == "clicks:color":
             break

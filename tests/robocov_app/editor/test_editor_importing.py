@@ -115,7 +115,7 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     taken = asked.poll()
     assert taken is not None and taken.environment.free_area == pytest.approx(56)
     assert worker.process is process
-    asked.canceled()
+    asked.handle_cancel()
     assert process.poll() is not None
 
 
@@ -128,8 +128,8 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 def shown(hands: Hands) -> tuple[ImportDialog, Any]:
     """Return the dialog, and its widgets by kind and name."""
     hands.frames(2)
-    assert isinstance(hands.editor.dialogs.asked, ImportDialog)
-    return hands.editor.dialogs.asked, hands.window.dialogs._ui.shown
+    assert isinstance(hands.editor.dialogs.current, ImportDialog)
+    return hands.editor.dialogs.current, hands.window.dialogs.ui.widgets
 
 
 def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, plan: Path) -> None:
@@ -146,7 +146,7 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.click(*asked.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     hands.key("return")
     hands.frames(2)
-    assert hands.editor.dialogs.asked is None
+    assert hands.editor.dialogs.current is None
     assert (
         hands.editor.document.history.has_unsaved_changes
         and hands.editor.document.path is None
@@ -178,7 +178,7 @@ def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
     assert "unknown" not in asked.entries, "an option without a default can be left again"
     before = hands.sketch
     hands.click(*view["button:cancel"].rect.center)
-    assert hands.editor.dialogs.asked is None and hands.sketch is before
+    assert hands.editor.dialogs.current is None and hands.sketch is before
 
 
 def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path) -> None:
@@ -186,12 +186,12 @@ def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path)
     asked, _ = shown(hands)
     hands.key("return")
     hands.frames(2)
-    assert hands.editor.dialogs.asked is asked and "--cell" in asked.trouble
+    assert hands.editor.dialogs.current is asked and "--cell" in asked.trouble
     hands.type("0.1")
     hands.frames(2)
-    assert hands.editor.dialogs.asked is asked, "an old Enter counts no more"
+    assert hands.editor.dialogs.current is asked, "an old Enter counts no more"
     hands.key("escape")
-    assert hands.editor.dialogs.asked is None
+    assert hands.editor.dialogs.current is None
 
 
 def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
@@ -202,7 +202,7 @@ def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
     hands.type("0.1")
     hands.key("return")
     hands.frames(2)
-    asked = hands.editor.dialogs.asked
+    asked = hands.editor.dialogs.current
     assert isinstance(asked, Question) and asked.title == "Save the changes?"
     hands.key("escape")
     assert hands.sketch.name == "mine"
@@ -213,7 +213,7 @@ def test_closing_the_window_leaves_it(hands: Hands, plan: Path) -> None:
     shown(hands)
     hands.post(pygame.QUIT)
     hands.settle()
-    assert hands.editor.dialogs.asked is None and hands.window.closed
+    assert hands.editor.dialogs.current is None and hands.window.closed
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])

@@ -28,7 +28,7 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
         hands.key("v")
         hands.window.canvas.zoom(2.0, (200.0, 200.0))
-        hands.window.frame(0.0)
+        hands.window.run_frame(0.0)
         before, camera, selection = hands.sketch, hands.window.canvas.camera, hands.editor.selection
         picture = hands.picture()
         trial = tried(hands)
@@ -41,7 +41,7 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         assert hands.sketch is before and hands.window.canvas.camera == camera
         assert hands.editor.selection == selection
         hands.editor.message = ""
-        hands.window.frame(0.0)
+        hands.window.run_frame(0.0)
         arena = np.s_[40:500, :500]
         apart = np.abs(hands.picture() - picture)[arena].max(axis=2)
         assert (apart > 40).mean() < 0.05  # but for the message, as it was
@@ -116,7 +116,7 @@ def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Pa
         hands.post(pygame.QUIT)
         hands.settle()
         hands.settle()
-        assert hands.window.trial is None and hands.window.dialogs.open and not hands.window.closed
+        assert hands.window.trial is None and hands.window.dialogs.is_open and not hands.window.closed
         hands.key("d")
         assert hands.window.closed
 

@@ -16,12 +16,10 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.fields import format_number
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import TABS
-from robocov_app.toolkit import clipboard
-from robocov_app.toolkit import command as help_page
-from robocov_app.toolkit.command import Menu
+from robocov_app.toolkit import clipboard, help_page
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.toolkit.input import shown_cursor
-from robocov_app.toolkit.layout import SMALLEST
+from robocov_app.toolkit.layout import MIN_SIZE_PX
+from robocov_app.toolkit.menu import Menu
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -155,10 +153,10 @@ def test_the_cursor_is_the_tools_over_the_map_and_an_arrow_over_the_panel(hands:
     hands.key("w")
     hands.go((5.0, 5.0))
     hands.wait()
-    assert shown_cursor() == pygame.SYSTEM_CURSOR_CROSSHAIR
+    assert hands.window.cursor.shape == pygame.SYSTEM_CURSOR_CROSSHAIR
     hands.move(hands.window.layout.panel[0] + 20, 200)
     hands.wait()
-    assert shown_cursor() == pygame.SYSTEM_CURSOR_ARROW
+    assert hands.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
 
 
 def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
@@ -191,7 +189,7 @@ def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
 
     def lines() -> list[tuple[str, bool]]:
         hands.frames(1)
-        shown = hands.window.panel.ui.shown.values()
+        shown = hands.window.panel.ui.widgets.values()
         return [(each.text, bool(each.value)) for each in shown if each.key.startswith("step:")]
 
     def click(row: int) -> None:
@@ -220,7 +218,7 @@ def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
     center = hands.window.canvas.camera.center
     hands.drag((300, 300), (330, 310), (360, 320), button=3)
     moved = hands.window.canvas.camera.center
-    assert moved[0] < center[0] and hands.editor.dialogs.asked is None
+    assert moved[0] < center[0] and hands.editor.dialogs.current is None
     hands.key("f")
     assert hands.window.canvas.camera.zoom == pytest.approx(zoom)
 
@@ -257,34 +255,34 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
 
 def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     hands.click_at((3, 3), button=3)
-    menu = hands.editor.dialogs.asked
+    menu = hands.editor.dialogs.current
     assert isinstance(menu, Menu) and hands.editor.selection == Selection.of(0)
     hands.window.draw()
-    names = [action.name if action else "" for action in menu.commands]
+    names = [action.name if action else "" for action in menu.rows]
     row = names.index("duplicate")
     hands.key("down", times=sum(1 for name in names[: row + 1] if name))
     hands.key("return")
-    assert len(hands.shapes) == 3 and hands.editor.dialogs.asked is None
+    assert len(hands.shapes) == 3 and hands.editor.dialogs.current is None
     hands.click_at((9.5, 5), button=3)
     hands.window.draw()
     assert not hands.editor.selection
-    assert "paste" in [action.name for action in hands.editor.dialogs.asked.commands if action]
-    hands.click(*hands.window.dialogs._ui.shown["option:select:all"].rect.center)
-    assert hands.editor.dialogs.asked is None and hands.editor.selection
+    assert "paste" in [action.name for action in hands.editor.dialogs.current.rows if action]
+    hands.click(*hands.window.dialogs.ui.widgets["option:select:all"].rect.center)
+    assert hands.editor.dialogs.current is None and hands.editor.selection
     hands.click_at((3, 3), button=3)
     hands.key("escape")
-    assert hands.editor.dialogs.asked is None
+    assert hands.editor.dialogs.current is None
     hands.click_at((3, 3), button=3)
     hands.post(pygame.DROPFILE, file="nowhere.txt")
     hands.settle()
-    assert hands.editor.dialogs.asked is None and "nowhere.txt" in hands.said
+    assert hands.editor.dialogs.current is None and "nowhere.txt" in hands.said
 
 
 def test_a_right_click_ends_what_is_being_drawn(hands: Hands) -> None:
     hands.key("p")
     hands.click_all((5, 1), (6, 1), (6, 2))
     hands.click_at((6, 2), button=3)
-    assert len(hands.shapes) == 3 and hands.editor.dialogs.asked is None
+    assert len(hands.shapes) == 3 and hands.editor.dialogs.current is None
 
 
 # palette, help, look
@@ -299,9 +297,9 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")
-    assert isinstance(hands.editor.dialogs.asked, Choice) and hands.editor.dialogs.asked.text == ""
+    assert isinstance(hands.editor.dialogs.current, Choice) and hands.editor.dialogs.current.text == ""
     hands.key("escape")
-    assert hands.editor.dialogs.asked is None
+    assert hands.editor.dialogs.current is None
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
@@ -316,7 +314,7 @@ def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatc
     with opened_editor(tmp_path, size=size, scale=scale) as hands:
         monkeypatch.setattr(help_page, "label", label)
         hands.key("f1")
-    for action in hands.window.commands.listed:
+    for action in hands.window.commands.commands:
         if action.keys and not action.hidden:
             title = action.title.partition(":")[0]
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
@@ -325,7 +323,7 @@ def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatc
 def test_light_dark_and_every_size(hands: Hands) -> None:
     hands.key("t")
     assert hands.picture().mean() < 90
-    for size in (SMALLEST, (640, 480), (1600, 500), (700, 1200)):
+    for size in (MIN_SIZE_PX, (640, 480), (1600, 500), (700, 1200)):
         pygame.display.set_mode(size, pygame.RESIZABLE)
         hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
         hands.settle()
@@ -385,7 +383,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
         for k in range(20):
             at = round(x + 2 * k), round(y + k % 7)
             hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
-            window.frame(1 / 60)
+            window.run_frame(1 / 60)
         assert hands.editor.displayed[0] is not hands.sketch
         whole = window.canvas.camera.view[2] * window.canvas.camera.view[3]
         assert boxes and all(box.width * box.height < whole / 10 for box in boxes)
@@ -418,7 +416,7 @@ def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
     hands.key("ctrl+tab")
     hands.editor.select(Selection())
     hands.frames(2)
-    lines = [each for each in hands.window.panel.ui.shown.values() if each.key.startswith("thing:")]
+    lines = [each for each in hands.window.panel.ui.widgets.values() if each.key.startswith("thing:")]
     assert lines[-1].text == "boundary" and len(lines) == len(hands.shapes) + 1 + len(hands.sketch.starts)
     hands.click(*hands.widget("option", "thing:0").rect.center)
     assert hands.editor.selection.items == {0}
@@ -459,7 +457,7 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         hands.frames(320)
         drawn.clear()
         hands.frames(20)
-        assert hands.window.dialogs.open and not drawn
+        assert hands.window.dialogs.is_open and not drawn
 
 
 def test_a_map_that_is_fitted_stays_so_in_a_window_of_another_size(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import Camera
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.toolkit.layout import laid_out
+from robocov_app.toolkit.layout import build_layout
 
 pytestmark = MARKS
 
@@ -48,7 +48,7 @@ class Sheet:
     """Where places of the map are in the window."""
 
     def __init__(self, bounds: tuple[float, float, float, float], legend_rows: int = 1) -> None:
-        left, top, width, height = laid_out(SIZE, 1.0, 1, 1.0, plot=False).arena
+        left, top, width, height = build_layout(SIZE, 1.0, 1, 1.0, plot=False).arena
         above = 10 + 22 * legend_rows
         view = float(left), float(top + above), float(width), height - above - STRIP
         self.camera = Camera.fit(bounds, view, MARGIN_PX)

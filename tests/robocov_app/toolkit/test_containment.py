@@ -41,7 +41,7 @@ class Fragile(BaseWindow):
         if name in self.raises:
             raise self.raises[name]
 
-    def take(self, event: pygame.event.Event) -> None:
+    def handle_event(self, event: pygame.event.Event) -> None:
         if event.type == pygame.KEYDOWN:
             self.value += 1
             self.call("take")
@@ -54,11 +54,11 @@ class Fragile(BaseWindow):
     def draw(self) -> None:
         self.call("draw")
 
-    def look(self) -> object:
+    def get_visible_state(self) -> object:
         self.call("look")
         return None
 
-    def save_point(self) -> Callable[[], None]:
+    def create_save_point(self) -> Callable[[], None]:
         value = self.value
         return lambda: setattr(self, "value", value)
 
@@ -82,7 +82,7 @@ def post_key() -> None:
 def test_an_event_that_raises_is_logged_reported_and_taken_back(window: Fragile, tmp_path: Path) -> None:
     window.raises["take"] = ValueError("embedded\nnull byte")
     post_key()
-    window.frame(0.02)
+    window.run_frame(0.02)
     assert window.value == 0 and not window.closed
     (report,) = window.reports
     assert report.startswith("Internal error while handling KeyDown (ValueError: embedded null byte).")
@@ -91,7 +91,7 @@ def test_an_event_that_raises_is_logged_reported_and_taken_back(window: Fragile,
     assert "Traceback" in log and "ValueError: embedded" in log
     window.raises.clear()
     post_key()
-    window.frame(0.02)
+    window.run_frame(0.02)
     assert window.value == 1
 
 
@@ -101,20 +101,20 @@ def test_a_part_that_always_fails_floods_nothing_and_recovers(
 ) -> None:
     window.raises[part] = RuntimeError("always")
     for _ in range(500):
-        window.frame(0.02)
+        window.run_frame(0.02)
     assert window.calls.count(part) < 20, "it is tried now and then"
     assert (tmp_path / LOG_FILE).read_text().count("Traceback") == 1
     window.raises.clear()
-    window._retry_at.clear()
+    window._retry_at_s.clear()
     window.calls.clear()
-    window.frame(0.02)
+    window.run_frame(0.02)
     assert part in window.calls
 
 
 def test_a_window_whose_closing_fails_closes(window: Fragile) -> None:
     window.raises["quit"] = RuntimeError("cannot ask")
     pygame.event.post(pygame.event.Event(pygame.QUIT))
-    window.frame(0.02)
+    window.run_frame(0.02)
     assert window.closed
 
 
@@ -123,14 +123,14 @@ def test_what_is_meant_to_end_a_program_ends_it(window: Fragile, error: type[Exc
     window.raises["take"] = error()
     post_key()
     with pytest.raises(error):
-        window.frame(0.02)
+        window.run_frame(0.02)
 
 
 def test_a_lost_display_ends_the_window(window: Fragile) -> None:
     window.raises["draw"] = pygame.error("display Surface quit")
     pygame.display.quit()
     with pytest.raises(pygame.error):
-        window.frame(0.02)
+        window.run_frame(0.02)
 
 
 def test_a_log_file_stays_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,7 +171,7 @@ def test_no_control_character_comes_in(tmp_path: Path) -> None:
 
 
 def test_a_field_takes_text_of_a_largest_length() -> None:
-    edit = TextEdit.of("ab")
+    edit = TextEdit.select_all("ab")
     edit.place(1)
     edit.type("x\x00y\tz" * MAX_CHARS)
     assert len(edit.text) == MAX_CHARS and edit.text.startswith("axyzxyz") and edit.text.endswith("b")
@@ -207,16 +207,16 @@ def test_a_dialog_that_cannot_be_drawn_is_dropped(tmp_path: Path, monkeypatch: p
     with opened_editor(tmp_path) as hands:
         hands.window.contains_faults = True
         hands.key("ctrl+k")
-        asked = hands.editor.dialogs.asked
+        asked = hands.editor.dialogs.current
         assert asked is not None
 
         def fail(ui: object) -> None:
             raise IndexError("page")
 
-        monkeypatch.setattr(asked, "page", fail)
-        hands.window.frame(0.1)
-        hands.window.frame(0.1)
-        assert hands.editor.dialogs.asked is None and "IndexError" in hands.editor.message
+        monkeypatch.setattr(asked, "show_content", fail)
+        hands.window.run_frame(0.1)
+        hands.window.run_frame(0.1)
+        assert hands.editor.dialogs.current is None and "IndexError" in hands.editor.message
 
 
 def test_an_edit_of_a_session_that_raises_is_taken_back(
@@ -293,4 +293,4 @@ def test_a_map_with_controls_in_its_texts_is_drawn(tmp_path: Path) -> None:
         (item,) = hands.sketch.obstacles
         assert isinstance(item.shape, CircleObstacle)
         hands.editor.show_message("a\x00b\udcff", is_error=True)
-        hands.window.frame(0.1)
+        hands.window.run_frame(0.1)

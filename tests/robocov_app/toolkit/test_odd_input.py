@@ -19,7 +19,7 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.map_draft import find_recoverable
 from robocov_app.editor.model.selection import Selection
 from robocov_app.jobs.workers import LatestWorker
-from robocov_app.toolkit.input import wheel_notches
+from robocov_app.toolkit.input import get_wheel_notches
 
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links")
 
@@ -27,7 +27,7 @@ posix_only = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links
 @pytest.mark.parametrize("precise", [math.nan, math.inf, -math.inf])
 def test_a_wheel_turned_by_no_number_counts_whole_notches(precise: float) -> None:
     event = pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=2, precise_x=0.0, precise_y=precise)
-    assert wheel_notches(event) == 2.0
+    assert get_wheel_notches(event) == 2.0
 
 
 def resize(driver: Driver, size: tuple[int, int]) -> None:
@@ -82,7 +82,7 @@ def test_a_picture_that_is_a_pipe_does_not_hold_the_window_up(tmp_path: Path) ->
     sketch = sheet(background=Background("plan.png", (10, 10)))
     with opened_editor(tmp_path, sketch) as hands:
         hands.editor.shown.add("picture")
-        hands.window.frame(0.1)
+        hands.window.run_frame(0.1)
         assert "got a pipe or a device" in hands.said
 
 
@@ -91,7 +91,7 @@ def test_a_draft_with_an_endless_circle_is_drawn(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sketch) as hands:
         hands.select(*(item.key for item in sketch.obstacles))
         assert hands.editor.selection == Selection.of(0, 1)
-        hands.window.frame(0.1)
+        hands.window.run_frame(0.1)
 
 
 def test_an_open_list_whose_names_have_changed_chooses_nothing(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_a_map_whose_file_name_is_no_text_has_drafts(tmp_path: Path) -> None:
     document = Document.new(tmp_path / "drafts", path)
     with opened_editor(tmp_path, document=document) as hands:
         hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
-        hands.window.frame(0.1)
+        hands.window.run_frame(0.1)
         assert document.flush()
     (draft,) = find_recoverable(tmp_path / "drafts")
     assert draft.path == path and len(draft.read_sketch().obstacles) == 1

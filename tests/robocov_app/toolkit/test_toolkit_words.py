@@ -2,15 +2,15 @@
 
 import pytest
 
-from robocov_app.toolkit.command import parted
-from robocov_app.toolkit.input import key_words
-from robocov_app.toolkit.layout import inside, laid_out, largest_scale
+from robocov_app.toolkit.command import split_command
+from robocov_app.toolkit.input import format_key
+from robocov_app.toolkit.layout import build_layout, find_max_scale, is_inside
 
 
 def test_the_panel_stands_at_the_right_of_the_arena() -> None:
-    layout = laid_out((1280, 720), 1.0, 1, 4 / 3)
+    layout = build_layout((1280, 720), 1.0, 1, 4 / 3)
     assert (layout.arena, layout.panel) == ((0, 0, 960, 518), (960, 0, 320, 720))
-    assert inside((10, 10, 5, 5), (14, 10)) and not inside((10, 10, 5, 5), (15, 10))
+    assert is_inside((10, 10, 5, 5), (14, 10)) and not is_inside((10, 10, 5, 5), (15, 10))
 
 
 @pytest.mark.parametrize(
@@ -18,11 +18,11 @@ def test_the_panel_stands_at_the_right_of_the_arena() -> None:
     [((900, 600), 1.0), ((1280, 720), 1.125), ((3840, 2160), 3.5), ((640, 480), 0.625), ((1170, 2532), 2.5)],
 )
 def test_text_is_as_large_as_there_is_room_for(size: tuple[int, int], scale: float) -> None:
-    assert largest_scale(size) == scale
+    assert find_max_scale(size) == scale
 
 
 def test_keys_and_what_is_typed() -> None:
     keys = ("ctrl+shift+z", "page down", "f1", "space", "`", "left")
-    assert [key_words(key) for key in keys] == ["Ctrl Shift Z", "Page down", "F1", "Space", "`", "←"]
-    assert parted("k_rep = 0.5") == ("k_rep", "0.5")
-    assert (parted("map a=b.json"), parted("robots")) == (("map", "a=b.json"), ("robots", ""))
+    assert [format_key(key) for key in keys] == ["Ctrl Shift Z", "Page down", "F1", "Space", "`", "←"]
+    assert split_command("k_rep = 0.5") == ("k_rep", "0.5")
+    assert (split_command("map a=b.json"), split_command("robots")) == (("map", "a=b.json"), ("robots", ""))

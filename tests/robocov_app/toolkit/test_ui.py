@@ -13,8 +13,10 @@ from driven_window import opened
 from robocov.errors import InputError
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.toolkit import clipboard
-from robocov_app.toolkit.command import Command, Commands, Menu, Takes, palette
-from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, file_choice
+from robocov_app.toolkit.command import Argument, Command, CommandTable
+from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, create_file_choice
+from robocov_app.toolkit.menu import Menu
+from robocov_app.toolkit.palette import create_palette
 from robocov_app.toolkit.ui import Ui
 
 KEYS = {"return": pygame.K_RETURN, "tab": pygame.K_TAB, "escape": pygame.K_ESCAPE, "left": pygame.K_LEFT}
@@ -54,11 +56,11 @@ class Page:
 
     def page(self, ui: Ui) -> None:
         self.pressed += ui.button("Go", tip="goes")
-        self.pressed += ui.button("Stop", why="nothing goes")
+        self.pressed += ui.button("Stop", disabled_reason="nothing goes")
         self.value = ui.slider("value", self.value, 0.0, 1.0) or self.value
-        if (on := ui.check("On", now=self.on)) is not None:
+        if (on := ui.check_box("On", value=self.on)) is not None:
             self.on = on
-        self.name = ui.text_entry("name", self.name) or self.name
+        self.name = ui.text_field("name", self.name) or self.name
         self.word = ui.dropdown("word", "abcdefghijklmnopqrstuvwxyz", self.word) or self.word
         self.tab = ui.tabs("tab", ["one", "two"], self.tab) or self.tab
         with ui.scroll("more"):
@@ -68,7 +70,7 @@ class Page:
 
     def draw(self) -> None:
         self.ui.draw(self.screen)
-        self.ui.draw_over(self.screen)
+        self.ui.draw_overlays(self.screen)
 
     def press(self, kind: str, name: str, at: float = 0.5) -> None:
         found = self.ui.find(kind, name)
@@ -78,12 +80,12 @@ class Page:
     def at(self, x: float, y: float) -> None:
         pos = round(x), round(y)
         for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
-            self.ui.take(pygame.event.Event(kind, pos=pos, button=1))
+            self.ui.handle_event(pygame.event.Event(kind, pos=pos, button=1))
             self.draw()
 
     def keys(self, *names: str) -> None:
         for name in names:
-            self.ui.take(key(name))
+            self.ui.handle_event(key(name))
 
     def text(self) -> str:
         found = self.ui.find("entry", "name")
@@ -99,7 +101,7 @@ def page(screen: pygame.Surface) -> Page:
 def test_widgets_edit_what_they_show(page: Page) -> None:
     page.press("button", "Go")
     page.press("button", "Stop")  # disabled, with its reason as tip
-    assert page.pressed == 1 and page.ui.shown["button:Stop"].tip == "nothing goes"
+    assert page.pressed == 1 and page.ui.widgets["button:Stop"].tip == "nothing goes"
     page.press("slider", "value", 0.9)
     assert 0.85 < page.value < 0.95
     page.press("check", "On")
@@ -109,8 +111,8 @@ def test_widgets_edit_what_they_show(page: Page) -> None:
 
 def test_a_field_replaces_undoes_and_gives_its_text_with_enter(page: Page) -> None:
     page.press("entry", "name")
-    page.ui.take(letters("1"))
-    page.ui.take(letters("2"))
+    page.ui.handle_event(letters("1"))
+    page.ui.handle_event(letters("2"))
     assert page.ui.edit and page.name == "8"
     page.keys("ctrl+z")
     page.draw()
@@ -125,11 +127,11 @@ def test_a_field_replaces_undoes_and_gives_its_text_with_enter(page: Page) -> No
 
 def test_an_input_method_composes_before_it_types(page: Page) -> None:
     page.press("entry", "name")
-    page.ui.take(pygame.event.Event(pygame.TEXTEDITING, text="にほ", start=0, length=2))
+    page.ui.handle_event(pygame.event.Event(pygame.TEXTEDITING, text="にほ", start=0, length=2))
     page.draw()
     page.keys("return")
     assert page.ui.edit and page.text() == "8"
-    page.ui.take(letters("日本"))
+    page.ui.handle_event(letters("日本"))
     page.keys("return")
     assert page.name == "日本"
 
@@ -138,7 +140,7 @@ def test_lists_drop_down_over_what_is_below(page: Page) -> None:
     page.press("menu", "word")
     found = page.ui.open_list
     assert found is not None
-    item = found.item(found.chosen + 1)
+    item = found.get_item_rect(found.chosen + 1)
     page.at(*item.center)
     assert page.word == "c" and page.ui.open_list is None and page.tab == "one"
     page.press("menu", "word")
@@ -150,7 +152,7 @@ def test_lists_drop_down_over_what_is_below(page: Page) -> None:
 
 
 def test_tab_walks_and_keys_press(page: Page) -> None:
-    assert not page.ui.take(key("tab"))  # while nothing has the focus it means something else
+    assert not page.ui.handle_event(key("tab"))  # while nothing has the focus it means something else
     page.press("entry", "name")
     page.keys("shift+tab", "space")
     assert page.on and not page.ui.edit
@@ -158,18 +160,22 @@ def test_tab_walks_and_keys_press(page: Page) -> None:
     assert page.value < 0.5
     page.keys("shift+tab", "return")
     assert page.pressed == 1
-    assert not page.ui.take(key("x")) and page.ui.take(key("escape")) and not page.ui.take(key("space"))
+    assert (
+        not page.ui.handle_event(key("x"))
+        and page.ui.handle_event(key("escape"))
+        and not page.ui.handle_event(key("space"))
+    )
 
 
 def test_more_than_there_is_room_for_scrolls_and_folds(page: Page) -> None:
     bar = page.ui.find("bar", "more")
     assert bar is not None and bar.value == 0.0
-    page.ui.at = (50, 280)
-    page.ui.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=-1, precise_y=-1.0))
+    page.ui.pointer = (50, 280)
+    page.ui.handle_event(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=-1, precise_y=-1.0))
     page.draw()
     bar = page.ui.find("bar", "more")
     assert bar is not None and bar.value == 40.0
-    page.ui.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=1, precise_y=1.0))
+    page.ui.handle_event(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=1, precise_y=1.0))
     page.draw()
     page.press("section", "section:MORE")
     assert page.ui.find("label", "line 0") is None and page.ui.find("bar", "more") is None
@@ -196,11 +202,20 @@ class Done:
     def __init__(self) -> None:
         self.done: list[object] = []
         self.said: list[str] = []
-        self.commands = Commands(
+        self.commands = CommandTable(
             [
                 Command("pause", "Play or pause", "Run", lambda: self.done.append("pause"), ("space",)),
-                Command("undo", "Undo", "Edit", lambda: None, ("ctrl+z",), when=lambda: "nothing to undo"),
-                Command("map", "Open a map", "Run", self._open, takes=Takes("name", options=self._maps)),
+                Command(
+                    "undo",
+                    "Undo",
+                    "Edit",
+                    lambda: None,
+                    ("ctrl+z",),
+                    get_disabled_reason=lambda: "nothing to undo",
+                ),
+                Command(
+                    "map", "Open a map", "Run", self._open, argument=Argument("name", list_values=self._maps)
+                ),
             ],
             self._attempt,
         )
@@ -223,33 +238,33 @@ class Done:
 
 def test_keys_do_commands_once_and_tell_why_they_cannot_be_done() -> None:
     its = Done()
-    command = its.commands.of_key(key("space"))
+    command = its.commands.press_key(key("space"))
     assert command is not None and command.name == "pause"
-    assert its.commands.of_key(key("space")) is None, "it is held down"
-    its.commands.release(key("space"))
-    its.commands.do("pause")
-    its.commands.do("undo")
+    assert its.commands.press_key(key("space")) is None, "it is held down"
+    its.commands.release_key(key("space"))
+    its.commands.run("pause")
+    its.commands.run("undo")
     assert its.done == ["pause"] and its.said == ["nothing to undo"]
     assert its.commands["undo"].tip == "Undo (Ctrl Z)"
 
 
 def test_the_palette_completes_and_keeps_what_was_wrong(screen: pygame.Surface) -> None:
     its, dialogs, told = Done(), Dialogs(), []
-    dialogs.ask(palette(its.commands, "", told.append))
-    dialogs.swallow("/")
+    dialogs.ask(create_palette(its.commands, "", told.append))
+    dialogs.ignore_letter("/")
 
     def does(*events: pygame.event.Event) -> None:
         for event in events:
             dialogs.draw(screen, LIGHT, 1.0)
-            dialogs.take(event)
+            dialogs.handle_event(event)
 
     does(letters("/"), letters("open"), key("return"), letters("attic"), key("return"))
-    assert dialogs.open and its.done == []
-    assert dialogs.asked.text == "map attic" and dialogs.asked.trouble == "there is no map attic"
+    assert dialogs.is_open and its.done == []
+    assert dialogs.current.text == "map attic" and dialogs.current.error == "there is no map attic"
     does(key("ctrl+backspace"), letters("of"), key("tab"), key("return"))
-    assert not dialogs.open and its.done == ["office"] and told == ["office is open"]
+    assert not dialogs.is_open and its.done == ["office"] and told == ["office is open"]
     with pytest.raises(InputError, match="mao"):
-        its.commands.typed("mao office")
+        its.commands.run_text("mao office")
 
 
 def test_questions_are_answered_by_keys_and_clicks(screen: pygame.Surface) -> None:
@@ -263,8 +278,8 @@ def test_questions_are_answered_by_keys_and_clicks(screen: pygame.Surface) -> No
         dialogs.ask(Question("Save first? " * 9, "It was edited.", answers, lambda: given.append("c"), 300))
         for event in events:
             dialogs.draw(screen, LIGHT, 1.0)
-            dialogs.take(event)
-        assert not dialogs.open
+            dialogs.handle_event(event)
+        assert not dialogs.is_open
     assert given == ["s", "d", "d", "c"]
 
 
@@ -274,23 +289,23 @@ def test_files_are_found_in_folders(screen: pygame.Surface, tmp_path: Any) -> No
     (tmp_path / "maps" / "b.txt").touch()
     chosen: list[object] = []
     dialogs = Dialogs()
-    dialogs.ask(file_choice("Open", tmp_path, chosen.append, endings=(".json",)))
+    dialogs.ask(create_file_choice("Open", tmp_path, chosen.append, suffixes=(".json",)))
     for event in (key("return"), key("return")):
         dialogs.draw(screen, LIGHT, 1.0)
-        dialogs.take(event)
-    assert chosen == [tmp_path / "maps" / "a.json"] and not dialogs.open
+        dialogs.handle_event(event)
+    assert chosen == [tmp_path / "maps" / "a.json"] and not dialogs.is_open
 
 
 def test_a_menu_at_the_cursor_stays_in_the_window_and_passes_over_what_cannot_be_done(
     screen: pygame.Surface,
 ) -> None:
     its, dialogs = Done(), Dialogs()
-    dialogs.ask(Menu([its.commands["undo"], None, its.commands["pause"]], (310, 290), its.commands.do))
+    dialogs.ask(Menu([its.commands["undo"], None, its.commands["pause"]], (310, 290), its.commands.run))
     dialogs.draw(screen, LIGHT, 1.0)
-    assert dialogs._ui is not None and screen.get_rect().contains(dialogs._ui.box)
-    dialogs.take(key("down"))
-    dialogs.take(key("return"))
-    assert its.done == ["pause"] and not dialogs.open
+    assert dialogs.ui is not None and screen.get_rect().contains(dialogs.ui.box)
+    dialogs.handle_event(key("down"))
+    dialogs.handle_event(key("return"))
+    assert its.done == ["pause"] and not dialogs.is_open
 
 
 def test_a_command_that_is_typed_within_one_frame_is_done(tmp_path: Path) -> None:
@@ -303,4 +318,4 @@ def test_a_command_that_is_typed_within_one_frame_is_done(tmp_path: Path) -> Non
                 pygame.event.post(pygame.event.Event(pygame.TEXTINPUT, text=letter))
             pygame.event.post(pygame.event.Event(pygame.KEYUP, key=key, mod=0, unicode=letter, scancode=0))
         driver.frames(2)
-        assert not driver.window.dialogs.open and driver.viewer.session.displayed.numbers == (1,)
+        assert not driver.window.dialogs.is_open and driver.viewer.session.displayed.numbers == (1,)

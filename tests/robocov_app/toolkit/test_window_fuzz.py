@@ -89,7 +89,7 @@ def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
         for pane in driver.session.timeline.panes:
             assert np.isfinite(pane.simulation.positions).all()
         driver.key("ctrl+k")
-        assert driver.window.dialogs.open
+        assert driver.window.dialogs.is_open
     return log
 
 
@@ -102,7 +102,7 @@ def leave_everything(driver: Driver | Hands) -> None:
     pygame.display.set_mode((900, 600), pygame.RESIZABLE)
     driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
     driver.post(pygame.WINDOWFOCUSLOST)
-    driver.window.suit(1.0, "light", panel=True)
+    driver.window.set_appearance(1.0, "light", panel=True)
     for _ in range(8):
         driver.key("escape")
         driver.window.closed = False

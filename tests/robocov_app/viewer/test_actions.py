@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 import robocov_app.viewer as package
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov_app.render.picture import standard_layers
-from robocov_app.toolkit.command import Command, matching
-from robocov_app.toolkit.input import key_words
+from robocov_app.toolkit.command import Command, find_commands
+from robocov_app.toolkit.input import format_key
 from robocov_app.viewer import panel
 from robocov_app.viewer.commands import GROUPS, list_viewer_commands
 from robocov_app.viewer.inspection import Inspection
@@ -31,7 +31,7 @@ HARMLESS = frozenset({"quit", "video", "screenshot", "save:run", "save:map", "fu
 
 @pytest.fixture(scope="module")
 def actions(shared: Driver) -> list[Command]:
-    return shared.window.commands.listed
+    return shared.window.commands.commands
 
 
 def test_no_key_does_two_things(actions: list[Command]) -> None:
@@ -46,7 +46,7 @@ def test_no_two_actions_have_one_name_or_one_title(actions: list[Command]) -> No
 
 def test_everything_has_a_key_or_is_typed_and_is_in_a_group_of_the_help(actions: list[Command]) -> None:
     for action in actions:
-        assert action.keys or action.takes, action.name
+        assert action.keys or action.argument, action.name
         assert action.title[0].isupper() and not action.title.endswith(".")
         assert action.group in GROUPS
     assert {action.group for action in actions} == set(GROUPS)
@@ -82,7 +82,7 @@ def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key(shared: Driver)
     ],
 )
 def test_keys_are_written_as_on_the_keyboard(key: str, words: str) -> None:
-    assert key_words(key) == words
+    assert format_key(key) == words
 
 
 def test_every_key_is_one_that_there_is(actions: list[Command]) -> None:
@@ -118,7 +118,7 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
     for tab in panel.TABS:
         shared.window.panel.show_tab(tab)
         shared.settle()
-        for each in shared.window.panel.ui.shown.values():
+        for each in shared.window.panel.ui.widgets.values():
             own = each.key.partition(":")[0] in {"tab", "reset", "close", "team.kinematics", *options}
             assert each.kind != "button" or own or each.key in names, each.key
 
@@ -159,7 +159,7 @@ def state_of(driver: Driver) -> list[object]:
         viewer.tool.build_preview(session),
         session.displayed.get_setup(session.timeline.panes[0]),
         its.help,
-        its.dialogs.open,
+        its.dialogs.is_open,
         its.tour,
         its.panel.tab,
     ]
@@ -168,8 +168,8 @@ def state_of(driver: Driver) -> list[object]:
 
 @pytest.mark.slow
 def test_every_action_does_something(shared: Driver) -> None:
-    for action in shared.window.commands.listed:
-        if action.name in HARMLESS or action.takes is not None:
+    for action in shared.window.commands.commands:
+        if action.name in HARMLESS or action.argument is not None:
             continue
         driver = prepared(shared)
         before = state_of(driver)
@@ -182,12 +182,12 @@ def test_every_key_does_its_action(shared: Driver, monkeypatch: pytest.MonkeyPat
     shared.window.dialogs.close()
     shared.window.panel.ui.stop_typing()
     monkeypatch.setattr(shared.window, "do", done.append)
-    for action in shared.window.commands.listed:
+    for action in shared.window.commands.commands:
         for key in action.keys:
             shared.post(pygame.KEYDOWN, **key_event(key))
             shared.post(pygame.KEYUP, **key_event(key))
     shared.window.advance(0.0)
-    assert done == [action.name for action in shared.window.commands.listed for _ in action.keys]
+    assert done == [action.name for action in shared.window.commands.commands for _ in action.keys]
 
 
 @pytest.fixture(scope="module")
@@ -229,7 +229,7 @@ def prepared(driver: Driver) -> Driver:
 
 @given(st.text(max_size=30))
 def test_what_is_found_holds_all_words_typed(actions: list[Command], typed: str) -> None:
-    found = matching(actions, typed)
+    found = find_commands(actions, typed)
     for action in actions:
         assert (action in found) == all(
             word in f"{action.title} {action.name}".lower() for word in typed.lower().split()
@@ -237,6 +237,6 @@ def test_what_is_found_holds_all_words_typed(actions: list[Command], typed: str)
 
 
 def test_what_begins_with_the_words_comes_first(actions: list[Command]) -> None:
-    found = [action.title for action in matching(actions, "re")]
+    found = [action.title for action in find_commands(actions, "re")]
     first = [title for title in found if title.lower().startswith("re")]
     assert first and found[: len(first)] == first

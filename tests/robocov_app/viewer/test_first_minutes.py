@@ -186,21 +186,21 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
         launcher = opened_for_a_person(monkeypatch, folder, offers_lesson=True)
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
-            assert isinstance(window.dialogs.asked, Question)
-            assert [answer.text for answer in window.dialogs.asked.answers] == [
+            assert isinstance(window.dialogs.current, Question)
+            assert [answer.text for answer in window.dialogs.current.answers] == [
                 "Lesson 1",
                 "Just let me play",
             ]
-            window.frame(0.5)
+            window.run_frame(0.5)
             assert window.viewer.session.displayed.time == 0.0  # nobody looks at the team yet
             key = pygame.K_RETURN if chosen == "return" else pygame.K_ESCAPE
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
-            window.frame(0.0)
-            assert window.dialogs.asked is None and (window.lesson.player is not None) is lesson
-            window.frame(0.5)
+            window.run_frame(0.0)
+            assert window.dialogs.current is None and (window.lesson.player is not None) is lesson
+            window.run_frame(0.5)
             assert window.viewer.session.displayed.time > 0.0
         with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
-            assert window.dialogs.asked is None
+            assert window.dialogs.current is None
 
 
 def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
@@ -221,20 +221,20 @@ def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
         launcher = opened_for_a_person(monkeypatch, tmp_path, offers_lesson=True)
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
-            assert isinstance(window.dialogs.asked, Question)
-            assert "1 edit, never saved" in window.dialogs.asked.words
-            window.frame(0.5)
+            assert isinstance(window.dialogs.current, Question)
+            assert "1 edit, never saved" in window.dialogs.current.text
+            window.run_frame(0.5)
             assert window.viewer.session.displayed.time == 0.0
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=chosen, mod=0, unicode="", scancode=0))
-            window.frame(0.0)
+            window.run_frame(0.0)
             assert window.viewer.session.displayed.numbers == numbers
-            assert (window.dialogs.asked is not None) is (left == 1)  # the next one is offered
+            assert (window.dialogs.current is not None) is (left == 1)  # the next one is offered
             assert len(find_recoverable_drafts(tmp_path / "drafts")) == left
 
 
 def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
-        assert window.dialogs.asked is None
+        assert window.dialogs.current is None
 
 
 def test_a_scale_takes_the_window_that_it_needs_or_says_so(
@@ -256,14 +256,14 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         viewer.files.save_session(tmp_path / "second.robocov")
         (tmp_path / "notes.txt").touch()
         driver.key("ctrl+o")
-        asked = driver.window.dialogs.asked
+        asked = driver.window.dialogs.current
         assert isinstance(asked, Choice)
         offered = [each.text for each in asked.options("")]
         assert offered[:2] == [str(tmp_path / "second.robocov"), str(tmp_path / "first.robocov")]
         assert offered[2:] == ["first.robocov", "other.json", "second.robocov", "../"]
         driver.type("oth")
         driver.key("return")
-        assert not driver.window.dialogs.open and viewer.files.map_name == str(tmp_path / "other.json")
+        assert not driver.window.dialogs.is_open and viewer.files.map_name == str(tmp_path / "other.json")
         driver.key("ctrl+o")
         driver.key("down")
         driver.key("return")
@@ -272,8 +272,8 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         driver.key("ctrl+o")
         driver.type("nothing.robocov")
         driver.key("return")  # an error stays in the dialog, with what was typed
-        asked = driver.window.dialogs.asked
-        assert isinstance(asked, Choice) and "nothing.robocov" in asked.trouble
+        asked = driver.window.dialogs.current
+        assert isinstance(asked, Choice) and "nothing.robocov" in asked.error
         assert asked.text == "nothing.robocov"
 
 
@@ -333,15 +333,15 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         session.fail_robot(3)
         driver.frames(20)
         driver.key("ctrl+b")
-        asked = driver.window.dialogs.asked
+        asked = driver.window.dialogs.current
         assert isinstance(asked, Choice)
         lines = asked.options("")
         assert [line.text for line in lines][-1].endswith("robot 3 failed  (here)")
-        assert all("RAPF" in line.aside and " m" in line.aside for line in lines)
+        assert all("RAPF" in line.note and " m" in line.note for line in lines)
         ends = np.array(
             [pane.distance_curve.interpolate(session.timeline.end_time) for pane in session.timeline.panes]
         )
-        assert lines[-1].aside == f"{session.timeline.end_time:.1f} s · RAPF {ends[0]:.3f} m"
+        assert lines[-1].note == f"{session.timeline.end_time:.1f} s · RAPF {ends[0]:.3f} m"
         driver.type("robot 2")
         driver.key("return")
         assert session.timeline.head is failed

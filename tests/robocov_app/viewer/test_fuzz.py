@@ -72,7 +72,7 @@ class Monkey:
     def __init__(self, driver: Driver, seed: int) -> None:
         self.driver, self.random = driver, random.Random(seed)
         self.held: list[int] = []
-        listed = [each for each in driver.window.commands.listed if MOST.get(each.name) != 0]
+        listed = [each for each in driver.window.commands.commands if MOST.get(each.name) != 0]
         self.named = [key for each in listed for key in each.keys if not key.endswith("+")]
 
     def play(self, events: int) -> None:
@@ -118,7 +118,7 @@ class Monkey:
             self.driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
         elif what < 0.985:
             self.driver.viewer.attempt(
-                lambda: self.driver.window.commands.typed(f"map {self.random.choice(MAPS)}")
+                lambda: self.driver.window.commands.run_text(f"map {self.random.choice(MAPS)}")
             )
         else:
             self.drag()
@@ -159,8 +159,8 @@ class Monkey:
         if what < 0.3:
             return rng.randint(-30, width + 30), rng.randint(-30, height + 30)
         panel = window.panel
-        if what < 0.55 and panel.ui.shown:
-            box = rng.choice(list(panel.ui.shown.values())).rect
+        if what < 0.55 and panel.ui.widgets:
+            box = rng.choice(list(panel.ui.widgets.values())).rect
             if panel.ui.open_list is not None and rng.random() < 0.7:
                 box = panel.ui.open_list.rect
             return rng.randint(box.left, box.right), rng.randint(box.top, box.bottom)

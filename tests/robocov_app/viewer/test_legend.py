@@ -17,7 +17,7 @@ def words(tmp_path: Path, *laws: str) -> list[str]:
     session = Session(SessionScenario(load_map("square"), tuple(ControllerChoice(law) for law in laws)))
     with Launcher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
         for _ in range(10):
-            window.frame(1 / 30)
+            window.run_frame(1 / 30)
         return [entry.text for entry in window.canvas._list_legend_entries()]
 
 

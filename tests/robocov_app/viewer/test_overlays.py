@@ -12,15 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.render.fonts import text_width
-from robocov_app.toolkit import command as keys_page
-from robocov_app.toolkit.overlay import wrapped
+from robocov_app.toolkit import help_page as keys_page
+from robocov_app.toolkit.overlay import wrap_text
 from robocov_app.viewer.commands import GROUPS
 from robocov_app.viewer.screen_video import copy_pixels
 
 
 @given(st.text(st.characters(whitelist_categories=("Ll", "Zs")), max_size=80), st.integers(60, 300))
 def test_wrapped_words_are_all_there_and_fit(text: str, width: int) -> None:
-    lines = wrapped(text, 12, width)
+    lines = wrap_text(text, 12, width)
     assert "".join("".join(lines).split()) == "".join(text.split())
     assert all(text_width(line, 12) <= width for line in lines), "a word that is too wide is broken"
 
@@ -34,28 +34,28 @@ def test_the_keys_are_all_on_one_card(
 ) -> None:
     boxes: list[pygame.Rect] = []
     words: set[str] = set()
-    real_label, real_card = keys_page.label, keys_page.card
+    real_label, real_card = keys_page.label, keys_page.draw_card
 
     def label(text, *rest):
         words.add(text)
         return real_label(text, *rest)
 
-    def card(screen, box, *rest):
+    def draw_card(screen, box, *rest):
         boxes.append(box.copy())
         real_card(screen, box, *rest)
 
     with opened(tmp_path, size=size, scale=scale) as driver:
         window = driver.window
         paler = window.screen.copy()
-        keys_page.dim(paler, window.theme)
+        keys_page.draw_veil(paler, window.theme)
         monkeypatch.setattr(keys_page, "label", label)
-        monkeypatch.setattr(keys_page, "card", card)
-        keys_page.draw_keys(
-            window.screen, window.theme, window.layout.scale, window.commands.listed, GROUPS, ""
+        monkeypatch.setattr(keys_page, "draw_card", draw_card)
+        keys_page.draw_help_page(
+            window.screen, window.theme, window.layout.scale, window.commands.commands, groups=GROUPS, hint=""
         )
         (box,) = boxes
         assert window.screen.get_rect().contains(box)
-        for action in (each for each in window.commands.listed if each.keys):
+        for action in (each for each in window.commands.commands if each.keys):
             title = action.title.partition(":")[0]
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
         # nothing sticks out
@@ -89,7 +89,7 @@ def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_
         driver.move(left + width // 2, top + height - 40)
         seen = [copy_pixels(window.screen)[top:, left:].copy()]
         for notches in (-2, -100, -1, 200):
-            window.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=notches))
+            window.handle_event(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=notches))
             window.draw()
             seen.append(copy_pixels(window.screen)[top:, left:].copy())
         assert not np.array_equal(seen[0], seen[1])

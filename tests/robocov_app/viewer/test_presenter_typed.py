@@ -125,7 +125,7 @@ def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
     typed(viewer, "map square")
     assert viewer.files.map_name == "square"
     words = "robots seed start controller speed time robot map open save branch"
-    assert set(words.split()) == {each.name for each in listed(viewer).listed if each.takes is not None}
+    assert set(words.split()) == {each.name for each in listed(viewer).commands if each.argument is not None}
 
 
 def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Path) -> None:

@@ -410,17 +410,17 @@ def test_the_window_displays_a_record_without_its_controller(
     launcher = Launcher(session, "", tmp_path, size=(900, 600), headless=True, lattice=16)
     with launcher.window() as window:
         for _ in range(40):
-            window.frame(1 / 30)
+            window.run_frame(1 / 30)
         assert window.viewer.session.timeline.is_live
         assert window.viewer.message.startswith("the record ends here")
         window.do("pause")
-        window.frame(1 / 30)
+        window.run_frame(1 / 30)
         assert "not resumed" in window.viewer.message
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
             window.do("robot:next")
-            window.frame(1 / 30)
-            window.frame(1 / 30)
+            window.run_frame(1 / 30)
+            window.run_frame(1 / 30)
 
 
 def test_a_controller_that_has_changed_does_not_change_the_past(

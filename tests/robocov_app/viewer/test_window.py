@@ -14,7 +14,6 @@ from PIL import Image
 from sample_sessions import RAPF, start_session
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.toolkit.input import shown_cursor
 from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.status import describe_cursor
 
@@ -83,11 +82,11 @@ def test_over_the_panel_the_cursor_is_an_arrow(driver: Driver) -> None:
     driver.key("w")
     driver.move(*driver.pixel((4.2, 1.2)))
     driver.frames(1)
-    assert shown_cursor() == pygame.SYSTEM_CURSOR_CROSSHAIR
+    assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_CROSSHAIR
     left, top, wide, high = driver.window.layout.panel
     driver.move(left + wide / 2, top + high - 5)
     driver.frames(1)
-    assert shown_cursor() == pygame.SYSTEM_CURSOR_ARROW
+    assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
 
 
 def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -> None:
@@ -167,17 +166,17 @@ def test_the_keys_are_shown_and_go_with_a_key_or_a_click(key: str, driver: Drive
 def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
     driver.key(key)
     dialogs = driver.window.dialogs
-    assert dialogs.open and dialogs.asked.text == ""
+    assert dialogs.is_open and dialogs.current.text == ""
     driver.type("single")
-    assert [each.text for each in dialogs.asked.options("single")] == ["Single step"]
+    assert [each.text for each in dialogs.current.options("single")] == ["Single step"]
     driver.key("return")
-    assert driver.session.timeline.end_time > 0.0 and not dialogs.open
+    assert driver.session.timeline.end_time > 0.0 and not dialogs.is_open
 
 
 def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("rob")
-    asked = driver.window.dialogs.asked
+    asked = driver.window.dialogs.current
     driver.key("down", 2)
     driver.key("up")
     assert asked.chosen == 1
@@ -186,7 +185,7 @@ def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
     driver.key("down", 30)
     assert asked.chosen == len(asked.options("ro")) - 1
     driver.key("escape")
-    assert not driver.window.dialogs.open and driver.session.timeline.end_time == 0.0
+    assert not driver.window.dialogs.is_open and driver.session.timeline.end_time == 0.0
 
 
 def test_values_are_set_by_typing(driver: Driver) -> None:
@@ -201,8 +200,8 @@ def test_values_are_set_by_typing(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("robots many")
     driver.key("return")
-    asked = driver.window.dialogs.asked
-    assert asked.text == "robots many" and "whole number" in asked.trouble  # nothing typed is lost
+    asked = driver.window.dialogs.current
+    assert asked.text == "robots many" and "whole number" in asked.error  # nothing typed is lost
 
 
 def test_a_key_that_is_held_down_saves_one_picture_but_goes_on_stepping(

@@ -13,8 +13,8 @@ from driven_window import MIDDLE, Driver, opened, resized
 from sample_sessions import RAPF, RPF
 
 from robocov.controllers import CONTROLLERS
-from robocov_app.toolkit.input import DOUBLE, KEY_REPEAT
-from robocov_app.toolkit.ui import TIP_AFTER
+from robocov_app.toolkit.input import DOUBLE_CLICK_S, KEY_REPEAT_MS
+from robocov_app.toolkit.tool_tip import TIP_DELAY_S
 from robocov_app.viewer.panel import TABS, label_controllers
 
 # the panel
@@ -42,7 +42,7 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
     }
     with opened(tmp_path, RAPF, RPF, RPF, RPF) as driver:
         for name in names:
-            driver.viewer.attempt(lambda name=name: driver.window.commands.typed(f"controller {name}"))
+            driver.viewer.attempt(lambda name=name: driver.window.commands.run_text(f"controller {name}"))
         driver.viewer.attempt(lambda: driver.viewer.comparison.set_controller(0, "rapf"))
         driver.settle()
         driver.click(*driver.widget("menu", "controller:1").rect.center)
@@ -96,7 +96,7 @@ def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
     step = driver.widget("button", "step").rect
     driver.click(*driver.widget("menu", "map").rect.center)
     found = driver.window.panel.ui.open_list
-    name = found.options[found.at((driver.at[0], step.centery))]
+    name = found.options[found.find_item((driver.at[0], step.centery))]
     driver.click(driver.at[0], step.centery)
     assert driver.session.timeline.end_time == 0.0 and driver.viewer.files.map_name == name
 
@@ -193,20 +193,20 @@ def test_keys_repeat_as_before_after_something_was_typed(driver: Driver) -> None
     driver.write("k_rep", "1")
     driver.key("return")
     driver.frames(2)
-    assert pygame.key.get_repeat() == KEY_REPEAT
+    assert pygame.key.get_repeat() == KEY_REPEAT_MS
 
 
 def test_typing_goes_on_in_the_middle_after_a_second_click(driver: Driver) -> None:
     entry = driver.widget("entry", "seed")
     driver.write("seed", "123")
-    time.sleep(DOUBLE)
+    time.sleep(DOUBLE_CLICK_S)
     driver.click(entry.rect.left + 8, entry.rect.centery)
     driver.type("9")
     assert sorted(driver.widget("entry", "seed").text) == ["1", "2", "3", "9"]
 
 
 def test_the_reset_button_goes_back_to_the_default(driver: Driver) -> None:
-    driver.viewer.attempt(lambda: driver.window.commands.typed("k_rep 4"))
+    driver.viewer.attempt(lambda: driver.window.commands.run_text("k_rep 4"))
     driver.settle()
     assert driver.widget("slider", "k_rep").value > 0.7
     driver.push("reset:k_rep")
@@ -348,12 +348,12 @@ def test_tool_tips_tell_what_and_by_which_key(driver: Driver) -> None:
     driver.move(*button.rect.center)
     before = driver.picture()
     assert button.tip == "Single step (.)"
-    time.sleep(TIP_AFTER)
+    time.sleep(TIP_DELAY_S)
     driver.frames(1)
     assert not driver.same(before)
 
 
 def test_tool_tips_of_gains_tell_what_they_mean_and_no_letter_is_taken_for_a_sign(driver: Driver) -> None:
-    tips = [each.tip for each in driver.window.panel.ui.shown.values()]
+    tips = [each.tip for each in driver.window.panel.ui.widgets.values()]
     assert any(tip and "N m³" in tip for tip in tips)
     assert not any(tip and "<" in tip for tip in tips)

@@ -109,12 +109,12 @@ def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
         driver.key("ctrl+s")
         (path,) = tmp_path.glob("*.robocov")
         assert str(path) in driver.viewer.message
-        driver.window.commands.typed(f"open {path}")
+        driver.window.commands.run_text(f"open {path}")
         driver.frames(2)
         session = driver.viewer.session
         assert session.displayed.numbers == (2, 3)
         assert len(session.timeline.document.list_branches()) == 2
-        driver.window.commands.typed("branch 1")
+        driver.window.commands.run_text("branch 1")
         assert session.displayed.numbers == (1, 3)
 
 

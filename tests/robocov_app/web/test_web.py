@@ -24,7 +24,7 @@ from robocov.errors import InputError, RobocovError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
 from robocov_app.toolkit import clipboard
-from robocov_app.toolkit.input import key_of
+from robocov_app.toolkit.input import get_key_name
 from robocov_app.web.confined import OutsideError, confine_files
 from robocov_app.web.events import (
     MAX_UPLOAD_BYTES,
@@ -88,7 +88,7 @@ def test_a_picture_without_a_change_is_empty():
 def test_keys_have_the_names_that_the_window_knows(key, held, name):
     told = json.dumps({"kind": "key", "key": key, "down": True, "held": held})
     event = next(EventTranslator().translate(MESSAGES.validate_json(told)))
-    assert key_of(event) == name
+    assert get_key_name(event) == name
 
 
 SCRAPS = st.recursive(

@@ -49,29 +49,29 @@ def wait_for(condition: Callable[[], object]) -> None:
 def test_a_served_editor_offers_its_draft_at_the_next_start(tmp_path: Path) -> None:
     with editor_window(None, tmp_path, served=True) as window:
         editor = window.editor
-        assert editor.dialogs.asked is None
+        assert editor.dialogs.current is None
         editor.attempt(lambda: editor.apply(add_circle(editor.sketch, (5.0, 5.0), 1.0)))
-        window.frame(0.1)
+        window.run_frame(0.1)
     assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
     with editor_window(None, tmp_path, served=True) as window:
-        assert window.editor.dialogs.asked.title == "Recover unsaved work?"
-        window.editor.dialogs.asked.answers[0].call()
+        assert window.editor.dialogs.current.title == "Recover unsaved work?"
+        window.editor.dialogs.current.answers[0].call()
         assert len(window.editor.sketch.obstacles) == 1
 
 
 def test_a_served_viewer_offers_its_draft_at_the_next_start(tmp_path: Path) -> None:
     session = start_session()
     with Launcher(session, "hall", tmp_path, lattice=4, size=(900, 600), served=True).window() as window:
-        assert window.dialogs.asked is None
+        assert window.dialogs.current is None
         session.fail_robot(2)
-        window.frame(0.1)
+        window.run_frame(0.1)
         window.close()
     assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
     with Launcher(
         start_session(), "hall", tmp_path, lattice=4, size=(900, 600), served=True
     ).window() as window:
-        assert window.dialogs.asked.title == "Recover unsaved work?"
-        window.dialogs.asked.answers[0].call()
+        assert window.dialogs.current.title == "Recover unsaved work?"
+        window.dialogs.current.answers[0].call()
         assert window.viewer.session.displayed.numbers == (1, 3)
         window.close()
 

@@ -29,7 +29,7 @@ from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import range_label, value_range
 from robocov_app.render.fonts import shortened
 from robocov_app.render.surface_cache import Latest
-from robocov_app.toolkit.layout import Layout, inside
+from robocov_app.toolkit.layout import Layout, is_inside
 
 # Lengths in pixels at scale 1.
 REACH_PX = 12.0  # within which the pointer takes hold of something
@@ -197,7 +197,7 @@ class EditorCanvas:
 
     def contains(self, pixel: Point) -> bool:
         """Return whether a pixel of the window belongs to the map."""
-        return inside(self.camera.view, pixel)
+        return is_inside(self.camera.view, pixel)
 
     def to_world(self, pixel: Point) -> Point:
         """Return the position under a pixel of the window, m."""

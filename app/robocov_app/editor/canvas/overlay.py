@@ -24,7 +24,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import MAX_PIXEL
 from robocov_app.render.canvas import Canvas
-from robocov_app.toolkit.overlay import tag
+from robocov_app.toolkit.overlay import draw_tag
 
 # Lengths in pixels at scale 1.
 HANDLE_HALF_PX = 3.5  # half the side of a handle
@@ -284,7 +284,7 @@ def draw_preview(canvas: Canvas, state: DrawState, cursor: Point | None) -> None
         _draw_selection_box(canvas, state.box, selects_touched=state.box_selects_touched)
     if state.label and cursor is not None:
         position = _place_cursor_label(canvas, cursor)
-        tag(canvas.surface, state.label, position, canvas.theme, canvas.scale)
+        draw_tag(canvas.surface, state.label, position, canvas.theme, canvas.scale)
 
 
 def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
@@ -403,7 +403,7 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
         low_x = cursor_x - canvas.text_width(label) - 20 * scale
         if low_x < x < cursor_x + 200 * scale and abs(y - cursor_y) < 24 * scale:
             y = cursor_y - 24 * scale
-    tag(canvas.surface, label, (x, y), canvas.theme, scale)
+    draw_tag(canvas.surface, label, (x, y), canvas.theme, scale)
 
 
 def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
@@ -472,7 +472,7 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
     free_width = canvas.surface.get_width() - text_x - 8 * scale
     is_wide_enough = free_width > canvas.text_width(problem.message)
     text_y = y if is_wide_enough else y - (BADGE_RADIUS_PX + 14) * scale
-    tag(canvas.surface, problem.message, (text_x, text_y), canvas.theme, scale)
+    draw_tag(canvas.surface, problem.message, (text_x, text_y), canvas.theme, scale)
 
 
 def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: bool = False) -> None:

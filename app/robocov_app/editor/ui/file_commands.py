@@ -25,7 +25,7 @@ from robocov_app.editor.ui.importing import Imported, ImportJob
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect_format, export_map
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.storage.regular_files import require_regular_file
-from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
+from robocov_app.toolkit.dialogs import Option, create_file_choice, create_list_choice
 
 Action: TypeAlias = Callable[[], object]
 IMPORT_PATIENCE_S = 2.0  # after which an import whose settings have changed is abandoned
@@ -141,7 +141,7 @@ class FileCommands:
         def choose(path: Path) -> None:
             self.editor.carry_out(lambda: action(path))
 
-        dialog = file_choice(title, self.editor.folder, choose, endings=suffixes, text=text)
+        dialog = create_file_choice(title, self.editor.folder, choose, suffixes=suffixes, text=text)
         self.editor.dialogs.ask(dialog)
 
     def ask_recent(self) -> None:
@@ -152,7 +152,7 @@ class FileCommands:
         def choose(option: Option) -> None:
             self.editor.carry_out(lambda: self.open(find_map_file(option.text)))
 
-        self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: options, choose))
+        self.editor.dialogs.ask(create_list_choice("Open a recent or bundled map", lambda: options, choose))
 
     def open(self, path: Path) -> None:
         """Open a map, or import a foreign file; the open map itself is reloaded.
@@ -269,13 +269,13 @@ class FileCommands:
     def poll(self) -> None:
         """Accept an import that is ready, and look for changes of the file."""
         editor = self.editor
-        dialog = editor.dialogs.asked
+        dialog = editor.dialogs.current
         if isinstance(dialog, ImportDialog):
             imported = dialog.poll()
             if imported is not None:
                 editor.dialogs.close()
                 editor.attempt(lambda: dialog.call(imported))
-        if editor.dialogs.asked is not None:
+        if editor.dialogs.current is not None:
             return
         state = editor.document.check_disk(editor.now)
         title = editor.document.title

@@ -26,9 +26,10 @@ from robocov_app.formats.colors import Color, name_color
 from robocov_app.jobs.workers import Worker
 from robocov_app.render.fonts import label
 from robocov_app.toolkit.dialogs import Dialog
-from robocov_app.toolkit.overlay import wrapped
+from robocov_app.toolkit.overlay import wrap_text
 from robocov_app.toolkit.text_edit import TextEdit
-from robocov_app.toolkit.ui import SMALL, Ui
+from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 
 # Lengths in pixels at scale 1.
 OPTIONS_WIDTH_PX = 300
@@ -182,28 +183,28 @@ class ImportDialog(Dialog):
         """Whether the map has been imported with the present settings."""
         return self.imported is not None and not self.busy and not self.trouble
 
-    def key(self, name: str, ui: Ui) -> bool:
+    def handle_key(self, name: str, ui: Ui) -> bool:
         """Accept the map with Enter; return whether the key was used."""
         is_accepting = name in ("return", "enter") and ui.open_list is None
         if is_accepting:
             self.accepted = True
         return is_accepting
 
-    def canceled(self) -> None:
+    def handle_cancel(self) -> None:
         """End the import."""
         self._worker.close()
 
-    def page(self, ui: Ui) -> None:
+    def show_content(self, ui: Ui) -> None:
         """Draw the dialog."""
         left = ui.x
         top = ui.y
-        width = ui.wide
+        width = ui.width
         height = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
-        ui.wide = OPTIONS_WIDTH_PX
+        ui.width = OPTIONS_WIDTH_PX
         self._draw_options(ui, top + height)
         ui.x = left + OPTIONS_WIDTH_PX + OPTIONS_GAP_PX
         ui.y = top
-        ui.wide = width - OPTIONS_WIDTH_PX - OPTIONS_GAP_PX
+        ui.width = width - OPTIONS_WIDTH_PX - OPTIONS_GAP_PX
         if self.sheet is not None:
             self._draw_click_actions(ui)
         report_height = REPORT_LINE_PX * (MIN_REPORT_LINES + 1) + MAPS_GAP_PX
@@ -211,7 +212,7 @@ class ImportDialog(Dialog):
         self._draw_report(ui, top + height)
         ui.x = left
         ui.y = top + height
-        ui.wide = width
+        ui.width = width
 
     def _draw_maps(self, ui: Ui, height: float) -> None:
         """Draw the two maps, or a text while there is none."""
@@ -229,7 +230,7 @@ class ImportDialog(Dialog):
         if ui.surface is not None:
             self._draw_preview(ui.surface, ui, self.imported)
         if is_clicked:
-            self._click(ui.at)
+            self._click(ui.pointer)
         ui.end_row()
         ui.y = top + maps_height / ui.scale + MAPS_GAP_PX
 
@@ -277,7 +278,7 @@ class ImportDialog(Dialog):
 
     def _draw_chips(self, ui: Ui, sheet: ColorSheet) -> None:
         colors = list(dict.fromkeys([*list_declared_colors(self.entries), *sheet.colors]))
-        columns = int((ui.wide + CHIP_GAP_PX) // (CHIP_WIDTH_PX + CHIP_GAP_PX))
+        columns = int((ui.width + CHIP_GAP_PX) // (CHIP_WIDTH_PX + CHIP_GAP_PX))
         colors = colors[: max(columns, 1)]
         ui.row(*[CHIP_WIDTH_PX] * len(colors), 0, height=24, below=8)
         for color in colors:
@@ -301,7 +302,7 @@ class ImportDialog(Dialog):
 
     def _draw_options(self, ui: Ui, foot: float) -> None:
         """Draw the options, the help of the focused one, and the buttons; `foot` is the lower edge."""
-        ui.words(f"Import {self.path.name}", size=16, bold=True)
+        ui.paragraph(f"Import {self.path.name}", size=16, bold=True)
         ui.label(self.importer.title, style="unit")
         ui.end_row()
         if ui is not self._focused_ui:
@@ -318,14 +319,14 @@ class ImportDialog(Dialog):
         if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
             self.accepted = True
         if ui.button("Cancel", key="cancel"):
-            self.done = True
-            self.canceled()
+            self.is_done = True
+            self.handle_cancel()
         ui.end_row()
 
     def _focus_first_field(self, ui: Ui) -> None:
         first = next(option.name for option in self.options if not option.choices)
         ui.focus = first
-        ui.edit = TextEdit.of(self.entries.get(first, ""))
+        ui.edit = TextEdit.select_all(self.entries.get(first, ""))
 
     def _draw_option(self, ui: Ui, option: ImportOption) -> None:
         name = option.name
@@ -336,15 +337,15 @@ class ImportDialog(Dialog):
             choices = option.choices if option.default else (DEFAULT_TEXT, *option.choices)
             text = ui.dropdown(name, choices, present or DEFAULT_TEXT, tip=option.help)
         else:
-            text = ui.text_entry(name, present, ghost=DEFAULT_TEXT, tip=option.help, live=True)
+            text = ui.text_field(name, present, placeholder=DEFAULT_TEXT, tip=option.help, live=True)
         if text is not None and text != present:
             self.set(name, text)
 
     def _draw_option_help(self, ui: Ui, foot: float) -> None:
         text = next((option.help for option in self.options if option.name == ui.focus), "")
-        max_lines = max(int((foot - HELP_MARGIN_PX - ui.y) / (SMALL + 5)), 0)
-        lines = wrapped(text, ui.px(SMALL), ui.px(ui.wide))[:max_lines]
-        ui.words(" ".join(lines), size=SMALL, color=ui.theme.faint)
+        max_lines = max(int((foot - HELP_MARGIN_PX - ui.y) / (SMALL_TEXT_PX + 5)), 0)
+        lines = wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))[:max_lines]
+        ui.paragraph(" ".join(lines), size=SMALL_TEXT_PX, color=ui.theme.faint)
 
     def _list_report_lines(self) -> list[str]:
         if self.trouble:
@@ -354,7 +355,7 @@ class ImportDialog(Dialog):
     def _draw_report(self, ui: Ui, foot: float) -> None:
         lines: list[str] = []
         for text in self._list_report_lines():
-            lines += wrapped(text, ui.px(SMALL), ui.px(ui.wide))
+            lines += wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))
         max_lines = int((foot - ui.y) / REPORT_LINE_PX) - 1
         if len(lines) > max_lines:
             lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
@@ -362,7 +363,7 @@ class ImportDialog(Dialog):
         if ui.surface is not None:
             color = ui.theme.trajectory if self.trouble else ui.theme.ink
             for line in lines:
-                ui.surface.blit(label(line, ui.px(SMALL), color), ui.cell())
+                ui.surface.blit(label(line, ui.px(SMALL_TEXT_PX), color), ui.cell())
         ui.end_row()
         ui.y = foot - REPORT_LINE_PX
         hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOR]

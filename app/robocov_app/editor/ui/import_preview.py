@@ -20,7 +20,7 @@ from robocov_app.render import layout
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import Latest
-from robocov_app.toolkit.ui import SMALL
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 
 # Lengths in pixels at scale 1.
 CAPTION_HEIGHT_PX = 40  # above each map
@@ -114,7 +114,7 @@ class ImportPreview:
         self, screen: Surface, camera: Camera, caption: _Caption, scale: float, theme: Theme
     ) -> None:
         title_size = round(13 * scale)
-        text_size = round(SMALL * scale)
+        text_size = round(SMALL_TEXT_PX * scale)
         x = round(camera.view[0])
         y = round(camera.view[1] - CAPTION_HEIGHT_PX * scale)
         screen.blit(label(caption.title, title_size, theme.ink, True), (x, y))

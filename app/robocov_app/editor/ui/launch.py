@@ -168,7 +168,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
 def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:
     """Return the present settings of a window; what it does not change is as before."""
     editor = window.editor
-    width, height = window.windowed or window.screen.get_size()
+    width, height = window.windowed_size or window.screen.get_size()
     changes: dict[str, object] = {
         setting: getattr(editor, attribute) for setting, attribute in SETTING_ATTRIBUTES.items()
     }

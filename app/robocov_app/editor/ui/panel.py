@@ -24,9 +24,10 @@ from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.actions import fix_problem, select_owners
 from robocov_app.editor.ui.fields import FIELDS, set_picture_opacity
 from robocov_app.editor.ui.map_facts import list_map_facts
-from robocov_app.toolkit.command import Commands
-from robocov_app.toolkit.overlay import flat_canvas, wrapped
-from robocov_app.toolkit.ui import SMALL, TEXT, SidePanel, Ui
+from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.overlay import create_flat_canvas, wrap_text
+from robocov_app.toolkit.ui import SidePanel, Ui
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX
 
 TABS = ("map", "object", "snap", "problems", "history")
 TAB_WIDTHS_PX = (44, 56, 46, 72, 0)  # 0 for the rest
@@ -178,7 +179,7 @@ class Panel(SidePanel):
     ----------
     editor : Editor
         The editor.
-    commands : Commands
+    commands : CommandTable
         The commands of the window.
     run_command : callable
         Runs a command given its name.
@@ -189,7 +190,7 @@ class Panel(SidePanel):
     def __init__(
         self,
         editor: Editor,
-        commands: Commands,
+        commands: CommandTable,
         run_command: Callable[[str], object],
         show_problem: Callable[[], object],
     ) -> None:
@@ -203,7 +204,7 @@ class Panel(SidePanel):
         """Show a page."""
         if name in TABS:
             self.tab = name
-            self.ui.stale = True
+            self.ui.needs_redraw = True
 
     def show_next_tab(self) -> None:
         """Show the next page."""
@@ -221,11 +222,11 @@ class Panel(SidePanel):
             id(editor.measurement),
             editor.document.history.has_unsaved_changes,
         )
-        if state != self._drawn:
-            self._drawn = state
-            self.ui.stale = True
+        if state != self.drawn_state:
+            self.drawn_state = state
+            self.ui.needs_redraw = True
 
-    def _page(self, ui: Ui) -> None:
+    def show_content(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
         document = self.editor.document
         suffix = ", not saved" if document.history.has_unsaved_changes else ""
@@ -274,7 +275,7 @@ class Panel(SidePanel):
 
     def _draw_check(self, ui: Ui, command: str, title: str, *, is_on: bool) -> None:
         tip = self._commands[command].tip
-        if ui.check(title, key=command, now=is_on, tip=tip) is not None:
+        if ui.check_box(title, key=command, value=is_on, tip=tip) is not None:
             self._run_command(command)
 
     def _draw_field(self, ui: Ui, cell: FieldCell) -> None:
@@ -284,7 +285,7 @@ class Panel(SidePanel):
         text = ""
         with suppress(MapError, LookupError):
             text = field.read(editor)
-        typed = ui.text_entry(cell.name, text, tip=field.tip)
+        typed = ui.text_field(cell.name, text, tip=field.tip)
         if cell.unit:
             ui.label(cell.unit, key=f"unit:{cell.name}", style="unit")
         if typed is not None:
@@ -326,7 +327,7 @@ class Panel(SidePanel):
         editor = self.editor
         kind = find_object_kind(editor)
         if kind == "nothing":
-            ui.words(NOTHING_SELECTED, size=SMALL + 1, color=ui.theme.faint)
+            ui.paragraph(NOTHING_SELECTED, size=SMALL_TEXT_PX + 1, color=ui.theme.faint)
             ui.space(6)
             self._draw_object_list(ui)
             return
@@ -384,7 +385,7 @@ class Panel(SidePanel):
         picture = self.editor.sketch.background
         present = picture.opacity if picture is not None else 0.5
         reason = "" if picture is not None else "there is no picture under the map"
-        opacity = ui.slider("opacity", present, 0.0, 1.0, why=reason)
+        opacity = ui.slider("opacity", present, 0.0, 1.0, disabled_reason=reason)
         if opacity is not None:
             self.editor.attempt(lambda: set_picture_opacity(self.editor, round(opacity, 2)))
 
@@ -395,26 +396,26 @@ class Panel(SidePanel):
             if not problems:
                 is_measured = self.editor.measurement is not None
                 text = "Nothing is wrong with the map." if is_measured else "Checking the map …"
-                ui.words(text, color=ui.theme.faint)
+                ui.paragraph(text, color=ui.theme.faint)
             for number, problem in enumerate(problems[:MAX_PROBLEMS]):
                 is_fixed = self._draw_problem(ui, number, problem)
                 if is_fixed:
                     # The remaining problems are those of the map before.
                     return
             if len(problems) > MAX_PROBLEMS:
-                ui.words(f"… and {len(problems) - MAX_PROBLEMS} more", color=ui.theme.faint)
+                ui.paragraph(f"… and {len(problems) - MAX_PROBLEMS} more", color=ui.theme.faint)
 
     def _draw_problem(self, ui: Ui, number: int, problem: Problem) -> bool:
         """Draw a problem; return whether its fix has been applied."""
         editor = self.editor
         fix = FIXES.get(problem.kind)
-        text_width = ui.wide - 44 - (66 if fix else 0)
-        lines = wrapped(problem.message, ui.px(TEXT), ui.px(text_width))
+        text_width = ui.width - 44 - (66 if fix else 0)
+        lines = wrap_text(problem.message, ui.px(TEXT_PX), ui.px(text_width))
         columns = (20, 0, 54) if fix else (20, 0)
-        ui.row(*columns, height=(TEXT + 5) * len(lines) + 8, below=2)
+        ui.row(*columns, height=(TEXT_PX + 5) * len(lines) + 8, below=2)
         badge = ui.cell()
         if ui.surface is not None:
-            canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
+            canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
             draw_badge(canvas, badge.centerx, badge.top + ui.px(13), is_error=problem.is_error)
         if ui.option("\n".join(lines), key=f"problem:{number}", chosen=problem is editor.problem):
             editor.problem = problem

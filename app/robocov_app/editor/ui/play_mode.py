@@ -14,7 +14,7 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
-from robocov_app.toolkit.input import key_of
+from robocov_app.toolkit.input import get_key_name
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.file_actions import FileActions
 from robocov_app.viewer.presenter import Presenter
@@ -89,21 +89,21 @@ class PlayWindow(ViewerWindow):
         self.held: int | None = None
         super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
 
-    def take(self, event: pygame.event.Event) -> None:
+    def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event; F5 leads back."""
         is_released = event.type == pygame.KEYUP and event.key == self.held
         if event.type == pygame.WINDOWFOCUSLOST or is_released:
             self.held = None
         if event.type == pygame.KEYDOWN and event.key == self.held:
             return
-        if event.type == pygame.KEYDOWN and key_of(event) == "f5":
+        if event.type == pygame.KEYDOWN and get_key_name(event) == "f5":
             self.ended = True
         else:
-            super().take(event)
+            super().handle_event(event)
 
     def do(self, name: str) -> None:
         """Run a command; Escape leads back where it would do nothing."""
-        is_open = self.is_help_open or self.dialogs.open or self.lesson.player is not None
+        is_open = self.is_help_open or self.dialogs.is_open or self.lesson.player is not None
         viewer = self.viewer
         hand = viewer.toolbox.hand
         is_idle = not is_open and viewer.tool is hand and viewer.selected_robot is None

@@ -11,7 +11,7 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Snap
 from robocov_app.editor.tools.tool import PointerEvent
-from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, wheel_notches
+from robocov_app.toolkit.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX, ZOOM_PER_NOTCH, get_wheel_notches
 
 BUTTONS = (1, 2, 3)  # left, middle, right
 _NEVER_S = -1.0
@@ -108,8 +108,8 @@ class Pointer:
 
     def _press_tool(self, event: pygame.event.Event) -> None:
         editor = self.editor
-        max_slip = SLIP * self.canvas.layout.scale
-        is_quick = editor.now - self._last_click_s < DOUBLE
+        max_slip = MAX_CLICK_MOVE_PX * self.canvas.layout.scale
+        is_quick = editor.now - self._last_click_s < DOUBLE_CLICK_S
         is_double = is_quick and dist(self._last_click_at, event.pos) < max_slip
         # The third of three quick clicks is a single click again.
         self._last_click_s = _NEVER_S if is_double else editor.now
@@ -130,7 +130,7 @@ class Pointer:
         canvas.hovered = None
         if is_over_map and not self.is_busy:
             canvas.hovered = canvas.find_problem(event.pos)
-        if self.is_busy and dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale:
+        if self.is_busy and dist(event.pos, self._pressed_at) >= MAX_CLICK_MOVE_PX * canvas.layout.scale:
             self._has_moved = True
         if self.gesture is Gesture.PAN:
             if self._has_moved:
@@ -169,7 +169,7 @@ class Pointer:
     def turn_wheel(self, event: pygame.event.Event, pixel: tuple[int, int]) -> None:
         """Zoom about a pixel by the notches of the wheel."""
         if self.canvas.contains(pixel):
-            self.canvas.zoom(WHEEL ** wheel_notches(event), pixel)
+            self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), pixel)
 
     def _build_event(self, pixel: tuple[int, int]) -> PointerEvent:
         """Return the pointer at a pixel, snapped unless the tool or Ctrl prevents it."""

@@ -3,7 +3,7 @@
 import pygame
 
 from robocov_app.editor.editor import Editor
-from robocov_app.toolkit.input import key_of
+from robocov_app.toolkit.input import get_key_name
 
 MAX_TYPED_CHARACTERS = 40
 _VALUE_CHARACTERS = frozenset("0123456789.,-+@<*/%°×x; ")
@@ -18,7 +18,7 @@ def type_for_tool(editor: Editor, event: pygame.event.Event) -> bool:
     if not _accepts_text(editor) or event.mod & _COMMAND_MODIFIERS:
         return False
     text = editor.typed
-    key = key_of(event)
+    key = get_key_name(event)
     if text and key in ("return", "enter"):
         editor.typed = ""
         editor.attempt(lambda: editor.tool.enter_text(editor, text))

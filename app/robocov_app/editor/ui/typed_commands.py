@@ -12,7 +12,7 @@ from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import parse_angle, parse_length, parse_point, parse_size
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import Edit
-from robocov_app.toolkit.command import Command, Takes
+from robocov_app.toolkit.command import Argument, Command
 
 MIN_SNAP_ANGLE_DEG = 0.1
 MAX_SNAP_ANGLE_DEG = 90.0
@@ -44,8 +44,8 @@ def list_typed_commands(editor: Editor) -> list[Command]:
     commands = []
     for typed in TYPED_COMMANDS.values():
         run = partial(_carry_out, editor, typed.word)
-        takes = Takes(typed.help)
-        commands.append(Command(typed.word, f"{typed.word} {typed.help}", "", run, takes=takes))
+        takes = Argument(typed.help)
+        commands.append(Command(typed.word, f"{typed.word} {typed.help}", "", run, argument=takes))
     return commands
 
 

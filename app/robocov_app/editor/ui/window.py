@@ -21,11 +21,14 @@ from robocov_app.editor.ui.pointer import Pointer
 from robocov_app.editor.ui.tool_text import type_for_tool
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
-from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
+from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.display import set_title
-from robocov_app.toolkit.input import OF_THE_MOUSE, show_cursor
-from robocov_app.toolkit.layout import laid_out
+from robocov_app.toolkit.help_page import draw_help_page
+from robocov_app.toolkit.input import MOUSE_EVENTS
+from robocov_app.toolkit.layout import build_layout
+from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
+from robocov_app.toolkit.palette import create_palette
 from robocov_app.toolkit.window import BaseWindow
 
 _CURSORS = {
@@ -64,7 +67,7 @@ class EditorWindow(BaseWindow):
         The view of the map.
     documents : FileCommands
         Commands on files.
-    commands : Commands
+    commands : CommandTable
         All commands.
     panel : Panel
         The panel.
@@ -92,7 +95,7 @@ class EditorWindow(BaseWindow):
         self.dialogs = editor.dialogs
         self.pointer = Pointer(editor, self.canvas, self.open_menu)
         commands = list_commands(editor, self.canvas, self.documents, self._list_actions())
-        self.commands = Commands(commands, self._attempt, lambda: list_typed_commands(editor))
+        self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
         self.panel = Panel(editor, self.commands, self.do, self._show_problem)
         self.team_sampler = TeamSampler()
         self._trial_drafts: TrialDrafts | None = None
@@ -117,7 +120,7 @@ class EditorWindow(BaseWindow):
             open_palette=self._open_palette,
         )
 
-    def save_point(self) -> Callable[[], None]:
+    def create_save_point(self) -> Callable[[], None]:
         """Return a function that takes back all changes since now."""
         editor = self.editor
         document = editor.document
@@ -145,7 +148,7 @@ class EditorWindow(BaseWindow):
         editor = self.editor
         if in_drawing:
             self.help = False
-            editor.dialogs.drop()
+            editor.dialogs.discard()
             editor.problem = None
             self.canvas.fit()
         editor.show_message(message, is_error=True)
@@ -160,13 +163,13 @@ class EditorWindow(BaseWindow):
         self.dialogs.close()
         self.editor.snapper.close()
 
-    def look(self) -> object:
+    def get_visible_state(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
         editor = self.editor
         canvas = self.canvas
-        dialog = editor.dialogs.asked
+        dialog = editor.dialogs.current
         is_importing = isinstance(dialog, ImportDialog) and dialog.busy
-        if self.panel.ui.stale or editor.moves_since is not None or is_importing:
+        if self.panel.ui.needs_redraw or editor.moves_since is not None or is_importing:
             return None
         return (
             editor.revision,
@@ -192,7 +195,7 @@ class EditorWindow(BaseWindow):
             pygame.display.get_caption(),
         )
 
-    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
+    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
         """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
         self.scale = scale
         self.editor.theme = theme
@@ -200,7 +203,7 @@ class EditorWindow(BaseWindow):
             self.editor.panel = panel
         self.editor.revision += 1
         if self.trial is not None:
-            self.trial.suit(scale, theme, panel=panel)
+            self.trial.set_appearance(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
         """Let seconds pass: poll files and workers, and adapt layout, cursor and title."""
@@ -222,9 +225,9 @@ class EditorWindow(BaseWindow):
             self.closed = True
             return
         self._arrange()
-        self.panel.covered = self.dialogs.open
+        self.panel.is_covered = self.dialogs.is_open
         self.panel.update()
-        show_cursor(_CURSORS[self._choose_cursor()])
+        self.cursor.show(_CURSORS[self._choose_cursor()])
         unsaved_mark = "● " if editor.document.history.has_unsaved_changes else ""
         set_title(f"{unsaved_mark}{editor.document.title} · robocov edit")
 
@@ -255,7 +258,7 @@ class EditorWindow(BaseWindow):
             return
         self._arranged = key
         self.theme = get_theme(editor.theme)
-        self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
+        self.layout = build_layout(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 
@@ -265,14 +268,16 @@ class EditorWindow(BaseWindow):
         theme = self.theme
         editor = self.editor
         self.canvas.draw(self.screen)
-        status = list_status(editor, self.rate, self.canvas.team)
-        draw_status(self.screen, layout.status, theme, layout.scale, status, STATUS_HINT)
+        status = list_status(editor, self.frame_rate, self.canvas.team)
+        draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
         _, _, panel_width, _ = layout.panel
         if panel_width:
             self.panel.draw(self.screen)
-        draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, editor.has_error_message)
+        is_error = editor.has_error_message
+        draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
         if self.help:
-            draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, KEYS_HINT)
+            commands = self.commands.commands
+            draw_help_page(self.screen, theme, layout.scale, commands, groups=GROUPS, hint=KEYS_HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
         self.show_screen()
 
@@ -281,7 +286,7 @@ class EditorWindow(BaseWindow):
         if name == "cancel" and self.help:
             self.help = False
         else:
-            self.commands.do(name)
+            self.commands.run(name)
 
     def _attempt(self, action: Callable[[], object]) -> None:
         problem = self.editor.problem
@@ -296,7 +301,7 @@ class EditorWindow(BaseWindow):
         self.help = not self.help
 
     def _open_palette(self) -> None:
-        self.dialogs.ask(palette(self.commands, PALETTE_HINT, self.editor.show_message))
+        self.dialogs.ask(create_palette(self.commands, PALETTE_HINT, self.editor.show_message))
 
     def _edit_name(self) -> None:
         """Put the text cursor into the name of the selected object, or of the map."""
@@ -324,14 +329,15 @@ class EditorWindow(BaseWindow):
             # A drag ends, but what is half drawn stays.
             self.editor.selector.cancel(self.editor)
         trial = start_trial(self.editor, self.screen, self.scale, patient=self._patient)
-        trial.windowed = self.windowed
+        trial.windowed_size = self.windowed_size
+        trial.cursor = self.cursor
         self._trial_drafts = TrialDrafts(self.editor.document, trial.viewer.files.tried)
         self.trial = trial
         self.inner = trial
 
     def _update_trial(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen = self.screen
-        trial.rate = self.rate
+        trial.frame_rate = self.frame_rate
         if not trial.ended and not trial.closed:
             trial.update(seconds)
         if trial.ended or trial.closed:
@@ -347,7 +353,7 @@ class EditorWindow(BaseWindow):
         self.inner = None
         self._trial_drafts = None
         self.adopt_display()
-        self.windowed = trial.windowed
+        self.windowed_size = trial.windowed_size
         editor = self.editor
         viewer = trial.viewer
         editor.theme = viewer.view.theme
@@ -357,9 +363,9 @@ class EditorWindow(BaseWindow):
         editor.document.update_draft()
         # A key that is still held down repeats, and must not start the next trial.
         if pygame.key.get_pressed()[pygame.K_F5]:
-            self.commands.forget_keys(pygame.K_F5)
+            self.commands.reset_keys(pygame.K_F5)
         else:
-            self.commands.forget_keys()
+            self.commands.reset_keys()
         self._arrange()
         editor.revision += 1
         if trial.ended:
@@ -372,31 +378,31 @@ class EditorWindow(BaseWindow):
         if self._trial_drafts is not None and not viewer.files.has_left_tried_map:
             self._trial_drafts.update(viewer.session.displayed.environment, at_once=at_once)
 
-    def take(self, event: pygame.event.Event) -> None:
+    def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event: by the dialog, else by keys, mouse or panel."""
         kind = event.type
         if kind == pygame.KEYUP:
-            self.commands.release(event)
+            self.commands.release_key(event)
             if event.key == pygame.K_SPACE:
                 self.pointer.pans_with_left = False
         elif kind == pygame.WINDOWFOCUSLOST:
-            self.commands.forget_keys()
+            self.commands.reset_keys()
             self.pointer.pans_with_left = False
         elif kind == pygame.KEYDOWN and event.key == pygame.K_F12:
             self.do("screenshot")
             return
-        if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
+        if kind in MOUSE_EVENTS and kind != pygame.MOUSEWHEEL:
             self.at = event.pos
         if kind == pygame.QUIT:
             self._take_quit()
-        elif not self.dialogs.take(event):
+        elif not self.dialogs.handle_event(event):
             self._take_without_dialog(event)
 
     def _take_quit(self) -> None:
         """Quit, unless a question is open; dialogs that hold nothing back are closed."""
-        if isinstance(self.editor.dialogs.asked, ImportDialog | Menu):
+        if isinstance(self.editor.dialogs.current, ImportDialog | Menu):
             self.dialogs.close()
-        if not self.dialogs.open:
+        if not self.dialogs.is_open:
             self.do("quit")
 
     def _take_without_dialog(self, event: pygame.event.Event) -> None:
@@ -407,28 +413,28 @@ class EditorWindow(BaseWindow):
             self._take_key(event)
         elif kind == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
-        elif kind in OF_THE_MOUSE:
+        elif kind in MOUSE_EVENTS:
             self._take_mouse(event)
         elif kind == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
-            self.panel.take(event)
+            self.panel.handle_event(event)
 
     def _take_key(self, event: pygame.event.Event) -> None:
         """Handle a key: it is for a field of the panel, a value for the tool, or a command."""
-        is_taken = self.panel.take(event)
-        if not is_taken and not self.panel.ui.busy:
+        is_taken = self.panel.handle_event(event)
+        if not is_taken and not self.panel.ui.is_busy:
             is_taken = type_for_tool(self.editor, event)
         if not is_taken:
-            command = self.commands.of_key(event)
+            command = self.commands.press_key(event)
             if command is not None:
                 self.do(command.name)
         if self.trial is not None:
             self.trial.held = event.key
-        self.dialogs.swallow(event.unicode)
+        self.dialogs.ignore_letter(event.unicode)
 
     def _take_mouse(self, event: pygame.event.Event) -> None:
-        is_taken = not self.pointer.is_busy and self.panel.take(event)
+        is_taken = not self.pointer.is_busy and self.panel.handle_event(event)
         if event.type == pygame.MOUSEMOTION:
             self.pointer.move(event)
         elif event.type == pygame.MOUSEBUTTONUP:

@@ -1,0 +1,209 @@
+"""Lists from which one chooses by typing."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from pygame import Rect
+
+from robocov.errors import InputError, RobocovError
+from robocov_app.toolkit.dialogs.dialog import Dialog
+from robocov_app.toolkit.input import ENTER_KEYS
+from robocov_app.toolkit.text_edit import TextEdit
+from robocov_app.toolkit.ui import Ui
+
+VISIBLE_OPTIONS = 9
+_TOP_PX = 64
+"""Distance from the upper edge of the window at scale 1."""
+_FIELD = "text"
+_KEY_STEPS = {"up": -1, "down": 1, "page up": -VISIBLE_OPTIONS, "page down": VISIBLE_OPTIONS}
+
+
+@dataclass(frozen=True)
+class Option:
+    """A line of a list.
+
+    Attributes
+    ----------
+    text : str
+    note : str
+        Faint text at its right end.
+    completion : str
+        Text that Tab types; empty for `text`.
+    disabled_reason : str
+        Why it cannot be chosen; empty if it can.
+    value : object
+        Anything that the function needs which accepts it.
+    """
+
+    text: str
+    note: str = ""
+    completion: str = ""
+    disabled_reason: str = ""
+    value: object = None
+
+
+@dataclass
+class Choice(Dialog):
+    """A list that typing narrows down.
+
+    Attributes
+    ----------
+    title : str
+    options : callable
+        Returns the lines for a typed text.
+    accept : callable
+        Accepts the typed text and the chosen line, which is None if there is none. If it returns a text, that
+        is typed instead. If it raises a RobocovError, the message is shown, and the typed text stays.
+    placeholder : str
+        Faint text in the empty field.
+    hint : str
+        Keys, shown below the list.
+    empty_text : str
+        Shown if there are no lines.
+    text : str
+        Typed text.
+    chosen : int
+        Number of the chosen line.
+    top : int
+        Number of the first visible line.
+    error : str
+        Why the text was not accepted.
+    """
+
+    width = 620.0
+    closes_on_outside_click = True
+
+    title: str
+    options: Callable[[str], Sequence[Option]]
+    accept: Callable[[str, Option | None], object]
+    placeholder: str = ""
+    hint: str = "↑ ↓ choose · Enter does it · Esc closes"
+    empty_text: str = "nothing of that name"
+    text: str = ""
+    chosen: int = 0
+    top: int = 0
+    error: str = ""
+
+    def show_content(self, ui: Ui) -> None:
+        """Show the field and the list."""
+        ui.paragraph(self.title, color=ui.theme.faint, bold=True)
+        if ui.edit is None or ui.focus != _FIELD:
+            ui.focus = _FIELD
+            ui.edit = TextEdit.append_to(self.text)
+        ui.row(height=32, below=8)
+        ui.text_field(_FIELD, self.text, placeholder=self.placeholder)
+        self.read_widgets(ui)
+        ui.paragraph(self.error, color=ui.theme.trajectory, bold=True)
+        options = list(self.options(self.text))
+        self.chosen = min(self.chosen, max(len(options) - 1, 0))
+        self._show_options(ui, options)
+        ui.row(height=22, below=0)
+        count = f"{len(options)} in all · " if len(options) > VISIBLE_OPTIONS else ""
+        ui.label(count + self.hint, style="unit", align="center")
+
+    def _show_options(self, ui: Ui, options: Sequence[Option]) -> None:
+        ui.row(height=26, below=1)
+        if not options:
+            ui.label(self.empty_text, style="unit")
+        for number in range(self.top, min(self.top + VISIBLE_OPTIONS, len(options))):
+            option = options[number]
+            is_clicked = ui.option(
+                option.text,
+                option.note,
+                key=f"option:{number}",
+                chosen=number == self.chosen,
+                disabled_reason=option.disabled_reason,
+            )
+            if is_clicked:
+                self._accept(option, ui)
+
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        """Move the box to the upper part of the screen, where it stays while the list grows."""
+        box.midtop = screen.width // 2, round(_TOP_PX * scale)
+
+    def read_widgets(self, ui: Ui) -> None:
+        """Read what was typed, also if more events come within the same frame."""
+        if ui.focus == _FIELD and ui.edit is not None and ui.edit.text != self.text:
+            self._set_text(ui.edit.text)
+
+    def _set_text(self, text: str) -> None:
+        self.text = text
+        self.chosen = 0
+        self.top = 0
+        self.error = ""
+
+    def _accept(self, option: Option | None, ui: Ui) -> None:
+        try:
+            text = self.accept(self.text, option)
+        except RobocovError as error:
+            self.error = str(error)
+            return
+        if isinstance(text, str):
+            self._complete(text, ui)
+        else:
+            self.is_done = True
+
+    def _complete(self, text: str, ui: Ui) -> None:
+        self._set_text(text)
+        ui.edit = TextEdit.append_to(text)
+
+    def handle_key(self, name: str, ui: Ui) -> bool:
+        """Choose, complete or accept a line."""
+        options = list(self.options(self.text))
+        option = options[self.chosen] if self.chosen < len(options) else None
+        if name in _KEY_STEPS:
+            self._move(_KEY_STEPS[name])
+        elif name == "tab":
+            if option is not None:
+                self._complete(option.completion or option.text, ui)
+        elif name in ENTER_KEYS:
+            self._accept(option, ui)
+        else:
+            return False
+        return True
+
+    def handle_wheel(self, notches: float) -> bool:
+        """Choose another line."""
+        self._move(-round(notches))
+        return True
+
+    def _move(self, step: int) -> None:
+        """Choose another line, and scroll it into sight."""
+        last = max(len(self.options(self.text)) - 1, 0)
+        self.chosen = min(max(self.chosen + step, 0), last)
+        self.top = min(max(self.top, self.chosen - VISIBLE_OPTIONS + 1), self.chosen)
+
+
+def create_list_choice(
+    title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object]
+) -> Choice:
+    """Create a choice among given lines.
+
+    Parameters
+    ----------
+    title : str
+    options : callable
+        Returns the lines. A typed text selects those that contain all of its words.
+    accept : callable
+        Accepts the chosen line.
+
+    Returns
+    -------
+    Choice
+    """
+
+    def find_options(text: str) -> list[Option]:
+        words = text.lower().split()
+        matches = []
+        for option in options():
+            line = f"{option.text} {option.note}".lower()
+            if all(word in line for word in words):
+                matches.append(option)
+        return matches
+
+    def accept_option(text: str, option: Option | None) -> None:
+        if option is None:
+            raise InputError(f"expected one of the list, got {text!r}")
+        accept(option)
+
+    return Choice(title, find_options, accept_option, placeholder="type to find")

@@ -1,0 +1,61 @@
+"""What all dialogs have in common."""
+
+from pygame import Rect
+
+from robocov_app.toolkit.ui import Ui
+
+_HEIGHT_FRACTION = 0.42
+"""Fraction of the free height that is above a dialog."""
+
+
+class Dialog:
+    """A card over the window that gets all events while it is open.
+
+    Attributes
+    ----------
+    width : float
+        Width at scale 1, px.
+    margin : tuple of float
+        Space at the sides, and above and below, at scale 1, px.
+    has_veil : bool
+        Whether the rest of the window fades.
+    closes_on_outside_click : bool
+        Whether a click next to the dialog cancels it.
+    is_done : bool
+        Whether it has been answered, and closes.
+    """
+
+    width = 560.0
+    margin = 20.0, 16.0
+    has_veil = True
+    closes_on_outside_click = False
+    is_done = False
+
+    def show_content(self, ui: Ui) -> None:
+        """Show and edit what is in the dialog."""
+
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        """Move the box of the dialog to its place on the screen."""
+        top = round((screen.height - box.height) * _HEIGHT_FRACTION)
+        box.midtop = screen.width // 2, max(top, 0)
+
+    def show_with_margin(self, ui: Ui) -> None:
+        """Show the content with a margin around it."""
+        side, above = self.margin
+        ui.inset(side, above, side)
+        self.show_content(ui)
+        ui.space(above)
+
+    def handle_key(self, name: str, ui: Ui) -> bool:
+        """Handle a key; return whether it meant something. Otherwise, the focused widget gets it."""
+        return False
+
+    def handle_wheel(self, notches: float) -> bool:
+        """Handle the wheel; return whether it meant something. Otherwise, the widgets get it."""
+        return False
+
+    def read_widgets(self, ui: Ui) -> None:
+        """Read what an event has changed in the widgets."""
+
+    def handle_cancel(self) -> None:
+        """Do what is to be done if the dialog was canceled."""

@@ -1,0 +1,146 @@
+"""The dialog that is open: it gets the events, and is drawn over the window."""
+
+from contextlib import suppress
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.theme import LIGHT, Theme
+from robocov_app.toolkit.dialogs.dialog import Dialog
+from robocov_app.toolkit.input import MOUSE_EVENTS, get_key_name, get_wheel_notches
+from robocov_app.toolkit.overlay import draw_card, draw_veil
+from robocov_app.toolkit.ui import Ui
+
+_WINDOW_EVENTS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
+"""Events that the window gets, too, while a dialog is open."""
+_INITIAL_HEIGHT_PX = 100
+_SCREEN_MARGIN_PX = 24
+
+
+class Dialogs:
+    """Shows one dialog at a time, and passes events to it.
+
+    Attributes
+    ----------
+    current : Dialog or None
+        The dialog that is open.
+    ui : Ui or None
+        Its page, once it has been drawn or has got an event.
+    """
+
+    def __init__(self) -> None:
+        self.current: Dialog | None = None
+        self.ui: Ui | None = None
+        self._ignored_letter = ""
+        self._is_drawn = False
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a dialog is open."""
+        return self.current is not None
+
+    def ask(self, dialog: Dialog) -> None:
+        """Open a dialog in place of the present one."""
+        self.current = dialog
+        self.ui = None
+        self._ignored_letter = ""
+        self._is_drawn = False
+
+    def ignore_letter(self, letter: str) -> None:
+        """Ignore the text event of the key that has opened the dialog."""
+        self._ignored_letter = letter if self.is_open else ""
+
+    def close(self) -> None:
+        """Cancel the dialog."""
+        dialog = self.current
+        self.current = None
+        if dialog is not None:
+            dialog.handle_cancel()
+
+    def discard(self) -> None:
+        """Remove a dialog that cannot be drawn, even if canceling it raises."""
+        with suppress(Exception):
+            self.close()
+        self.current = None
+
+    def handle_event(self, event: pygame.event.Event) -> bool:
+        """Pass an event to the dialog.
+
+        Returns
+        -------
+        bool
+            Whether the event was for the dialog alone.
+        """
+        dialog = self.current
+        if dialog is None:
+            return False
+        if event.type == pygame.DROPFILE and not dialog.has_veil:
+            self.close()
+            return False
+        if event.type in MOUSE_EVENTS and not self._is_drawn:
+            return True
+        # Keys may come before the dialog is drawn for the first time.
+        ui = self.ui or self._create_ui(dialog, LIGHT, 1.0)
+        ui.needs_redraw = True
+        self._pass_event(event, dialog, ui)
+        dialog.read_widgets(ui)
+        if dialog.is_done and self.current is dialog:
+            self.current = None
+        return event.type not in _WINDOW_EVENTS
+
+    def _pass_event(self, event: pygame.event.Event, dialog: Dialog, ui: Ui) -> None:
+        if event.type == pygame.TEXTINPUT:
+            ignored = self._ignored_letter
+            self._ignored_letter = ""
+            if not ignored or event.text != ignored:
+                ui.handle_event(event)
+        elif event.type == pygame.KEYDOWN:
+            self._handle_key(event, dialog, ui)
+        elif event.type == pygame.MOUSEWHEEL:
+            if not dialog.handle_wheel(get_wheel_notches(event)):
+                ui.handle_event(event)
+        elif event.type == pygame.MOUSEBUTTONDOWN and not ui.box.collidepoint(event.pos):
+            if dialog.closes_on_outside_click:
+                self.close()
+        else:
+            ui.handle_event(event)
+
+    def _handle_key(self, event: pygame.event.Event, dialog: Dialog, ui: Ui) -> None:
+        name = get_key_name(event)
+        self._ignored_letter = ""
+        is_composing = ui.edit is not None and bool(ui.edit.composed)
+        if name == "escape" and not is_composing:
+            self.close()
+        elif is_composing or not dialog.handle_key(name, ui):
+            ui.handle_event(event)
+        if self.current is not dialog:
+            # The answer has opened another dialog, for which the letter of this key is not meant.
+            self.ignore_letter(event.unicode)
+
+    def _create_ui(self, dialog: Dialog, theme: Theme, scale: float) -> Ui:
+        self.ui = Ui(dialog.show_with_margin, theme, scale)
+        self.ui.background = None
+        self.ui.box = Rect(0, 0, round(dialog.width * scale), _INITIAL_HEIGHT_PX)
+        self.ui.run()
+        return self.ui
+
+    def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
+        """Draw the dialog that is open, if there is one."""
+        dialog = self.current
+        if dialog is None:
+            return
+        self._is_drawn = True
+        ui = self.ui
+        if ui is None or ui.theme is not theme or ui.scale != scale:
+            ui = self._create_ui(dialog, theme, scale)
+        if dialog.has_veil:
+            draw_veil(screen, theme)
+        width = min(dialog.width * scale, screen.get_width() - _SCREEN_MARGIN_PX * scale)
+        for _ in range(2):  # The height is known only after the content has run.
+            ui.box = Rect(0, 0, round(width), min(round(ui.y * scale), screen.get_height()))
+            dialog.place(ui.box, screen.get_rect(), scale)
+            ui.run()
+        draw_card(screen, ui.box, theme, scale)
+        ui.needs_redraw = True
+        ui.draw(screen)
+        ui.draw_overlays(screen)

@@ -1,0 +1,118 @@
+"""Choosing a file by typing its path."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+from robocov_app.toolkit.dialogs.choice import Choice, Option
+
+MAX_FOLDER_ENTRIES = 5000
+"""Files of a folder that are looked at."""
+_HINT = "↑ ↓ choose · Tab completes · Enter accepts · Esc closes"
+
+
+def create_file_choice(
+    title: str,
+    folder: Path,
+    accept: Callable[[Path], object],
+    *,
+    suffixes: Sequence[str] = (),
+    recent: Sequence[Path] = (),
+    text: str = "",
+) -> Choice:
+    """Create a choice of a file.
+
+    Parameters
+    ----------
+    title : str
+    folder : Path
+        Folder of paths that are not absolute.
+    accept : callable
+        Gets the path.
+    suffixes : sequence of str
+        Suffixes of the files that are listed; by default all are.
+    recent : sequence of Path
+        Files that are listed before anything is typed.
+    text : str
+        Name of a file to be saved; empty to choose a file that exists.
+
+    Returns
+    -------
+    Choice
+    """
+    browser = _FileBrowser(folder, tuple(suffixes), tuple(recent))
+    saves = bool(text)
+
+    def accept_text(typed: str, option: Option | None) -> object:
+        path = browser.resolve(typed.strip())
+        is_new_file = saves and typed.strip() and not typed.endswith("/")
+        if is_new_file:
+            accept(path)
+        elif option is not None and option.text.endswith("/"):
+            return option.completion
+        elif option is not None and isinstance(option.value, Path):
+            accept(option.value)
+        elif typed.strip():
+            accept(path)
+        return None
+
+    return Choice(
+        title,
+        browser.list_options,
+        accept_text,
+        placeholder=f"a path from {folder.absolute()}",
+        hint=_HINT,
+        empty_text="Enter saves it there" if saves else Choice.empty_text,
+        text=text,
+    )
+
+
+@dataclass
+class _FileBrowser:
+    """Lists files and folders for typed paths."""
+
+    folder: Path
+    suffixes: tuple[str, ...]
+    recent: tuple[Path, ...]
+    _options: dict[str, list[Option]] = field(default_factory=dict)
+
+    def resolve(self, text: str) -> Path:
+        # Unlike Path.expanduser, this does not raise if there is no such user.
+        return self.folder / os.path.expanduser(text)  # noqa: PTH111
+
+    def list_options(self, text: str) -> list[Option]:
+        """List what a typed path may become; a folder is read once while the dialog is open."""
+        if text not in self._options:
+            self._options[text] = self._build_options(text)
+        return self._options[text]
+
+    def _build_options(self, text: str) -> list[Option]:
+        name = text.rpartition("/")[2]
+        prefix = text.removesuffix(name)
+        folder = self.resolve(prefix)
+        try:
+            entries = [(not path.is_dir(), path) for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES)]
+        except (OSError, ValueError):
+            return []
+        options = []
+        if not text:
+            options += [Option(str(path), "recent", str(path), value=path) for path in self.recent]
+        for is_file, path in sorted(entries, key=lambda entry: (entry[0], entry[1].name.lower())):
+            if not self._is_listed(path, name, is_file=is_file):
+                continue
+            if is_file:
+                options.append(Option(path.name, completion=prefix + path.name, value=path))
+            else:
+                options.append(Option(f"{path.name}/", "folder", f"{prefix}{path.name}/", value=path))
+        if not name:
+            parent = folder.resolve().parent.as_posix().rstrip("/")
+            options.append(Option("../", "folder", f"{parent}/"))
+        return options
+
+    def _is_listed(self, path: Path, name: str, *, is_file: bool) -> bool:
+        """Return whether a file or folder is listed for the name that was typed."""
+        is_hidden = path.name.startswith(".") and not name.startswith(".")
+        has_suffix = not is_file or not self.suffixes or path.suffix.lower() in self.suffixes
+        return has_suffix and not is_hidden and name.lower() in path.name.lower()

@@ -1,0 +1,109 @@
+"""Questions with a few answers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from robocov_app.render.fonts import text_width
+from robocov_app.toolkit.dialogs.dialog import Dialog
+from robocov_app.toolkit.input import ENTER_KEYS
+from robocov_app.toolkit.overlay import wrap_text
+from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.appearance import TEXT_PX
+
+MAX_LINES = 14
+"""Lines of the text that are shown."""
+
+# Lengths in pixels at scale 1.
+_TITLE_PX = 16
+_TEXT_PX = TEXT_PX + 1
+_BUTTON_GAP_PX = 8
+
+_KEY_STEPS = {"left": -1, "shift+tab": -1, "right": 1, "tab": 1}
+
+
+def _do_nothing() -> None:
+    pass
+
+
+@dataclass
+class Answer:
+    """An answer to a question, shown as button.
+
+    Attributes
+    ----------
+    text : str
+    call : callable
+        Called if this answer is given.
+    key : str
+        Key that gives it, besides Enter while it is chosen.
+    """
+
+    text: str
+    call: Callable[[], object] = _do_nothing
+    key: str = ""
+
+
+@dataclass
+class Question(Dialog):
+    """A question with answers as buttons.
+
+    Attributes
+    ----------
+    title : str
+    text : str
+        May have several lines.
+    answers : sequence of Answer
+    on_cancel : callable
+        Called if the question is not answered.
+    chosen : int
+        Number of the answer that Enter gives.
+    """
+
+    title: str
+    text: str
+    answers: Sequence[Answer]
+    on_cancel: Callable[[], object] = _do_nothing
+    chosen: int = 0
+
+    def show_content(self, ui: Ui) -> None:
+        """Show the title, the text and the answers."""
+        ui.paragraph(self.title, size=_TITLE_PX, bold=True)
+        ui.space(6)
+        self._show_text(ui)
+        ui.space(12)
+        widths = [text_width(answer.text, ui.px(TEXT_PX), True) / ui.scale + 36 for answer in self.answers]
+        free_width = max(ui.width - sum(widths) - _BUTTON_GAP_PX * len(widths), 1.0)
+        ui.row(free_width, *widths, height=30, gap=_BUTTON_GAP_PX, below=0)
+        ui.cell()
+        for number, answer in enumerate(self.answers):
+            tip = f"Key {answer.key.upper()}" if answer.key else ""
+            if ui.button(answer.text, key=f"answer:{number}", chosen=number == self.chosen, tip=tip):
+                self._give(answer)
+
+    def _show_text(self, ui: Ui) -> None:
+        lines: list[str] = []
+        for paragraph in self.text.split("\n"):
+            lines += wrap_text(paragraph, ui.px(_TEXT_PX), ui.px(ui.width)) or [""]
+        for line in lines[:MAX_LINES]:
+            ui.paragraph(line, size=_TEXT_PX)
+        if len(lines) > MAX_LINES:
+            more = f"… and {len(lines) - MAX_LINES} lines more"
+            ui.paragraph(more, size=_TEXT_PX, color=ui.theme.faint)
+
+    def _give(self, answer: Answer) -> None:
+        self.is_done = True
+        answer.call()
+
+    def handle_key(self, name: str, ui: Ui) -> bool:
+        """Choose or give an answer."""
+        self.chosen = (self.chosen + _KEY_STEPS.get(name, 0)) % len(self.answers)
+        given = next((answer for answer in self.answers if answer.key == name), None)
+        if name in ENTER_KEYS:
+            given = self.answers[self.chosen]
+        if given is not None:
+            self._give(given)
+        return True
+
+    def handle_cancel(self) -> None:
+        """Call `on_cancel`."""
+        self.on_cancel()

@@ -1,0 +1,82 @@
+"""Tool tips: texts on widgets over which the mouse rests."""
+
+from time import perf_counter
+
+from pygame import Rect, Surface
+
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.theme import LIGHT, Theme
+from robocov_app.render.fonts import label, text_width
+from robocov_app.toolkit.overlay import draw_rounded_box, wrap_text
+
+TIP_DELAY_S = 0.6
+"""Time for which the mouse rests before a tool tip appears."""
+
+_TEXT_COLOR: Color = (245, 247, 250)
+# Lengths in pixels at scale 1.
+_TEXT_PX = 11.0
+_LINE_PX = 16.0
+_MAX_WIDTH_PX = 240.0
+_DISTANCE_PX = 5.0
+
+
+class ToolTip:
+    """Decides when the tip of a widget is due, and draws it."""
+
+    def __init__(self) -> None:
+        self._hovered = ""
+        self._rested_since_s = perf_counter()
+
+    def restart(self) -> None:
+        """Start waiting again, because a button or key was pressed."""
+        self._rested_since_s = perf_counter()
+
+    def note_hovered(self, widget: str) -> bool:
+        """Note the widget under the mouse, and return whether it is another one than before.
+
+        Parameters
+        ----------
+        widget : str
+            Kind and key of the widget; empty if there is none.
+        """
+        if widget == self._hovered:
+            return False
+        self._hovered = widget
+        self.restart()
+        return True
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the mouse has rested long enough."""
+        return perf_counter() - self._rested_since_s >= TIP_DELAY_S
+
+
+def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: int, widget: Rect) -> None:
+    """Draw a tool tip below a widget, or above it if there is no space below.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    text : str
+    theme : Theme
+    scale : float
+        Size of texts and margins.
+    x : int
+        Left end of the tip, px.
+    widget : pygame.Rect
+        Place of the widget.
+    """
+    size = round(_TEXT_PX * scale)
+    line_height = round(_LINE_PX * scale)
+    lines = wrap_text(text, size, round(_MAX_WIDTH_PX * scale))
+    width = max(text_width(line, size) for line in lines) + round(14 * scale)
+    box = Rect(0, 0, width, line_height * len(lines) + round(9 * scale))
+    box.topleft = x, widget.bottom + round(_DISTANCE_PX * scale)
+    if box.bottom > screen.get_height():
+        box.bottom = widget.top - round(_DISTANCE_PX * scale)
+    box.clamp_ip(screen.get_rect())
+    fill = mix(theme.panel, theme.ink, 0.92 if theme is LIGHT else 0.2)
+    draw_rounded_box(screen, box, fill, edge=mix(theme.panel, theme.ink, 0.24), radius=round(4 * scale))
+    for number, line in enumerate(lines):
+        top = box.top + round(_DISTANCE_PX * scale) + number * line_height
+        screen.blit(label(line, size, _TEXT_COLOR), (box.left + round(7 * scale), top))

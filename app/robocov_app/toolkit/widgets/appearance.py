@@ -1,0 +1,129 @@
+"""What widgets have in common: text sizes, boxes, faces, the focus ring, texts."""
+
+import pygame
+from pygame import Rect
+
+from robocov_app.look.colors import Color, mix
+from robocov_app.render.fonts import label, shortened
+from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_field_color
+from robocov_app.toolkit.page import Page
+
+# Lengths in pixels at scale 1.
+TEXT_PX = 12.0
+"""Size of a widget's text."""
+SMALL_TEXT_PX = 11.0
+"""Size of the text of small buttons, headings and units."""
+CORNER_RADIUS_PX = 4.0
+
+
+def shade(page: Page, fraction: float) -> Color:
+    """Return a color between the panel (0) and its text (1)."""
+    return mix(page.theme.panel, page.theme.ink, fraction)
+
+
+def is_drawn(page: Page, rect: Rect) -> bool:
+    """Return whether something at this place is drawn in this run."""
+    return page.surface is not None and bool(rect.colliderect(page.clip))
+
+
+def draw_box(
+    page: Page,
+    rect: Rect,
+    fill: Color,
+    *,
+    edge: Color | None = None,
+    radius: float = CORNER_RADIUS_PX,
+    width: int = 1,
+) -> None:
+    """Draw a rounded box.
+
+    Parameters
+    ----------
+    page : Page
+    rect : pygame.Rect
+    fill : color
+    edge : color, optional
+        By default that of the filling.
+    radius : float
+        Radius of the corners at scale 1, px.
+    width : int
+        Width of the edge, px.
+    """
+    if page.surface is not None:
+        draw_rounded_box(
+            page.surface, rect, fill, edge=fill if edge is None else edge, radius=page.px(radius), width=width
+        )
+
+
+def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled: bool = True) -> Color:
+    """Draw the face of a button, and return the color of its text."""
+    theme = page.theme
+    is_hovered = page.is_hovered(rect)
+    is_held = page.active == key and bool(rect.collidepoint(page.pointer))
+    if not enabled:
+        fill = theme.panel
+        edge = shade(page, 0.14)
+        ink = shade(page, 0.45)
+    elif chosen:
+        fill = mix(theme.final, theme.ink, _choose_strength(0.15, 0.25, is_hovered, is_held))
+        edge = fill
+        ink = get_accent_ink(theme)
+    else:
+        strength = _choose_strength(0.14, 0.28, is_hovered, is_held)
+        fill = mix(get_field_color(theme), theme.final, strength)
+        edge = theme.final if is_held or is_hovered else shade(page, 0.24)
+        ink = theme.ink
+    draw_box(page, rect, fill, edge=edge, width=max(1, page.px(0.75)))
+    draw_focus_ring(page, rect, key)
+    return ink
+
+
+def _choose_strength(hovered: float, held: float, is_hovered: bool, is_held: bool) -> float:
+    """Return how strongly a face is tinted."""
+    if is_held:
+        return held
+    return hovered if is_hovered else 0.0
+
+
+def draw_focus_ring(page: Page, rect: Rect, key: str) -> None:
+    """Draw a ring around a widget if it has the focus."""
+    if page.surface is not None and page.focus == key:
+        width = max(2, page.px(1.5))
+        radius = page.px(CORNER_RADIUS_PX)
+        pygame.draw.rect(page.surface, page.theme.final, rect, width, border_radius=radius)
+
+
+def draw_text(
+    page: Page,
+    text: str,
+    rect: Rect,
+    color: Color,
+    size: float,
+    *,
+    bold: bool = False,
+    align: str = "left",
+) -> None:
+    """Draw a line of text, cut to the width of a rectangle.
+
+    Parameters
+    ----------
+    page : Page
+    text : str
+    rect : pygame.Rect
+    color : color
+    size : float
+        Height at scale 1, px.
+    bold : bool
+    align : str
+        "left", "center" or "right".
+    """
+    if page.surface is None or not text or not is_drawn(page, rect):
+        return
+    pixels = page.px(size)
+    image = label(shortened(text, pixels, rect.width, bold), pixels, color, bold)
+    place = image.get_rect(midleft=rect.midleft)
+    if align == "center":
+        place = image.get_rect(center=rect.center)
+    elif align == "right":
+        place = image.get_rect(midright=rect.midright)
+    page.surface.blit(image, place)

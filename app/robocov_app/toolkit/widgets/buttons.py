@@ -1,0 +1,221 @@
+"""Buttons, options of a list, areas that can be clicked, tabs and check boxes."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from types import MappingProxyType
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.colors import mix
+from robocov_app.render.fonts import text_width
+from robocov_app.toolkit.overlay import get_accent_ink, get_field_color
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.widgets.appearance import (
+    SMALL_TEXT_PX,
+    TEXT_PX,
+    draw_box,
+    draw_face,
+    draw_focus_ring,
+    draw_text,
+    is_drawn,
+    shade,
+)
+
+# Lengths in pixels at scale 1.
+_MAX_BUTTON_HEIGHT_PX = 32.0
+_LINE_PX = TEXT_PX + 5
+_CHECK_BOX_PX = 16
+_CHECK_TEXT_LEFT_PX = 23
+_TICK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
+"""Corners of the tick, as fractions of the check box."""
+_FINE = 4
+"""Factor by which the tick is drawn larger, and then smoothly reduced."""
+_NO_TITLES: Mapping[str, str] = MappingProxyType({})
+
+
+def show_button(
+    page: Page,
+    text: str,
+    *,
+    key: str = "",
+    tip: str = "",
+    disabled_reason: str = "",
+    chosen: bool = False,
+    small: bool = False,
+) -> bool:
+    """Show a button.
+
+    Parameters
+    ----------
+    page : Page
+    text : str
+    key : str, optional
+        By default the text.
+    tip : str
+        Tool tip.
+    disabled_reason : str
+        Why it cannot be pressed; empty if it can.
+    chosen : bool
+        Whether it is highlighted.
+    small : bool
+        Whether its text is small.
+
+    Returns
+    -------
+    bool
+        Whether it was just pressed.
+    """
+    key = key or text
+    rect = page.cell()
+    rect.height = min(rect.height, page.px(_MAX_BUTTON_HEIGHT_PX))
+    is_clicked = page.add_clickable(Widget("button", key, rect, text, chosen, tip), disabled_reason)
+    if is_drawn(page, rect):
+        ink = draw_face(page, rect, key, chosen=chosen, enabled=not disabled_reason)
+        size = SMALL_TEXT_PX if small else TEXT_PX
+        inner = rect.inflate(-page.px(6), 0)
+        draw_text(page, text, inner, ink, size, bold=chosen and not small, align="center")
+    return is_clicked
+
+
+def show_option(
+    page: Page, text: str, note: str = "", *, key: str, chosen: bool = False, disabled_reason: str = ""
+) -> bool:
+    """Show a line of a list.
+
+    Parameters
+    ----------
+    page : Page
+    text : str
+        May have several lines.
+    note : str
+        Faint text at the right end.
+    key : str
+    chosen : bool
+        Whether it is highlighted.
+    disabled_reason : str
+        Why it cannot be chosen; empty if it can.
+
+    Returns
+    -------
+    bool
+        Whether it was just clicked.
+    """
+    rect = page.cell()
+    is_clicked = page.add_clickable(Widget("option", key, rect, text, chosen), disabled_reason)
+    if not is_drawn(page, rect):
+        return is_clicked
+    if chosen or page.is_hovered(rect):
+        draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.2 if chosen else 0.08))
+    inner = rect.inflate(-page.px(16), 0)
+    draw_text(page, note, inner, page.theme.faint, SMALL_TEXT_PX, align="right")
+    if note:
+        inner.width -= text_width(note, page.px(SMALL_TEXT_PX)) + page.px(12)
+    lines = text.split("\n")
+    ink = shade(page, 0.45) if disabled_reason else page.theme.ink
+    inner.top -= page.px(_LINE_PX * (len(lines) - 1) / 2)
+    for number, line in enumerate(lines):
+        draw_text(page, line, inner.move(0, page.px(_LINE_PX * number)), ink, TEXT_PX)
+    return is_clicked
+
+
+def show_area(page: Page, key: str) -> tuple[Rect, bool]:
+    """Take the next cell for an image.
+
+    Returns
+    -------
+    rect : pygame.Rect
+        Place in the window, px.
+    is_clicked : bool
+        Whether it was just clicked.
+    """
+    rect = page.cell()
+    return rect, page.add_clickable(Widget("area", key, rect))
+
+
+def show_tabs(
+    page: Page,
+    key: str,
+    names: Sequence[str],
+    value: str,
+    *widths: float,
+    titles: Mapping[str, str] = _NO_TITLES,
+) -> str | None:
+    """Show a row of buttons of which one is chosen.
+
+    Parameters
+    ----------
+    page : Page
+    key : str
+    names : sequence of str
+    value : str
+        Name of the chosen one.
+    *widths : float
+        Widths of the buttons; by default they are equal.
+    titles : mapping of str to str
+        Texts of the buttons by their names; by default the capitalized names.
+
+    Returns
+    -------
+    str or None
+        Name of another one that was just chosen.
+    """
+    page.row(*(widths or [0.0] * len(names)), below=8)
+    picked = None
+    for name in names:
+        title = titles.get(name, name.capitalize())
+        is_chosen = name == value
+        is_clicked = show_button(page, title, key=f"{key}:{name}", chosen=is_chosen, small=True)
+        if is_clicked and not is_chosen:
+            picked = name
+    page.row()
+    return picked
+
+
+def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: str = "") -> bool | None:
+    """Show a check box.
+
+    Parameters
+    ----------
+    page : Page
+    text : str
+    value : bool
+        Whether it is ticked.
+    key : str, optional
+        By default the text.
+    tip : str
+        Tool tip.
+
+    Returns
+    -------
+    bool or None
+        The new value if it was just clicked.
+    """
+    key = key or text
+    rect = page.cell()
+    is_clicked = page.add_clickable(Widget("check", key, rect, text, value, tip))
+    if is_drawn(page, rect):
+        box = Rect(0, 0, page.px(_CHECK_BOX_PX), page.px(_CHECK_BOX_PX))
+        box.midleft = rect.midleft
+        _draw_check_box(page, box, is_hovered=page.is_hovered(rect), value=value)
+        text_rect = rect.move(page.px(_CHECK_TEXT_LEFT_PX), 0)
+        text_rect.width -= page.px(_CHECK_TEXT_LEFT_PX)
+        draw_text(page, text, text_rect, page.theme.ink, TEXT_PX)
+        draw_focus_ring(page, rect, key)
+    return (not value) if is_clicked else None
+
+
+def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> None:
+    theme = page.theme
+    fill = theme.final if value else mix(get_field_color(theme), theme.final, 0.14 if is_hovered else 0.0)
+    edge = theme.final if value or is_hovered else shade(page, 0.35)
+    draw_box(page, box, fill, edge=edge, radius=3, width=max(1, page.px(0.75)))
+    if not value or page.surface is None:
+        return
+    side = _FINE * box.width
+    large = Surface((side, side), pygame.SRCALPHA, 32)
+    corners = [(x * side, y * side) for x, y in _TICK]
+    for start, end in pairwise(corners):
+        pygame.draw.line(large, get_accent_ink(theme), start, end, max(4, round(side / 8)))
+    tick = pygame.transform.smoothscale(large.premul_alpha(), box.size)
+    page.surface.blit(tick, box, special_flags=pygame.BLEND_PREMULTIPLIED)

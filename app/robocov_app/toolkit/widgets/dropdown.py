@@ -1,0 +1,85 @@
+"""Drop-down menus."""
+
+from collections.abc import Sequence
+
+import pygame
+from pygame import Rect
+
+from robocov_app.render.fonts import text_width
+from robocov_app.toolkit.open_list import LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_drawn
+
+
+def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, tip: str = "") -> str | None:
+    """Show a menu that opens a list of options.
+
+    Parameters
+    ----------
+    page : Page
+    key : str
+    options : sequence of str
+    value : str
+        Text of the menu.
+    tip : str
+        Tool tip.
+
+    Returns
+    -------
+    str or None
+        Another option that was just picked.
+    """
+    rect = page.cell()
+    picked = _read_list(page, key, options)
+    is_clicked = page.add_clickable(Widget("menu", key, rect, value, value, tip))
+    if picked is None and (is_clicked or page.get_key(key) == "down"):
+        page.open_list = _build_list(page, key, options, value, rect)
+        page.focus = key
+        page.edit = None
+        page.consume_event()
+    if is_drawn(page, rect):
+        _draw_menu(page, key, value, rect)
+    return picked if picked != value else None
+
+
+def _read_list(page: Page, key: str, options: Sequence[str]) -> str | None:
+    """Return what was picked from the open list of a menu, and close a list of other options."""
+    open_list = page.open_list
+    if open_list is None or open_list.key != key:
+        return None
+    if open_list.picked is not None or open_list.options != list(options):
+        page.open_list = None
+    if open_list.picked is None or open_list.picked not in options:
+        return None
+    return open_list.picked
+
+
+def _build_list(page: Page, key: str, options: Sequence[str], value: str, menu: Rect) -> OpenList:
+    """Build the list below its menu, or above it if there is more space."""
+    row_height = page.px(LIST_ROW_PX)
+    height = min(len(options) * row_height + 2, page.px(MAX_LIST_HEIGHT_PX))
+    space_below = page.box.bottom - menu.bottom - page.px(8)
+    space_above = menu.top - page.box.top - page.px(8)
+    rect = Rect(menu.left, menu.bottom + page.px(2), menu.width, min(height, max(space_below, space_above)))
+    if space_below < height and space_above > space_below:
+        rect.bottom = menu.top - page.px(2)
+    longest = max((text_width(option, page.px(TEXT_PX)) for option in options), default=0)
+    rect.width = min(max(longest + page.px(34), menu.width), page.box.width - page.px(16))
+    rect.right = min(rect.right, page.box.right - page.px(8))
+    open_list = OpenList(key, list(options), rect, row_height)
+    open_list.choose(open_list.options.index(value) if value in options else 0)
+    return open_list
+
+
+def _draw_menu(page: Page, key: str, value: str, rect: Rect) -> None:
+    ink = draw_face(page, rect, key)
+    text_rect = rect.inflate(-page.px(18), 0)
+    text_rect.width -= page.px(12)
+    draw_text(page, value, text_rect, ink, TEXT_PX)
+    if page.surface is None:
+        return
+    x = rect.right - page.px(13)
+    y = rect.centery + page.px(1)
+    side = page.px(4)
+    corners = [(x - side, y - side // 2), (x + side, y - side // 2), (x, y + side // 2 + 1)]
+    pygame.draw.polygon(page.surface, ink, corners)

@@ -1,0 +1,70 @@
+"""Texts: headings, labels and paragraphs."""
+
+from robocov_app.look.colors import Color
+from robocov_app.toolkit.overlay import wrap_text
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX, draw_text
+
+
+def show_header(page: Page, text: str) -> None:
+    """Show a heading in a row of its own."""
+    page.row(height=18, below=2)
+    show_label(page, text, style="header")
+    page.row()
+
+
+def show_label(
+    page: Page, text: str, *, key: str = "", style: str = "", tip: str = "", align: str = "left"
+) -> None:
+    """Show a line of text in the next cell.
+
+    Parameters
+    ----------
+    page : Page
+    text : str
+    key : str, optional
+        By default the text.
+    style : str
+        "header", "unit", "bold" or empty.
+    tip : str
+        Tool tip.
+    align : str
+        "left", "center" or "right".
+    """
+    rect = page.cell()
+    page.add_widget(Widget("label", key or text, rect, text, tip=tip))
+    is_small = style in ("header", "unit")
+    color = page.theme.faint if is_small else page.theme.ink
+    size = SMALL_TEXT_PX if is_small else TEXT_PX
+    draw_text(page, text, rect, color, size, bold=style in ("header", "bold"), align=align)
+
+
+def show_paragraph(
+    page: Page,
+    text: str,
+    *,
+    size: float = TEXT_PX,
+    color: Color | None = None,
+    bold: bool = False,
+    indent: float = 0.0,
+) -> None:
+    """Show a text in as many rows as it needs.
+
+    Parameters
+    ----------
+    page : Page
+    text : str
+    size : float
+        Height of the text at scale 1, px.
+    color : color, optional
+    bold : bool
+    indent : float
+        Margin at the left at scale 1, px.
+    """
+    widths = (indent, 0.0) if indent else (0.0,)
+    page.row(*widths, height=size + 4, gap=0, below=1)
+    for line in wrap_text(text, page.px(size), page.px(page.width - indent), bold):
+        if indent:
+            page.cell()
+        draw_text(page, line, page.cell(), color or page.theme.ink, size, bold=bold)
+    page.row()

@@ -1,0 +1,124 @@
+"""Areas whose content scrolls when it is higher than its place."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pygame
+from pygame import Rect
+
+from robocov_app.toolkit.input import get_wheel_notches
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.widgets.appearance import draw_box, shade
+
+# Lengths in pixels at scale 1.
+BAR_WIDTH_PX = 10.0
+PANEL_MARGIN_PX = 12.0
+"""Margin at the side of a panel, in which the scroll bar is."""
+_NOTCH_PX = 40.0
+"""Length by which a notch of the wheel scrolls."""
+_MIN_KNOB_PX = 20
+_HEIGHT_TOLERANCE_PX = 0.5
+
+
+@contextmanager
+def scroll(page: Page, key: str) -> Iterator[None]:
+    """Put the following widgets into an area that takes the rest of the page, and scrolls.
+
+    Parameters
+    ----------
+    page : Page
+    key : str
+    """
+    page.end_row()
+    height = page.rest.height / page.scale
+    start_x = page.x
+    start_y = page.y
+    start_width = page.width
+    start_clip = page.clip
+    area = Rect(page.box.left, page.rest.top, page.box.width, page.px(height))
+    content_height = page.content_heights.get(key, 0.0)
+    max_offset = max(content_height - height, 0.0)
+    offset = min(max(page.scroll_offsets.get(key, 0.0), 0.0), max_offset)
+    page.scroll_offsets[key] = offset
+    if max_offset:
+        offset = _show_bar(page, key, area, content_height, offset)
+        page.width -= BAR_WIDTH_PX + 4 - PANEL_MARGIN_PX
+    page.clip = page.clip.clip(area)
+    if page.surface is not None:
+        page.surface.set_clip(page.clip)
+    page.y -= offset
+    content_start = page.y
+    page.clear_cells()
+    yield
+    page.end_row()
+    new_height = page.y - content_start
+    if abs(new_height - content_height) > _HEIGHT_TOLERANCE_PX:
+        page.content_heights[key] = new_height
+        page.request_another_run()
+    page.x = start_x
+    page.y = start_y + height
+    page.width = start_width
+    page.clip = start_clip
+    if page.surface is not None:
+        page.surface.set_clip(None)
+
+
+def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:
+    """Lay out many equal rows of one cell, and yield the numbers of those that can be seen.
+
+    Parameters
+    ----------
+    page : Page
+    count : int
+        Number of rows.
+    height : float
+        Height of a row at scale 1, px.
+
+    Yields
+    ------
+    int
+    """
+    page.end_row()
+    first = int((page.clip.top - page.box.top - page.px(page.y)) / page.px(height))
+    first = min(max(first, 0), count)
+    last = min(first + page.clip.height // page.px(height) + 2, count)
+    page.y += first * height
+    page.row(height=height, below=0)
+    yield from range(first, last)
+    page.end_row()
+    page.y += (count - last) * height
+
+
+def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: float) -> float:
+    """Show the scroll bar of an area, and return the length that is scrolled out of sight."""
+    height = area.height / page.scale
+    max_offset = content_height - height
+    bar_key = f"bar:{key}"
+    track = Rect(area.right - page.px(BAR_WIDTH_PX + 1), area.top, page.px(BAR_WIDTH_PX), area.height)
+    knob_height = max(round(track.height * height / content_height), page.px(_MIN_KNOB_PX))
+    free_height = max(track.height - knob_height, 1)
+    knob = Rect(track.left, track.top + round(free_height * offset / max_offset), track.width, knob_height)
+    event = page.get_event()
+    is_pressed = page.is_pressed(track)
+    is_dragged = page.active == bar_key and page.is_event(pygame.MOUSEMOTION)
+    if event is not None and event.type == pygame.MOUSEWHEEL and area.collidepoint(page.pointer):
+        offset -= get_wheel_notches(event) * _NOTCH_PX
+        page.consume_event()
+    elif is_pressed or is_dragged:
+        is_on_knob = is_pressed and bool(knob.collidepoint(page.pointer))
+        if is_pressed:
+            page.active = bar_key
+            page.consume_event()
+            page.grab_offset = page.pointer[1] - knob.top if is_on_knob else knob.height / 2
+        if not is_on_knob:
+            offset = (page.pointer[1] - page.grab_offset - track.top) / free_height * max_offset
+    offset = min(max(offset, 0.0), max_offset)
+    page.scroll_offsets[key] = offset
+    page.widgets[bar_key] = Widget("bar", key, knob, value=offset)
+    strength = 0.3
+    if page.active == bar_key:
+        strength = 0.55
+    elif page.is_hovered(track):
+        strength = 0.45
+    draw_box(page, knob.inflate(-page.px(4), -page.px(2)), shade(page, strength), radius=BAR_WIDTH_PX / 2)
+    return offset

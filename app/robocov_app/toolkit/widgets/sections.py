@@ -1,0 +1,37 @@
+"""Sections of a page, whose content can be hidden."""
+
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box, draw_focus_ring, draw_text, shade
+
+
+def show_section(page: Page, title: str, *, key: str = "") -> bool:
+    """Show the title of a section; a click hides or shows the content.
+
+    Parameters
+    ----------
+    page : Page
+    title : str
+    key : str, optional
+        By default the title.
+
+    Returns
+    -------
+    bool
+        Whether the content is shown.
+    """
+    key = f"section:{key or title}"
+    page.row(height=20, below=4)
+    rect = page.cell()
+    widget = Widget("section", key, rect, title)
+    if page.add_clickable(widget):
+        page.folded_sections ^= {key}
+        page.needs_redraw = True
+    is_open = key not in page.folded_sections
+    widget.value = is_open
+    if page.is_hovered(rect):
+        draw_box(page, rect, shade(page, 0.06))
+    text = f"{'▾' if is_open else '▸'} {title}"
+    draw_text(page, text, rect, page.theme.faint, SMALL_TEXT_PX, bold=True)
+    draw_focus_ring(page, rect, key)
+    page.row()
+    return is_open

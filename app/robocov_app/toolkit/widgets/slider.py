@@ -1,0 +1,133 @@
+"""Sliders."""
+
+from dataclasses import dataclass
+
+import pygame
+from pygame import Rect
+
+from robocov_app.look.colors import mix
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.widgets.appearance import draw_box, draw_focus_ring, is_drawn, shade
+
+# Lengths in pixels at scale 1.
+_TRACK_HEIGHT_PX = 14
+_KNOB_WIDTH_PX = 12
+_KNOB_RADIUS_PX = 5
+
+_KEY_STEPS = {"left": -1, "down": -1, "right": 1, "up": 1}
+_STEPS_OF_KEYS = 50
+"""Steps of the arrow keys from one end to the other, if values have no steps of their own."""
+
+
+@dataclass(frozen=True)
+class _Range:
+    """Values of a slider, and where they are on its track."""
+
+    low: float
+    high: float
+    step: float  # 0 for any value
+    track: Rect
+    knob_width: int
+
+    @property
+    def span(self) -> float:
+        return max(self.high - self.low, 1e-300)
+
+    @property
+    def free_width(self) -> int:
+        """Length by which the knob can move, px."""
+        return max(self.track.width - self.knob_width, 1)
+
+    def compute_fraction(self, value: float) -> float:
+        """Return the position of a value between the ends, from 0 to 1."""
+        return min(max((value - self.low) / self.span, 0.0), 1.0)
+
+    def limit(self, value: float) -> float:
+        """Return the nearest value that the slider can have."""
+        value = min(max(value, self.low), self.high)
+        if not self.step:
+            return value
+        rounded = self.low + round((value - self.low) / self.step) * self.step
+        return min(max(rounded, self.low), self.high)
+
+
+def show_slider(
+    page: Page,
+    key: str,
+    value: float,
+    low: float,
+    high: float,
+    *,
+    step: float = 0.0,
+    disabled_reason: str = "",
+) -> float | None:
+    """Show a slider.
+
+    Parameters
+    ----------
+    page : Page
+    key : str
+    value, low, high : float
+        The value, and those at the ends.
+    step : float
+        Distance of the values that it can have; 0 if it can have any.
+    disabled_reason : str
+        Why it cannot be moved; empty if it can.
+
+    Returns
+    -------
+    float or None
+        The value to which it was just moved.
+    """
+    rect = page.cell()
+    track = Rect(rect.left, 0, rect.width, page.px(_TRACK_HEIGHT_PX))
+    track.centery = rect.centery
+    values = _Range(low, high, step, track, page.px(_KNOB_WIDTH_PX))
+    new_value = value
+    if not disabled_reason:
+        new_value = _read_input(page, key, value, values)
+    if new_value != value:
+        new_value = values.limit(new_value)
+    page.add_widget(Widget("slider", key, track, value=new_value), disabled_reason)
+    if is_drawn(page, rect):
+        _draw_slider(page, key, values, values.compute_fraction(new_value), enabled=not disabled_reason)
+    return new_value if new_value != value else None
+
+
+def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
+    """Return the value to which the mouse or the keys move a slider, which may be beyond its ends."""
+    track = values.track
+    knob_left = track.left + values.free_width * values.compute_fraction(value)
+    is_pressed = page.is_pressed(track)
+    is_on_knob = is_pressed and knob_left <= page.pointer[0] <= knob_left + values.knob_width
+    if is_pressed:
+        page.active = key
+        page.consume_event()
+        page.grab_offset = page.pointer[0] - knob_left if is_on_knob else values.knob_width / 2
+    is_dragged = page.active == key and page.is_event(pygame.MOUSEMOTION)
+    if is_dragged or (is_pressed and not is_on_knob):
+        return (
+            values.low + values.span * (page.pointer[0] - page.grab_offset - track.left) / values.free_width
+        )
+    steps = _KEY_STEPS.get(page.get_key(key), 0)
+    return value + steps * (values.step or values.span / _STEPS_OF_KEYS)
+
+
+def _draw_slider(page: Page, key: str, values: _Range, fraction: float, *, enabled: bool) -> None:
+    theme = page.theme
+    track = values.track
+    knob_offset = round(fraction * (track.width - values.knob_width))
+    groove = track.inflate(0, -page.px(8))
+    radius = groove.height // 2 / page.scale
+    draw_box(page, groove, shade(page, 0.18), radius=radius)
+    groove.width = max(knob_offset + page.px(6), groove.height)
+    accent = theme.final if enabled else shade(page, 0.35)
+    draw_box(page, groove, mix(theme.panel, accent, 0.6), radius=radius)
+    strength = 0.0
+    if page.active == key:
+        strength = 0.3
+    elif enabled and page.is_hovered(track):
+        strength = 0.2
+    knob = Rect(track.left + knob_offset, track.top, values.knob_width, page.px(_TRACK_HEIGHT_PX))
+    draw_box(page, knob, mix(accent, theme.ink, strength), radius=_KNOB_RADIUS_PX)
+    draw_focus_ring(page, track, key)

@@ -1,0 +1,150 @@
+"""Text fields of one line."""
+
+from bisect import bisect_left
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.colors import mix
+from robocov_app.render.fonts import label, text_width
+from robocov_app.toolkit.input import ENTER_KEYS
+from robocov_app.toolkit.overlay import get_field_color
+from robocov_app.toolkit.page import Page, Widget
+from robocov_app.toolkit.text_edit import TextEdit
+from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_box, draw_text, is_drawn, shade
+
+# Lengths in pixels at scale 1.
+_MARGIN_PX = 6
+_CURSOR_HEIGHT_PX = 17
+
+
+def show_text_field(
+    page: Page, key: str, text: str, *, placeholder: str = "", tip: str = "", live: bool = False
+) -> str | None:
+    """Show a text field.
+
+    Parameters
+    ----------
+    page : Page
+    key : str
+    text : str
+        Text while it is not edited.
+    placeholder : str
+        Faint text in the empty field.
+    tip : str
+        Tool tip.
+    live : bool
+        Whether each change is returned, not only the text after Enter.
+
+    Returns
+    -------
+    str or None
+        The new text.
+    """
+    rect = page.cell()
+    if page.is_pressed(rect):
+        _press(page, key, text, rect)
+    entered_text = _read_input(page, key, rect)
+    edit = page.edit if page.focus == key else None
+    if live and edit is not None and edit.text != text:
+        entered_text = edit.text
+    shown_text = text if edit is None else edit.text
+    page.add_widget(Widget("entry", key, rect, shown_text, text, tip))
+    if page.surface is not None and is_drawn(page, rect):
+        _draw_field(page, rect, is_edited=edit is not None)
+        if edit is None:
+            color = page.theme.ink if text else page.theme.faint
+            draw_text(page, text or placeholder, _get_inner(page, rect), color, TEXT_PX)
+        else:
+            _draw_edit(page, page.surface, rect, edit, placeholder)
+    return entered_text
+
+
+def _press(page: Page, key: str, text: str, rect: Rect) -> None:
+    """Start editing, or place the text cursor; a double click selects a word."""
+    page.consume_event()
+    is_double = page.is_double_click(key)
+    if page.focus != key or page.edit is None:
+        page.focus = key
+        page.edit = TextEdit.select_all(text)
+        return
+    page.active = key
+    page.edit.place(_find_caret(page, page.edit, rect))
+    if is_double:
+        page.edit.select_word(page.edit.caret)
+
+
+def _read_input(page: Page, key: str, rect: Rect) -> str | None:
+    """Pass a key or a drag to the text that is edited; return the text after Enter."""
+    edit = page.edit if page.focus == key else None
+    if edit is None:
+        return None
+    if page.is_event(pygame.MOUSEMOTION) and page.active == key:
+        edit.place(_find_caret(page, edit, rect), extend=True)
+        return None
+    name = page.get_key(key)
+    if not name:
+        return None
+    page.consume_event()
+    if edit.composed:
+        return None
+    if name in ENTER_KEYS:
+        page.stop_typing()
+        return edit.text
+    edit.press_key(name)
+    return None
+
+
+def _get_inner(page: Page, rect: Rect) -> Rect:
+    return rect.inflate(-page.px(2 * _MARGIN_PX), -page.px(4))
+
+
+def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
+    """Return the caret position nearest to the pointer. Longer texts are wider, so it bisects."""
+    x = page.pointer[0] - rect.left - page.px(_MARGIN_PX) + _compute_shift(page, edit, rect)
+
+    def get_width_before(caret: int) -> int:
+        return text_width(edit.text[:caret], page.px(TEXT_PX))
+
+    after = bisect_left(range(len(edit.text) + 1), x, key=get_width_before)
+    candidates = range(max(after - 1, 0), min(after, len(edit.text)) + 1)
+    return min(candidates, key=lambda caret: abs(get_width_before(caret) - x))
+
+
+def _compute_shift(page: Page, edit: TextEdit, rect: Rect) -> int:
+    """Return the length by which a long text is moved to the left so that its caret is visible, px."""
+    width_before = text_width(edit.text[: edit.caret] + edit.composed, page.px(TEXT_PX))
+    return max(width_before - (rect.width - page.px(14)), 0)
+
+
+def _draw_field(page: Page, rect: Rect, *, is_edited: bool) -> None:
+    edge = page.theme.final if is_edited or page.is_hovered(rect) else shade(page, 0.24)
+    width = max(2, page.px(1.25)) if is_edited else max(1, page.px(0.75))
+    draw_box(page, rect, get_field_color(page.theme), edge=edge, width=width)
+
+
+def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placeholder: str) -> None:
+    """Draw a text with its selection, its cursor, and what an input method is composing."""
+    theme = page.theme
+    size = page.px(TEXT_PX)
+    clip = screen.get_clip()
+    inner = _get_inner(page, rect)
+    screen.set_clip(inner.inflate(page.px(4), 0).clip(clip))
+    left = inner.left - _compute_shift(page, edit, rect)
+    start, end = (text_width(edit.text[:position], size) for position in edit.selection)
+    selection = Rect(left + start, 0, end - start, page.px(_CURSOR_HEIGHT_PX))
+    selection.centery = rect.centery
+    if start != end:
+        screen.fill(mix(get_field_color(theme), theme.final, 0.35), selection)
+    text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
+    image = label(text or placeholder, size, theme.ink if text else theme.faint)
+    screen.blit(image, image.get_rect(midleft=(left, rect.centery)))
+    x = left + text_width(edit.text[: edit.caret], size)
+    line_width = max(1, page.px(1))
+    if edit.composed:
+        width = text_width(edit.composed, size)
+        screen.fill(theme.ink, (x, selection.bottom - 1, width, line_width))
+        pygame.key.set_text_input_rect(Rect(x, rect.top, width, rect.height))
+        x += width
+    screen.fill(theme.ink, (x, selection.top, line_width, selection.height))
+    screen.set_clip(clip)
