@@ -327,14 +327,14 @@ class CoverageCost:
         return self.geodesics.find_path(point, positions[int(distances.argmin())])
 
 
-def _require_speeds(speeds: object, robots: int) -> Array:
+def _require_speeds(speeds: object, robot_count: int) -> Array:
     """Return the speeds as an array, (n,) m/s; raise InputError unless there is one above 0 per robot."""
     try:
         values = np.array(speeds, dtype=float)
     except (TypeError, ValueError):
         values = np.empty(0)
-    if values.shape != (robots,):
-        raise InputError(f"speeds: expected a number for each of {robots} robots, got {quote(speeds)}")
+    if values.shape != (robot_count,):
+        raise InputError(f"speeds: expected a number for each of {robot_count} robots, got {quote(speeds)}")
     for robot, speed in enumerate(values.tolist()):
         if not 0.0 < speed < np.inf:
             raise InputError(f"speeds[{robot}]: expected a number above 0 m/s, got {quote(speed)}")

@@ -23,6 +23,8 @@ _MAX_AREA = 0.9
 _MIN_GAPS_PER_SIDE = 3.0
 _MIN_CENTIMETER_GAP_M = 0.5
 """Coordinates are rounded to centimeters from this gap on, to millimeters below."""
+_STEP_TOLERANCE = 1e-9
+"""Fraction of a step by which a length may miss a multiple of it because of rounding."""
 
 
 @dataclass(frozen=True)
@@ -119,4 +121,4 @@ class Request:
         float, m
         """
         # Because of the tolerance, a rounding error does not make a multiple of the step one step shorter.
-        return round(math.floor(length / self.step + 1e-9) * self.step, self.digits)
+        return round(math.floor(length / self.step + _STEP_TOLERANCE) * self.step, self.digits)

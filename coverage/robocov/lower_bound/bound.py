@@ -194,9 +194,9 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
     best: _Proof | None = None
     smoothing = _SMOOTHING
-    rounds = max(1, math.ceil(math.log2(smoothing / (_FINAL_SMOOTHING * precision))))
-    for k in range(rounds):
-        fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / rounds
+    round_count = max(1, math.ceil(math.log2(smoothing / (_FINAL_SMOOTHING * precision))))
+    for k in range(round_count):
+        fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / round_count
         heartbeat = partial(report, fraction)
         prices = dual.improve_prices(prices, smoothing, heartbeat)
         proof = dual.prove(prices, _SLACK * smoothing, heartbeat)
@@ -289,8 +289,8 @@ class _Dual:
         """Return the maximum prices and the initial prices, (m,) m, for a placement at (n, 2) grid steps."""
         sites = self._site_data.sites
         distances = self._geodesics.compute_grid_distances(robots, sites) * self._unit
-        no_robots = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
-        distances = np.sort(np.concatenate([distances, no_robots]), axis=0)
+        missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
+        distances = np.sort(np.concatenate([distances, missing_distances]), axis=0)
         nearest = distances[0]
         second = distances[1]
         # An initial price is halfway between the distances of the nearest robot and the next one. If there is

@@ -16,7 +16,7 @@ from robocov.observation import Cells
 from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi.clipped_cells import compute_clipped_cells
-from robocov.voronoi.clipping import CellArrays
+from robocov.voronoi.clipping import EDGE_BEYOND, EDGE_CELL, CellArrays
 from robocov.voronoi.delaunay import CORNER, Mesh
 from robocov.voronoi.triangulated_cells import compute_triangulated_cells
 
@@ -146,22 +146,22 @@ def to_generators(values: object) -> Array:
     return points
 
 
-def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robots: int) -> None:
+def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robot_count: int) -> None:
     """Check that neighbors and reported positions match the number of robots.
 
     Parameters
     ----------
     neighbors : Neighbors
     reported_positions : (m, 2) array or None, m
-    robots : int
+    robot_count : int
 
     Raises
     ------
     InputError
         If they do not match.
     """
-    if neighbors.count != robots:
-        raise InputError(f"neighbors: expected a graph of {robots} robots, got {neighbors.count}")
+    if neighbors.count != robot_count:
+        raise InputError(f"neighbors: expected a graph of {robot_count} robots, got {neighbors.count}")
     if reported_positions is None:
         return
     if neighbors.indices is None:
@@ -219,8 +219,8 @@ def _find_edges(points: Array, sides: Array, known: NeighborPositions, mesh: Mes
     return CellEdges(
         start=edges[:, :2].copy(),
         end=edges[:, 2:4].copy(),
-        cell=edges[:, 4].astype(np.intp),
-        beyond=edges[:, 5].astype(np.intp),
+        cell=edges[:, EDGE_CELL].astype(np.intp),
+        beyond=edges[:, EDGE_BEYOND].astype(np.intp),
     )
 
 

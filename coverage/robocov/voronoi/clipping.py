@@ -32,6 +32,16 @@ ROBOT = 3
 """Column of a neighbor: its number."""
 _NEIGHBOR_COLUMNS = 4
 
+_EDGE_START_X = 0
+_EDGE_START_Y = 1
+_EDGE_END_X = 2
+_EDGE_END_Y = 3
+"""Columns of an edge: its ends relative to the generator, m."""
+EDGE_CELL = 4
+"""Column of an edge: the robot to whose cell it belongs."""
+EDGE_BEYOND = 5
+"""Column of an edge: the robot on the other side, or `REGION`."""
+
 _SORTED_NEIGHBORS = 6
 """Number of neighbors that cut a cell in order of distance; few others can then still cut it."""
 
@@ -65,20 +75,22 @@ class CellArrays(NamedTuple):
 
 
 @kernel
-def create_workspace(robots: int, sides: int) -> Workspace:
+def create_workspace(robot_count: int, side_count: int) -> Workspace:
     """Allocate the working memory for the cells of a team in a region.
 
     Parameters
     ----------
-    robots : int
-    sides : int
+    robot_count : int
+    side_count : int
         Number of sides of the region.
 
     Returns
     -------
     Workspace
     """
-    return Workspace(np.empty((2, sides + robots + 2, 4)), np.empty((robots, 4)))
+    return Workspace(
+        np.empty((2, side_count + robot_count + 2, 4)), np.empty((robot_count, _NEIGHBOR_COLUMNS))
+    )
 
 
 @inlined_kernel
@@ -206,7 +218,7 @@ def _cut(rings: Array, old: int, count: int, neighbor_rows: Array, row: int) -> 
     last_kept = after
     k = after
     while k != first:
-        for column in range(3):
+        for column in (X, Y, BEYOND):
             rings[1 - old, size, column] = rings[old, k, column]
         last_kept = k
         size += 1
@@ -292,12 +304,12 @@ def write_cell(
         moment_x += cross * (x + u)
         moment_y += cross * (y + v)
         if edge < len(edges):
-            edges[edge, 0] = x
-            edges[edge, 1] = y
-            edges[edge, 2] = u
-            edges[edge, 3] = v
-            edges[edge, 4] = i
-            edges[edge, 5] = rings[polygon.ring, k, BEYOND]
+            edges[edge, _EDGE_START_X] = x
+            edges[edge, _EDGE_START_Y] = y
+            edges[edge, _EDGE_END_X] = u
+            edges[edge, _EDGE_END_Y] = v
+            edges[edge, EDGE_CELL] = i
+            edges[edge, EDGE_BEYOND] = rings[polygon.ring, k, BEYOND]
         k = after
     factor = 1.0 / (3.0 * doubled_area) if doubled_area > 0.0 else 0.0
     cells.mass[i] = max(0.5 * doubled_area, 0.0)

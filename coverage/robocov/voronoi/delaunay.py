@@ -76,6 +76,21 @@ def get_next(h: int) -> int:
 
 
 @inlined_kernel
+def get_first(h: int) -> int:
+    """Return the first half-edge of the triangle of a half-edge.
+
+    Parameters
+    ----------
+    h : int
+
+    Returns
+    -------
+    int
+    """
+    return h & -4
+
+
+@inlined_kernel
 def get_previous(h: int) -> int:
     """Return the half-edge that precedes another one in its triangle.
 
@@ -193,10 +208,10 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 
 
 @kernel
-def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangles: int) -> int:
+def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
     """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 on failure."""
     triangle = start
-    for _ in range(3 * triangles + 3):
+    for _ in range(3 * triangle_count + 3):
         for h in range(triangle, triangle + 3):
             a = mesh[CORNER, h]
             b = mesh[CORNER, get_next(h)]
@@ -208,7 +223,7 @@ def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, tr
             return triangle
         if mesh[TWIN, h] < 0:
             break
-        triangle = mesh[TWIN, h] & -4
+        triangle = get_first(mesh[TWIN, h])
     return -1
 
 
@@ -236,8 +251,8 @@ def _flip_from(
         _link(mesh, a, mesh[TWIN, before_b])
         _link(mesh, b, mesh[TWIN, before_a])
         _link(mesh, before_a, before_b)
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, a & -4)
-        is_ccw &= _compute_cotangents(mesh, points, cotangents, b & -4)
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first(a))
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first(b))
         flips += 1
         if flips > _MAX_FLIPS_PER_POINT * len(points) or size + 4 > len(stack):
             return -1, False
