@@ -17,7 +17,7 @@ from robocov_app.toolkit.layout import MIN_SIZE_PX
 
 _DRIVER_VARIABLE = "SDL_VIDEODRIVER"
 _DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", _DRIVER_VARIABLE)
-"""Environment variables of which Linux needs one for a visible window."""
+"""Environment variables; Linux needs one of them for a visible window."""
 _INVISIBLE_DRIVERS = ("offscreen", "dummy", "evdev")
 """Drivers that SDL chooses silently if there is no display; the program would run for ever, unseen."""
 _FULL_HD_HEIGHT_PX = 1080
@@ -83,6 +83,21 @@ def get_screen_scale() -> float:
     height = max((size[1] for size in pygame.display.get_desktop_sizes()), default=_FULL_HD_HEIGHT_PX)
     scale = round(height / _FULL_HD_HEIGHT_PX / _SCALE_STEP) * _SCALE_STEP
     return float(min(max(scale, 1.0), _MAX_SCALE))
+
+
+def choose_scale(requested: float | None, *, has_display: bool) -> float:
+    """Return the scale of a window: the requested one, else the one that suits the display.
+
+    Parameters
+    ----------
+    requested : float or None
+        Scale that an option or the settings demand.
+    has_display : bool
+        Whether the window is visible.
+    """
+    if requested:
+        return requested
+    return get_screen_scale() if has_display else 1.0
 
 
 def fit_to_screen(size: tuple[int, int]) -> tuple[int, int]:

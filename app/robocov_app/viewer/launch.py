@@ -18,7 +18,7 @@ from robocov_app.storage.settings import (
     save_settings,
 )
 from robocov_app.terminal.output import echo
-from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
+from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.layout import MIN_SIZE_PX
 from robocov_app.viewer.costs import Costs
@@ -179,7 +179,7 @@ class Launcher:
             window.offer_lesson()
 
     def _open_window(self, settings: WindowSettings) -> ViewerWindow:
-        scale = self._choose_scale(settings)
+        scale = choose_scale(self.scale or settings.scale, has_display=not self._needs_no_display)
         size = self._choose_size(settings, scale)
         if not self.headless:
             self.session.playback.clock.budget = FRAME_BUDGET_S
@@ -218,12 +218,6 @@ class Launcher:
         viewer.view.has_suggestions = settings.suggests
         viewer.files.recent = list(settings.recent)
         return viewer
-
-    def _choose_scale(self, settings: WindowSettings) -> float:
-        scale = self.scale or settings.scale
-        if scale:
-            return scale
-        return 1.0 if self._needs_no_display else get_screen_scale()
 
     def _choose_size(self, settings: WindowSettings, scale: float) -> tuple[int, int]:
         if self.size is not None:

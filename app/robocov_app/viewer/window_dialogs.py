@@ -13,6 +13,7 @@ from robocov_app.toolkit.dialogs import (
     Question,
     create_file_choice,
     create_list_choice,
+    create_recovery_question,
 )
 from robocov_app.toolkit.palette import create_palette
 from robocov_app.viewer.file_actions import FileActions
@@ -107,15 +108,13 @@ def build_recovery_offer(
         if others:
             offer_others(others)
 
-    text = f"A window ended without saving: {describe_draft(newest)}."
-    if others:
-        text += f"\n{len(others)} more {'is' if len(others) == 1 else 'are'} kept."
-    answers = [
-        Answer("Recover", recover, "r"),
-        Answer("Discard", discard, "d"),
-        Answer("Later", play, "l"),
-    ]
-    return Question("Recover unsaved work?", text, answers, play)
+    return create_recovery_question(
+        f"A window ended without saving: {describe_draft(newest)}.",
+        others=len(others),
+        recover=recover,
+        discard=discard,
+        postpone=play,
+    )
 
 
 def _pause(viewer: Presenter) -> Callable[[], None]:

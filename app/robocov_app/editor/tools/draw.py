@@ -13,7 +13,7 @@ from robocov_app.editor.model.coordinates import parse_length, parse_next_point,
 from robocov_app.editor.model.geometry import build_rectangle, distance, format_bearing, format_length
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
-from robocov_app.toolkit.draw_tools import SAME, Outline
+from robocov_app.toolkit.drawn_outline import SAME_POINT_M, DrawnOutline
 
 CLOSING_FRACTION = 0.7  # of the pointer's reach, within which a click on the first point closes the outline
 
@@ -29,7 +29,7 @@ class DrawTool(Tool):
         Whether a click on the first point completes the drawing.
     drags : bool
         Whether it can be drawn with a single drag, too.
-    outline : Outline
+    outline : DrawnOutline
         The points drawn so far.
     """
 
@@ -41,7 +41,7 @@ class DrawTool(Tool):
 
     def __init__(self) -> None:
         super().__init__()
-        self.outline = Outline(self.min_points, self.max_points, self.closes, self.drags)
+        self.outline = DrawnOutline(self.min_points, self.max_points, self.closes, self.drags)
 
     def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
         """Return the change that adds what was drawn with these points, m."""
@@ -98,16 +98,16 @@ class DrawTool(Tool):
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
         """Move the end of the drawing to the pointer."""
-        self.outline.at = self.choose_point(event)
+        self.outline.cursor = self.choose_point(event)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         """Complete a drag."""
         if self.outline.release(self.choose_point(event), event.raw, event.reach, clicked=clicked):
-            self._finish_drag(context, self.outline.at)
+            self._finish_drag(context, self.outline.cursor)
 
     def finish(self, context: Workspace) -> bool:
         """Add what was drawn to the map."""
-        points = self.outline.take()
+        points = self.outline.take_points()
         if not points:
             return False
         if len(points) < self.min_points:
@@ -134,16 +134,16 @@ class DrawTool(Tool):
             if end is not None:
                 self._finish_drag(context, end)
                 return
-        cursor = self.outline.at if self.points else None
-        self.outline.at = parse_next_point(text, self.origin, cursor)
-        self.outline.points.append(self.outline.at)
-        self.outline.dragging = False
+        cursor = self.outline.cursor if self.points else None
+        self.outline.cursor = parse_next_point(text, self.origin, cursor)
+        self.outline.points.append(self.outline.cursor)
+        self.outline.is_dragging = False
 
     def build_draw_state(self, context: Workspace) -> DrawState:
         """Return what is shown while drawing."""
         if not self.points:
             return DrawState()
-        return self.build_preview(context, (*self.points, self.outline.at))
+        return self.build_preview(context, (*self.points, self.outline.cursor))
 
     def _finish_drag(self, context: Workspace, end: Point) -> None:
         start = self.points[0]
@@ -153,7 +153,7 @@ class DrawTool(Tool):
     def _find_far_corner(self, text: str) -> Point:
         """Return the corner opposite to the first of a rectangle with a typed size, towards the cursor."""
         x, y = self.points[0]
-        cursor_x, cursor_y = self.outline.at
+        cursor_x, cursor_y = self.outline.cursor
         width, height = parse_size(text)
         far_x = x + width if cursor_x >= x else x - width
         far_y = y + height if cursor_y >= y else y - height
@@ -188,7 +188,7 @@ class WallTool(DrawTool):
 
     def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
         """Return the line, with the wall as thick as it will be."""
-        line = points if distance(points[-2], points[-1]) > SAME else points[:-1]
+        line = points if distance(points[-2], points[-1]) > SAME_POINT_M else points[:-1]
         shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         label = f"{format_bearing(points[-2], points[-1])}   {format_length(context.wall_width)} wide"
         return DrawState(line=points, shows_lengths=True, shapes=shapes, label=label)
@@ -214,7 +214,7 @@ class MeasureTool(DrawTool):
 
     def finish(self, context: Workspace) -> bool:
         """Keep the line."""
-        points = self.outline.take()
+        points = self.outline.take_points()
         if points:
             self.clicked = points
         return bool(points)
@@ -227,7 +227,7 @@ class MeasureTool(DrawTool):
 
     def build_draw_state(self, context: Workspace) -> DrawState:
         """Return the line with its length, and the area that it encloses."""
-        points = [*self.points, self.outline.at] if self.points else self.clicked
+        points = [*self.points, self.outline.cursor] if self.points else self.clicked
         if len(points) < 2:
             return DrawState()
         start, end = points[-2], points[-1]
@@ -275,7 +275,7 @@ class BoundaryTool(DrawTool):
 
     def choose_point(self, event: PointerEvent) -> Point:
         """Return the position of the next point, m; angles count only between clicked corners."""
-        return event.point if self.outline.dragging else super().choose_point(event)
+        return event.point if self.outline.is_dragging else super().choose_point(event)
 
     def find_drag_end(self, text: str) -> Point | None:
         """Return the corner opposite to the first, if a size such as 10 x 8 was typed."""
@@ -284,7 +284,7 @@ class BoundaryTool(DrawTool):
 
     def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
         """Return the outline; in a drag, the rectangle."""
-        if not self.outline.dragging:
+        if not self.outline.is_dragging:
             return super().build_preview(context, points)
         (ax, ay), (bx, by) = points
         label = f"{format_length(abs(bx - ax))} x {format_length(abs(by - ay))}"
@@ -323,7 +323,7 @@ class RectangleTool(DrawTool):
         width = abs(bx - ax)
         height = abs(by - ay)
         ring = build_rectangle(*points)
-        shapes = (PolygonObstacle(ring),) if min(width, height) > SAME else ()
+        shapes = (PolygonObstacle(ring),) if min(width, height) > SAME_POINT_M else ()
         label = f"{format_length(width)} x {format_length(height)}   {width * height:.2f} m²"
         return DrawState(line=ring, is_closed=True, shapes=shapes, label=label)
 
@@ -348,7 +348,7 @@ class CircleTool(DrawTool):
     def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
         """Return the circle with its radius."""
         radius = distance(*points)
-        shapes = (CircleObstacle(points[0], radius),) if radius > SAME else ()
+        shapes = (CircleObstacle(points[0], radius),) if radius > SAME_POINT_M else ()
         return DrawState(line=points, shapes=shapes, label=f"radius {format_length(radius)}")
 
 
@@ -367,5 +367,5 @@ class DiscTool(CircleTool):
     def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
         """Return the disc with its radius."""
         radius = distance(*points)
-        start = DiscStart(points[0], radius) if radius > SAME else None
+        start = DiscStart(points[0], radius) if radius > SAME_POINT_M else None
         return DrawState(line=points, start=start, label=f"radius {format_length(radius)}")

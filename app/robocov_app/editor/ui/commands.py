@@ -1,7 +1,7 @@
 """All commands of the editor, by key, menu, button or palette: a group for each heading of the help."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 from robocov_app.editor.canvas.canvas import EditorCanvas
@@ -13,7 +13,7 @@ from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import FAR_STEPS, Edit
 from robocov_app.editor.ui.file_commands import OPEN_SUFFIXES, PICTURE_SUFFIXES, FileCommands
-from robocov_app.toolkit.command import Command
+from robocov_app.toolkit.command import Command, CommandGroup
 
 Action = Callable[[], object]
 ArrowAction = Callable[[int, int], object]
@@ -66,42 +66,20 @@ class WindowActions:
     open_palette: Action
 
 
-@dataclass
-class CommandGroup:
-    """Commands under one heading of the help.
+class EditorCommandGroup(CommandGroup):
+    """Commands of the editor under one heading of the help.
 
-    Attributes
+    Parameters
     ----------
     heading : str
         One of `GROUPS`.
     editor : Editor
         The editor.
-    commands : list of Command
-        The commands added so far.
     """
 
-    heading: str
-    editor: Editor
-    commands: list[Command] = field(default_factory=list)
-
-    def add(self, name: str, title: str, action: Action, *keys: str, repeats: bool = False) -> None:
-        """Add a command.
-
-        Parameters
-        ----------
-        name : str
-            Unique name.
-        title : str
-            What it does, for people; empty to leave it out of palette and help.
-        action : callable
-            Does it; a string that it returns is shown as message.
-        *keys : str
-            Keys, such as ``ctrl+z``.
-        repeats : bool
-            Whether it is repeated while the key is held down.
-        """
-        command = Command(name, title, self.heading, action, keys, repeats=repeats, hidden=not title)
-        self.commands.append(command)
+    def __init__(self, heading: str, editor: Editor) -> None:
+        super().__init__(heading)
+        self.editor = editor
 
     def add_edit(
         self, name: str, title: str, edit: Edit, *keys: str, value: object = None, repeats: bool = False
@@ -156,7 +134,7 @@ def list_commands(
     return [command for group in groups for command in group.commands]
 
 
-def _list_file_commands(editor: Editor, documents: FileCommands, window: WindowActions) -> CommandGroup:
+def _list_file_commands(editor: Editor, documents: FileCommands, window: WindowActions) -> EditorCommandGroup:
     ask_map = partial(documents.ask_path, "Open a map", documents.open, OPEN_SUFFIXES)
     ask_picture = partial(
         documents.ask_path, "Picture under the map", documents.open_background, PICTURE_SUFFIXES
@@ -165,7 +143,7 @@ def _list_file_commands(editor: Editor, documents: FileCommands, window: WindowA
     def remove_picture() -> None:
         editor.apply(properties.set_background(editor.sketch, None))
 
-    group = CommandGroup("File", editor)
+    group = EditorCommandGroup("File", editor)
     group.add("new", "New map", documents.new, "ctrl+n")
     group.add("open", "Open a map", ask_map, "ctrl+o")
     group.add("recent", "Open a recent or bundled map", documents.ask_recent, "ctrl+shift+o")
@@ -181,7 +159,7 @@ def _list_file_commands(editor: Editor, documents: FileCommands, window: WindowA
     return group
 
 
-def _list_edit_commands(editor: Editor, window: WindowActions) -> CommandGroup:
+def _list_edit_commands(editor: Editor, window: WindowActions) -> EditorCommandGroup:
     def select_all() -> None:
         editor.select(Selection.select_all(editor.sketch))
 
@@ -191,7 +169,7 @@ def _list_edit_commands(editor: Editor, window: WindowActions) -> CommandGroup:
     def finish() -> None:
         editor.tool.finish(editor)
 
-    group = CommandGroup("Edit", editor)
+    group = EditorCommandGroup("Edit", editor)
     group.add("undo", "Undo", partial(editor.undo_steps, 1), "ctrl+z", repeats=True)
     group.add("redo", "Redo", partial(editor.undo_steps, -1), "ctrl+y", "ctrl+shift+z", repeats=True)
     group.add("cut", "Cut", partial(actions.cut, editor), "ctrl+x")
@@ -219,11 +197,11 @@ def _list_edit_commands(editor: Editor, window: WindowActions) -> CommandGroup:
     return group
 
 
-def _list_arrange_commands(editor: Editor) -> CommandGroup:
+def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
     def release_all() -> None:
         editor.apply(properties.release(editor.sketch))
 
-    group = CommandGroup("Arrange", editor)
+    group = EditorCommandGroup("Arrange", editor)
     turn = transform.rotate
     group.add_edit("rotate:left", "Turn by 90° to the left", turn, "q", value=90.0, repeats=True)
     group.add_edit("rotate:right", "Turn by 90° to the right", turn, "e", value=-90.0, repeats=True)
@@ -252,7 +230,7 @@ def _list_arrange_commands(editor: Editor) -> CommandGroup:
     return group
 
 
-def _list_combine_commands(editor: Editor) -> CommandGroup:
+def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
     def clip() -> None:
         selection = editor.selection.without_vertices()
         editor.apply(boolean.clip_to_boundary(editor.sketch, selection))
@@ -260,7 +238,7 @@ def _list_combine_commands(editor: Editor) -> CommandGroup:
     def fill_unreachable() -> None:
         editor.apply(fixes.fill_unreachable(editor.sketch, editor.radius))
 
-    group = CommandGroup("Combine", editor)
+    group = EditorCommandGroup("Combine", editor)
     group.add_edit("unite", "Unite", boolean.unite, "alt+u")
     group.add_edit("subtract", "Subtract the upper ones", boolean.subtract, "alt+s")
     group.add_edit("intersect", "Keep what they have in common", boolean.intersect, "alt+i")
@@ -275,12 +253,12 @@ def _list_combine_commands(editor: Editor) -> CommandGroup:
     return group
 
 
-def _list_vertex_commands(editor: Editor) -> CommandGroup:
+def _list_vertex_commands(editor: Editor) -> EditorCommandGroup:
     bevel = partial(actions.trim_corners, editor, vertices.bevel_corners)
     round_corners = partial(actions.trim_corners, editor, vertices.round_corners)
     widen = partial(actions.scale_wall_width, editor, WALL_WIDTH_STEP)
     narrow = partial(actions.scale_wall_width, editor, 1.0 / WALL_WIDTH_STEP)
-    group = CommandGroup("Vertices", editor)
+    group = EditorCommandGroup("Vertices", editor)
     group.add("bevel", "Cut corners off", bevel, "shift+b")
     group.add("round", "Round corners", round_corners, "shift+r")
     group.add("split", "Cut a wall in two here", partial(actions.split_wall, editor), "shift+c")
@@ -299,22 +277,22 @@ def _list_vertex_commands(editor: Editor) -> CommandGroup:
     return group
 
 
-def _list_grid_commands(editor: Editor) -> CommandGroup:
-    group = CommandGroup("Snap", editor)
+def _list_grid_commands(editor: Editor) -> EditorCommandGroup:
+    group = EditorCommandGroup("Snap", editor)
     group.add("grid:finer", "Finer grid", editor.refine_grid, "-", repeats=True)
     group.add("grid:coarser", "Coarser grid", editor.coarsen_grid, "=", "+", repeats=True)
     group.add("snap:all", "Snap to everything, or to nothing", editor.toggle_all_snaps, "0")
     return group
 
 
-def _list_view_commands(editor: Editor, canvas: EditorCanvas, window: WindowActions) -> CommandGroup:
+def _list_view_commands(editor: Editor, canvas: EditorCanvas, window: WindowActions) -> EditorCommandGroup:
     def fit_selection() -> None:
         canvas.fit(editor.selection)
 
     def pan(x: int, y: int) -> None:
         canvas.pan(-PAN_STEP_PX * x, PAN_STEP_PX * y)
 
-    group = CommandGroup("View", editor)
+    group = EditorCommandGroup("View", editor)
     group.add("fit", "Show the whole map", canvas.fit, "f")
     group.add("fit:selection", "Show the selection", fit_selection, "z")
     group.add("zoom:in", "Zoom in", partial(canvas.zoom, ZOOM_STEP), "ctrl+=", "ctrl++", repeats=True)
@@ -333,11 +311,11 @@ def _list_view_commands(editor: Editor, canvas: EditorCanvas, window: WindowActi
     return group
 
 
-def _list_robot_commands(editor: Editor) -> CommandGroup:
+def _list_robot_commands(editor: Editor) -> EditorCommandGroup:
     def add_uniform_start() -> None:
         editor.apply(create.add_uniform_start(editor.sketch))
 
-    group = CommandGroup("Robots", editor)
+    group = EditorCommandGroup("Robots", editor)
     group.add("start:uniform", "A start anywhere in the free space", add_uniform_start, "shift+u")
     group.add("start:next", "Next start of the map", partial(actions.select_next_start, editor), "shift+n")
     make_default = partial(actions.make_default_start, editor)
@@ -347,31 +325,31 @@ def _list_robot_commands(editor: Editor) -> CommandGroup:
     return group
 
 
-def _list_help_commands(editor: Editor, window: WindowActions) -> CommandGroup:
-    group = CommandGroup("Help", editor)
+def _list_help_commands(editor: Editor, window: WindowActions) -> EditorCommandGroup:
+    group = EditorCommandGroup("Help", editor)
     group.add("help", "Keys", window.toggle_help, "f1", "shift+/")
     group.add("palette", "Commands by name", window.open_palette, "ctrl+k", "/")
     return group
 
 
-def _list_tool_commands(editor: Editor) -> CommandGroup:
-    group = CommandGroup("Tools", editor)
+def _list_tool_commands(editor: Editor) -> EditorCommandGroup:
+    group = EditorCommandGroup("Tools", editor)
     for tool in editor.tools.values():
         choose = partial(editor.choose_tool, tool.name)
         group.add(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", choose, tool.key)
     return group
 
 
-def _list_snap_commands(editor: Editor) -> CommandGroup:
-    group = CommandGroup("Snap", editor)
+def _list_snap_commands(editor: Editor) -> EditorCommandGroup:
+    group = EditorCommandGroup("Snap", editor)
     for number, (name, mode) in enumerate(SNAPS.items(), 1):
         toggle = partial(editor.toggle_snap, name)
         group.add(f"snap:{name}", f"Snap to {mode.title.lower()}", toggle, str(number))
     return group
 
 
-def _list_layer_commands(editor: Editor) -> CommandGroup:
-    group = CommandGroup("View", editor)
+def _list_layer_commands(editor: Editor) -> EditorCommandGroup:
+    group = EditorCommandGroup("View", editor)
     for name, layer in LAYERS.items():
         group.add(f"show:{name}", layer.title, partial(editor.toggle_layer, name), layer.key)
     return group

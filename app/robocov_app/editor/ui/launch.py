@@ -27,7 +27,8 @@ from robocov_app.storage.settings import (
     merge_changed_settings,
     save_settings,
 )
-from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
+from robocov_app.toolkit.dialogs import create_recovery_question
+from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
 from robocov_app.toolkit.faults import FaultLog
 
 NO_DISPLAY = (
@@ -101,7 +102,7 @@ def editor_window(
             set_reference_image(editor, background)
             editor.choose_tool("picture", shows_hint=False)
         window_size = _choose_size(size, settings, has_display=has_display)
-        window_scale = _choose_scale(scale, settings, has_display=has_display)
+        window_scale = choose_scale(scale or settings.scale, has_display=has_display)
         if settings_error:
             editor.show_message(settings_error)
         elif path is not None and document is opened:
@@ -138,13 +139,6 @@ def _choose_size(
     return fit_to_screen(saved) if has_display else saved
 
 
-def _choose_scale(scale: float | None, settings: EditorSettings, *, has_display: bool) -> float:
-    chosen = scale or settings.scale
-    if chosen:
-        return chosen
-    return get_screen_scale() if has_display else 1.0
-
-
 def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
     """Offer to recover the first of several drafts; after discarding it, the next one."""
     if not drafts:
@@ -156,13 +150,15 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
         remove_draft(draft.folder)
         offer_recovery(window, others)
 
-    text = f"An editor ended without saving: {draft.describe()}."
-    if others:
-        verb = "are" if len(others) > 1 else "is"
-        text += f"\n{len(others)} more {verb} kept besides."
-    recover = ("Recover", "r", partial(window.documents.recover, draft))
-    later = ("Later", "l", lambda: None)
-    window.editor.ask_question("Recover unsaved work?", text, recover, ("Discard", "d", discard), later)
+    editor = window.editor
+    question = create_recovery_question(
+        f"An editor ended without saving: {draft.describe()}.",
+        others=len(others),
+        recover=partial(editor.attempt, partial(window.documents.recover, draft)),
+        discard=partial(editor.attempt, discard),
+        postpone=lambda: None,
+    )
+    editor.dialogs.ask(question)
 
 
 def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:

@@ -1,7 +1,7 @@
 """Dialogs over a window: questions with answers, lists from which one chooses by typing, files.
 
 - `dialog`, `dialogs`: what all dialogs have in common; the one that is open gets the events
-- `question`, `choice`, `file_choice`: the kinds of dialogs
+- `question`, `choice`, `file_choice`, `recovery`: the kinds of dialogs
 """
 
 from robocov_app.toolkit.dialogs.choice import Choice, Option, create_list_choice
@@ -9,6 +9,7 @@ from robocov_app.toolkit.dialogs.dialog import Dialog
 from robocov_app.toolkit.dialogs.dialogs import Dialogs
 from robocov_app.toolkit.dialogs.file_choice import MAX_FOLDER_ENTRIES, create_file_choice
 from robocov_app.toolkit.dialogs.question import Answer, Question
+from robocov_app.toolkit.dialogs.recovery import create_recovery_question
 
 __all__ = [
     "MAX_FOLDER_ENTRIES",
@@ -20,4 +21,5 @@ __all__ = [
     "Question",
     "create_file_choice",
     "create_list_choice",
+    "create_recovery_question",
 ]

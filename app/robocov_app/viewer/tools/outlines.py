@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.environment import Point, WallObstacle
 from robocov.errors import RobocovError
-from robocov_app.toolkit.draw_tools import SAME, Outline
+from robocov_app.toolkit.drawn_outline import SAME_POINT_M, DrawnOutline
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.snapping import SNAP_REACH_FRACTION, snap_point
@@ -26,36 +26,36 @@ class SnappedOutline:
 
     Attributes
     ----------
-    outline : Outline
+    outline : DrawnOutline
         The points so far.
     end_fraction : float
         Fraction of a finger's width from the last point within which a press completes the outline.
     """
 
-    outline: Outline
+    outline: DrawnOutline
     end_fraction: float = 0.0
     _reach: float = 0.0
 
     def press(self, session: Session, point: Point, reach: float) -> bool:
         """Add a point; return whether that completes the outline."""
         self._reach = reach
-        same_point = max(SAME, self.end_fraction * reach)
+        same_point = max(SAME_POINT_M, self.end_fraction * reach)
         return self.outline.press(self._snap(session, point), point, reach, same_point)
 
     def move(self, session: Session, point: Point) -> None:
         """Move the end of the line that follows the cursor."""
-        self.outline.at = self._snap(session, point) if self.outline.points else point
+        self.outline.cursor = self._snap(session, point) if self.outline.points else point
 
     def release(self, session: Session, point: Point) -> bool:
         """End a drag; return whether that completes the outline."""
         is_complete = self.outline.release(self._snap(session, point), point, self._reach)
         if is_complete:
-            self.outline.points.append(self.outline.at)
+            self.outline.points.append(self.outline.cursor)
         return is_complete
 
     def take_points(self) -> list[Point]:
         """Return the points, and start over."""
-        return self.outline.take()
+        return self.outline.take_points()
 
     def cancel(self) -> bool:
         """Drop the points; return whether there were any."""
@@ -65,7 +65,7 @@ class SnappedOutline:
         """Return the line up to the cursor, with the length of its last edge."""
         if not self.outline.points:
             return None
-        line = (*self.outline.points, self.outline.at)
+        line = (*self.outline.points, self.outline.cursor)
         return Preview(line, is_closed=len(line) > 2, label=f"{dist(line[-2], line[-1]):.2f} m")
 
     def _snap(self, session: Session, point: Point) -> Point:
@@ -83,7 +83,7 @@ class AddPolygonTool(Tool):
     ends_on_double_click = True
 
     drawing: SnappedOutline = field(
-        default_factory=lambda: SnappedOutline(Outline(least=3, closes=True)), repr=False
+        default_factory=lambda: SnappedOutline(DrawnOutline(min_points=3, closes=True)), repr=False
     )
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
@@ -132,7 +132,7 @@ class AddWallTool(Tool):
     is_resizable = True
 
     drawing: SnappedOutline = field(
-        default_factory=lambda: SnappedOutline(Outline(drags=True), WALL_END_FRACTION), repr=False
+        default_factory=lambda: SnappedOutline(DrawnOutline(drags=True), WALL_END_FRACTION), repr=False
     )
     width: float = DEFAULT_WALL_WIDTH_M
 

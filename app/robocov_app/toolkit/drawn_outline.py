@@ -1,0 +1,109 @@
+"""Outlines drawn with the mouse, point by point or with a single drag; tools make shapes of them."""
+
+from dataclasses import dataclass, field
+from math import dist
+from typing import TypeAlias
+
+Point: TypeAlias = tuple[float, float]
+
+SAME_POINT_M = 1e-6
+"""Distance below which two points are the same."""
+_UNLIMITED = 1_000_000
+
+
+@dataclass
+class DrawnOutline:
+    """Points that are being drawn.
+
+    Attributes
+    ----------
+    min_points, max_points : int
+        Number of points that are needed, and with which the outline is complete.
+    closes : bool
+        Whether a press on the first point completes it.
+    drags : bool
+        Whether it can also be drawn by a single drag.
+    points : list of (x, y), m
+    cursor : (x, y), m
+        Position under the mouse.
+    is_dragging : bool
+        Whether the button is held down since the first point.
+    """
+
+    min_points: int = 2
+    max_points: int = _UNLIMITED
+    closes: bool = False
+    drags: bool = False
+    points: list[Point] = field(default_factory=list)
+    cursor: Point = (0.0, 0.0)
+    is_dragging: bool = False
+    _pressed_at: Point = (0.0, 0.0)
+
+    def press(self, point: Point, raw: Point, closing_reach: float, same_point: float = SAME_POINT_M) -> bool:
+        """Add a point.
+
+        Parameters
+        ----------
+        point : (x, y), m
+            The snapped position of the mouse.
+        raw : (x, y), m
+            The position of the mouse.
+        closing_reach : float, m
+            Distance from the first point within which a press completes a closed outline.
+        same_point : float, m
+            Distance from the last point within which a press completes the outline.
+
+        Returns
+        -------
+        bool
+            Whether the outline is complete.
+        """
+        self.cursor = point
+        has_enough = len(self.points) >= self.min_points
+        if self.closes and has_enough and dist(point, self.points[0]) < closing_reach:
+            return True
+        if self.points and dist(point, self.points[-1]) < same_point:
+            return has_enough
+        self.points.append(point)
+        self._pressed_at = raw
+        self.is_dragging = self.drags and len(self.points) == 1
+        return len(self.points) == self.max_points
+
+    def release(self, point: Point, raw: Point, reach: float, *, clicked: bool = False) -> bool:
+        """End a drag.
+
+        Parameters
+        ----------
+        point, raw : (x, y), m
+            Snapped position and position of the mouse.
+        reach : float, m
+            Distance that a drag must reach, so that a shaky click draws nothing. Not needed for outlines of
+            two points.
+        clicked : bool
+            Whether the mouse has hardly moved.
+
+        Returns
+        -------
+        bool
+            Whether the outline is complete.
+        """
+        was_dragging = self.is_dragging
+        self.is_dragging = False
+        # A key may have removed the first point during the drag.
+        if not was_dragging or not self.points or clicked:
+            return False
+        self.cursor = point
+        return self.max_points == 2 or dist(self._pressed_at, raw) >= reach
+
+    def take_points(self) -> list[Point]:
+        """Return the points, with the cursor as the second of two, and start again."""
+        points = self.points
+        if self.max_points == 2 and len(points) == 1:
+            points = [*points, self.cursor]
+        self.points = []
+        self.is_dragging = False
+        return points
+
+    def cancel(self) -> bool:
+        """Remove all points; return whether there were any."""
+        return bool(self.take_points())
