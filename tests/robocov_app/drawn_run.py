@@ -78,7 +78,7 @@ def run_of(
 def scene_of(record: Record, row: int = -1, cost: str = "mean distance 1.234 m") -> Scene:
     """Return the scene of one row of a record."""
     row %= len(record)
-    return Scene.of(
+    return Scene.from_snapshot(
         record.environment,
         record.team,
         record.snapshot(row),
@@ -114,4 +114,4 @@ def explained(
         1.5,
     )
     terms = {"attraction": forces, "repulsion_robots": forces, "repulsion_obstacle": forces}
-    return Scene.of(SQUARE, team, Snapshot(seen, Decision(forces, goals, terms)), label="RAPF")
+    return Scene.from_snapshot(SQUARE, team, Snapshot(seen, Decision(forces, goals, terms)), label="RAPF")

@@ -93,7 +93,7 @@ def describe_state(session: Session) -> list[object]:
             pane.trail.times,
             pane.distance_curve.times,
             pane.distance_curve.values,
-            *pane.sensed.until(np.inf),
+            *pane.sensed.get_until(np.inf),
         ]
         state += [pane.number, pane.setup, pane.time]
         state += [array.tobytes() for array in arrays]

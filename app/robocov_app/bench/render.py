@@ -15,7 +15,7 @@ from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
 from robocov_app.render.picture import Painter
-from robocov_app.render.scene import record_scene
+from robocov_app.render.record_scene import build_record_scene
 from robocov_app.runs.encoding import encode_png, save_video
 from robocov_app.runs.frames import draw_frames
 from robocov_app.runs.settings import VideoSettings
@@ -40,7 +40,7 @@ def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
     record = _simulate(name, robots)
     painter = Painter(record.environment, SIZE_PX)
     canvas = pygame.Surface(SIZE_PX)
-    scenes = cycle([record_scene(record, k) for k in range(len(record))])
+    scenes = cycle([build_record_scene(record, k) for k in range(len(record))])
     calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": build_clearing_call(canvas)}
     times = measure_in_alternation(calls, 40 if quick else 150)
     yield Row(

@@ -23,7 +23,8 @@ from robocov_app.look.robot_colors import ColorScheme, choose_robot_hues, choose
 from robocov_app.look.theme import Theme
 from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
-from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
+from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
+from robocov_app.render.scene import CENTROID, GOAL, are_centroids
 
 # radius of a robot where it has room and in the densest crowd, and least size of its number, in points
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
@@ -63,7 +64,7 @@ def draw_map(
         rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
         outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
         axes.add_patch(PathPatch(outline, zorder=2, **_static_style(theme)))
-    for obstacle in moving_obstacles(environment, time):
+    for obstacle in list_moving_obstacles(environment, time):
         _draw_motion(axes, environment, obstacle, theme)
     rim: Any = {"edgecolor": tone(theme.boundary), "linewidth": 1.6, "joinstyle": "miter"}
     vertices = environment.region.vertices

@@ -193,7 +193,7 @@ class EpisodeEnv:
         from robocov_app.render.scene import Scene
 
         trail = np.array(episode.trail)
-        return Scene.of(
+        return Scene.from_snapshot(
             episode.environment,
             episode.team,
             episode.take_snapshot(),

@@ -127,8 +127,8 @@ class SensedObstacles:
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         assert scene.sensed is not None
-        points, robots = scene.sensed.until(scene.now.time)
-        asked = None if scene.selected is None else scene.number(scene.selected)
+        points, robots = scene.sensed.get_until(scene.now.time)
+        asked = None if scene.selected is None else scene.get_number(scene.selected)
         size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
         key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.shown, asked
         # objects rather than their ids, which others may get when these are gone

@@ -12,7 +12,8 @@ import shapely
 from robocov_app.look.colors import Color
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
-from robocov_app.render.scene import MovingObstacle, Scene
+from robocov_app.render.moving_obstacles import MovingObstacle
+from robocov_app.render.scene import Scene
 
 GRID_GAP = 34.0  # least distance between the lines of the grid in pixels at scale 1
 NARROW = 20.0  # width of cells in pixels at scale 1 below which their edges are not smooth: they hardly show

@@ -159,7 +159,7 @@ def draw_failed(canvas: Canvas, scene: Scene) -> None:
     failed = canvas.camera.to_pixels(np.array(list(scene.failed.values())))
     working = canvas.camera.to_pixels(scene.snapshot.positions) if scene.snapshot else np.empty((0, 2))
     centers = np.concatenate([failed, working])
-    own = [scene.failed_radius(number) for number in scene.failed]
+    own = [scene.get_failed_radius(number) for number in scene.failed]
     true = np.array([*own, *(scene.team.radius if scene.snapshot else ())]) * canvas.camera.zoom
     fitted = fitted_radii(centers, true, SMALLEST * canvas.scale, 0.85 * READABLE * canvas.scale)
     radii = rounded(np.minimum(fitted[: len(failed)], 400.0)).tolist()
@@ -218,7 +218,7 @@ def belief_legend(scene: Scene) -> list[LegendEntry]:
     assert scene.selected is not None
     if scene.now.seen.reported_positions is None:
         return []
-    words = f"as robot {scene.number(scene.selected)} believes"
+    words = f"as robot {scene.get_number(scene.selected)} believes"
     return [LegendEntry(words, lambda canvas, x, y: _stamp_belief(canvas, 0, [x, y]))]
 
 

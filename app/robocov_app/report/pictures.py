@@ -18,7 +18,7 @@ from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.density import dots, shading
 from robocov_app.render.layout import fitted_radii, mark_size
-from robocov_app.render.scene import MovingObstacle, moving_obstacles
+from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.report.descriptions import describe_map, describe_run
 from robocov_app.runs.saved_runs import build_roster
 
@@ -251,7 +251,7 @@ def _draw_map_shapes(environment: Environment, frame: PictureFrame, time: float)
     rings = [frame.to_pixels(ring) for ring in extract_rings(obstacles)]
     if rings:
         shapes.append(f'<path class="blocked" d="{_format_path(rings, is_closed=True)}"/>')
-    moving = moving_obstacles(environment, time)
+    moving = list_moving_obstacles(environment, time)
     shapes += [_draw_moving_obstacle(obstacle, environment, frame) for obstacle in moving]
     region = _format_path([frame.to_pixels(environment.region.vertices)], is_closed=True)
     shapes.append(f'<path class="region" d="{region}"/>')

@@ -14,7 +14,7 @@ from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.distance_field import Fields
 from robocov_app.render.layers import Layer
 from robocov_app.render.picture import Painter, standard_layers
-from robocov_app.render.scene import record_scene
+from robocov_app.render.record_scene import build_record_scene
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.settings import VideoSettings
 
@@ -85,7 +85,7 @@ def draw_frames(
     if rows is None:
         rows = select_frame_rows(record.time, settings.fps, settings.speed)
     for row, repetitions in groupby(rows.tolist()):
-        scene = record_scene(
+        scene = build_record_scene(
             record,
             row,
             cost=_describe_cost(record, cost, float(record.time[row])),

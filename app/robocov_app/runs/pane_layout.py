@@ -16,7 +16,8 @@ from robocov_app.render.canvas import LegendEntry
 from robocov_app.render.distance_field import Fields
 from robocov_app.render.layout import columns_for
 from robocov_app.render.picture import Painter, pane_layers, scale_for
-from robocov_app.render.scene import Scene, record_scene
+from robocov_app.render.record_scene import build_record_scene
+from robocov_app.render.scene import Scene
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.frames import build_painter
 from robocov_app.runs.settings import VideoSettings
@@ -186,9 +187,9 @@ def _select_legend_scenes(records: Sequence[Record], fields: Fields | None, pain
     shown_fields = fields if painter.needs_field else None
     scenes = []
     for record in records:
-        scenes.append(record_scene(record, 0, fields=shown_fields))
+        scenes.append(build_record_scene(record, 0, fields=shown_fields))
         if record.conditions and len(record) > 1:
-            scenes.append(record_scene(record, len(record) - 1, fields=shown_fields))
+            scenes.append(build_record_scene(record, len(record) - 1, fields=shown_fields))
     return scenes
 
 

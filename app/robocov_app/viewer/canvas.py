@@ -158,7 +158,7 @@ class ViewerCanvas:
         distances = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
         radii = np.array(drawn_radii(canvas, scene)) + _HIT_MARGIN_PX * self.layout.scale
         rows = np.flatnonzero(distances <= radii).tolist()
-        hits = [(float(distances[row]), scene.number(row)) for row in rows]
+        hits = [(float(distances[row]), scene.get_number(row)) for row in rows]
         for number, position in scene.failed.items():
             distance = float(np.hypot(*(np.array(position) - point))) * canvas.camera.zoom
             if distance <= FAILED_RADIUS_PX * self.layout.scale:

@@ -40,7 +40,7 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
     """Draw a ring around the selected robot if it has failed; painters do so around others."""
     if selected is None or selected not in scene.failed:
         return
-    radius = scene.failed_radius(selected) * canvas.camera.zoom
+    radius = scene.get_failed_radius(selected) * canvas.camera.zoom
     radius = max(radius, FAILED_RADIUS_PX * canvas.scale)
     ring = partial(sprites.ring, round(radius) + 4.0 * canvas.scale, canvas.theme.ink, 2.2 * canvas.scale)
     canvas.stamp(ring, canvas.camera.to_pixels(np.array(scene.failed[selected])).tolist())

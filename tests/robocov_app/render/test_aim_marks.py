@@ -10,7 +10,7 @@ from drawn_run import SQUARE, explained
 from robocov.observation import Decision, Snapshot
 from robocov.voronoi import partition
 from robocov_app.look.theme import LIGHT
-from robocov_app.render.scene import SAME, Scene, are_centroids
+from robocov_app.render.scene import CENTROID_TOLERANCE_M, Scene, are_centroids
 
 CENTROIDS = partition(TWO, SQUARE.region).centroid
 UPRIGHT = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])
@@ -26,7 +26,7 @@ def test_centroids_are_plus_signs() -> None:
 @pytest.mark.parametrize("layer", ["centroids", "goals"])
 def test_goals_of_another_kind_are_times_signs(layer: str) -> None:
     """A controller that does not head for centroids does not know of them."""
-    goals = CENTROIDS + (0.0, 2.0 * SAME)
+    goals = CENTROIDS + (0.0, 2.0 * CENTROID_TOLERANCE_M)
     goals[1] += 1.0
     frame, painter = drawn(explained(TWO, goals=goals), layer)
     for center in painter.camera.to_pixels(goals):
@@ -49,7 +49,7 @@ def test_who_hears_only_some_still_heads_for_a_centroid() -> None:
     heard = replace(alone, centroid=np.repeat(alone.centroid, 2, axis=0))
     decision = Decision(np.zeros((2, 2)), heard.centroid, cells=heard)
     assert scene.snapshot is not None
-    limited = Scene.of(
+    limited = Scene.from_snapshot(
         SQUARE, replace(scene.team, communication_range=np.ones(2)), Snapshot(scene.snapshot.seen, decision)
     )
     assert not are_centroids(heard.centroid, CENTROIDS)

@@ -26,7 +26,7 @@ STARTS = np.array([[3.0, 1.0], [6.0, 2.0], [4.0, 6.0]])
 
 def scene_of(environment: Environment, **more) -> Scene:
     simulation = Simulation(environment, Rapf(), STARTS)
-    return replace(Scene.of(environment, simulation.team, simulation.observe_and_decide()), **more)
+    return replace(Scene.from_snapshot(environment, simulation.team, simulation.observe_and_decide()), **more)
 
 
 def pixel(painter: Painter, frame, x: float, y: float):

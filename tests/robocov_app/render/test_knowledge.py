@@ -13,8 +13,9 @@ from robocov_app.look.colors import compute_contrast, mix
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render import knowledge
 from robocov_app.render.camera import Camera
+from robocov_app.render.moving_obstacles import list_moving_obstacles
 from robocov_app.render.picture import Painter
-from robocov_app.render.scene import Sensed, moving_obstacles
+from robocov_app.render.sensed_points import SensedPoints
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
@@ -108,7 +109,7 @@ SEEN = np.array([[7.2, 2.8], [11.0, 3.75], [4.0, 5.0]])
 
 def knowing(points=SEEN, numbers=(1, 2, 3), time=0.0, n=4, **more):
     """Return a scene in which robots have sensed points."""
-    sensed = Sensed()
+    sensed = SensedPoints()
     sensed.add(time, numbers, np.asarray(points))
     return replace(scene_of(run_of(ROOMS, n)), sensed=sensed, **more)
 
@@ -145,7 +146,9 @@ class TestSensedObstacles:
         )
         island = PolygonObstacle(((1.5, 1.5), (6.5, 1.5), (6.5, 6.5), (1.5, 6.5)))
         yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
-        frame, painter = drawn(replace(scene_of(run_of(yard, 2)), sensed=Sensed()), "obstacles", "sensed")
+        frame, painter = drawn(
+            replace(scene_of(run_of(yard, 2)), sensed=SensedPoints()), "obstacles", "sensed"
+        )
         pale = mix(LIGHT.background, LIGHT.obstacle, 0.3)
         for point, color in (((0.75, 4.0), pale), ((4.0, 4.0), pale), ((1.25, 4.0), LIGHT.background)):
             assert distance(frame, painter.camera.to_pixels(np.array(point)), color) == 0
@@ -153,13 +156,13 @@ class TestSensedObstacles:
     def test_the_boundary_stays_as_it_is(self):
         scene = scene_of(run_of(HALL, 2))  # a third of it lies along what is outside
         plain, painter = drawn(scene, "obstacles", "boundary")
-        frame, _ = drawn(replace(scene, sensed=Sensed()), "obstacles", "boundary", "sensed")
+        frame, _ = drawn(replace(scene, sensed=SensedPoints()), "obstacles", "boundary", "sensed")
         corners = HALL.region.vertices
         for part in np.linspace(0.01, 0.99, 60):
             for pixel in painter.camera.to_pixels(corners + part * (np.roll(corners, -1, axis=0) - corners)):
                 x, y = np.rint(pixel).astype(int)
                 assert np.abs(frame[y, x] - plain[y, x]).max() < 50
-        pale, _ = drawn(replace(scene, sensed=Sensed()), "obstacles", "sensed")
+        pale, _ = drawn(replace(scene, sensed=SensedPoints()), "obstacles", "sensed")
         assert (pale != frame).any()
 
     def test_where_obstacles_are_not_shown_only_points_are(self):
@@ -180,7 +183,7 @@ class TestSensedObstacles:
 
     def test_points_come_and_go_with_time(self):
         record = run_of(ROOMS, 4)
-        sensed = Sensed()
+        sensed = SensedPoints()
         for time, point in zip((0.0, 1.0, 2.0), SEEN, strict=True):
             sensed.add(time, (1,), point[None])
         painter = Painter(ROOMS, SIZE)
@@ -194,7 +197,7 @@ class TestSensedObstacles:
         painter.show({"obstacles", "sensed"})
         scene = knowing(SEEN[:2], (1, 2))
         painter.frame(scene)
-        scene.sensed.cut(-1.0)  # the same object, as long as before
+        scene.sensed.remove_after(-1.0)  # the same object, as long as before
         scene.sensed.add(0.0, (1, 2), SEEN[1:])
         assert dots(painter.frame(scene).astype(int), painter) == [False, True, True]
         assert dots(painter.frame(knowing(SEEN[:2], (1, 2))).astype(int), painter) == [True, True, False]
@@ -220,7 +223,7 @@ class TestSensedObstacles:
             dots_of(canvas, centers, *style)
 
         monkeypatch.setattr(knowledge, "_dots", watched)
-        sensed = Sensed()
+        sensed = SensedPoints()
         layer = layer_named("sensed")
         painter = Painter(ROOMS, SIZE, layers=[layer])
         painter.show({"sensed"})
@@ -240,7 +243,7 @@ class TestSensedObstacles:
             (12.0, 7.0), 0.8, "cart", ObstaclePath(((12, 7), (15, 7)), 1.0, "back-and-forth")
         )
         carts = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
-        scene = replace(knowing(), environment=carts.at(1.0), moving=moving_obstacles(carts, 1.0))
+        scene = replace(knowing(), environment=carts.at(1.0), moving=list_moving_obstacles(carts, 1.0))
         frame, painter = drawn(scene, "sensed", "obstacles", theme=theme)
         middle = painter.camera.to_pixels(np.array([13.0, 7.0]))
         assert nearest(frame, middle, theme.ink) < 30

@@ -17,8 +17,9 @@ from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.marks import drawn_radii
+from robocov_app.render.moving_obstacles import list_moving_obstacles
 from robocov_app.render.picture import Painter, standard_layers
-from robocov_app.render.scene import Scene, moving_obstacles
+from robocov_app.render.scene import Scene
 
 
 def test_every_layer_has_a_name_of_its_own_and_words():
@@ -309,8 +310,8 @@ class TestNumbers:
         assert (self.patch(frame, painter, (4.0, 4.0)) == self.patch(expected, painter, (4.0, 4.0))).all()
         unnamed, _ = drawn(replace(named, numbers=None), "robots")
         assert (self.patch(unnamed, painter, (4.0, 4.0)) != self.patch(expected, painter, (4.0, 4.0))).any()
-        assert [named.number(row) for row in (0, 1)] == [7, 2]
-        assert [explained(TWO).number(row) for row in (0, 1)] == [1, 2]
+        assert [named.get_number(row) for row in (0, 1)] == [7, 2]
+        assert [explained(TWO).get_number(row) for row in (0, 1)] == [1, 2]
 
     @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
     def test_in_a_small_team_colors_stay_with_them(self, theme):
@@ -337,7 +338,7 @@ class TestCells:
         scene = explained(TWO, communication_range=reach)
         decision = replace(scene.snapshot.decision, cells=used)
         snapshot = Snapshot(scene.snapshot.seen, decision)
-        return Scene.of(SQUARE, scene.team, snapshot)
+        return Scene.from_snapshot(SQUARE, scene.team, snapshot)
 
     def test_those_of_the_law_are_taken_where_all_hear_all(self):
         used = partition(TWO, SQUARE.region)
@@ -424,14 +425,14 @@ class TestMovingObstacles:
     )
 
     def scene(self, time: float) -> Scene:
-        return Scene(self.CARTS.at(time), Team.homogeneous(1), moving=moving_obstacles(self.CARTS, time))
+        return Scene(self.CARTS.at(time), Team.homogeneous(1), moving=list_moving_obstacles(self.CARTS, time))
 
     def test_know_where_they_are_and_head(self):
-        (cart,) = moving_obstacles(self.CARTS, 6.0)
+        (cart,) = list_moving_obstacles(self.CARTS, 6.0)
         assert cart.middle == pytest.approx([5.0, 3.0])
         assert cart.heading == pytest.approx([0.0, 1.0])
         assert cart.path.tolist() == pytest.approx(np.array([[1, 1], [5, 1], [5, 4], [1, 1]]))
-        assert moving_obstacles(self.CARTS.static, 6.0) == []
+        assert list_moving_obstacles(self.CARTS.static, 6.0) == []
 
     @pytest.mark.parametrize("theme", [LIGHT, DARK])
     def test_look_different_from_static_ones(self, theme):

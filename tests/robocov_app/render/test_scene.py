@@ -15,9 +15,10 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov_app.figures.runs import plot_trajectories
 from robocov_app.look.theme import LIGHT
-from robocov_app.render import scene as module
+from robocov_app.render import sensed_points
 from robocov_app.render.picture import Painter, standard_layers
-from robocov_app.render.scene import CELL, Sensed, record_scene
+from robocov_app.render.record_scene import build_record_scene
+from robocov_app.render.sensed_points import CELL_SIZE_M, SensedPoints
 from robocov_app.runs.frames import draw_frames
 from robocov_app.runs.settings import VideoSettings
 
@@ -34,7 +35,7 @@ def record() -> Record:
 
 
 def test_robots_that_work_failed_ones_and_obstacles_where_they_are(record: Record) -> None:
-    first, later, last = (record_scene(record, row) for row in (0, 12, 30))
+    first, later, last = (build_record_scene(record, row) for row in (0, 12, 30))
     assert first.numbers == (1, 2, 4)
     assert first.failed == {}
     assert later.numbers == (1, 4)
@@ -53,7 +54,7 @@ def test_robots_that_work_failed_ones_and_obstacles_where_they_are(record: Recor
 
 
 def test_neighbors_are_renumbered(record: Record) -> None:
-    scene = record_scene(record, 30)
+    scene = build_record_scene(record, 30)
     assert scene.snapshot is not None
     whole, part = record.snapshot(30).seen.neighbors, scene.snapshot.seen.neighbors
     rows = np.array(scene.numbers) - 1
@@ -64,7 +65,7 @@ def test_neighbors_are_renumbered(record: Record) -> None:
 
 
 def test_who_joins_has_no_trail_before(record: Record) -> None:
-    scene = record_scene(record, 30)
+    scene = build_record_scene(record, 30)
     assert scene.trail is not None
     assert scene.starts is not None
     assert scene.starts[1].tolist() == pytest.approx([4.5, 2.0], abs=0.05)
@@ -87,7 +88,7 @@ def test_films_and_plots_of_it_can_be_drawn(record: Record) -> None:
 def test_when_all_have_failed_the_map_is_still_drawn() -> None:
     conditions = Conditions(failures=((1, 0.1), (2, 0.1)))
     record = Simulation(HALL, Rapf(), STARTS[:2], conditions=conditions).run(0.5)
-    scene = record_scene(record, len(record) - 1)
+    scene = build_record_scene(record, len(record) - 1)
     assert scene.snapshot is None
     assert list(scene.failed) == [1, 2]
     painter = Painter(HALL, (320, 240), LIGHT, standard_layers(), 1.0)
@@ -97,7 +98,7 @@ def test_when_all_have_failed_the_map_is_still_drawn() -> None:
 
 def test_a_record_of_ideal_conditions_is_shown_as_ever() -> None:
     record = Simulation(HALL.static, Rapf(), STARTS).run(0.1)
-    scene = record_scene(record, 3)
+    scene = build_record_scene(record, 3)
     assert scene.numbers is None
     assert scene.environment is record.environment
     assert scene.team is record.team
@@ -107,83 +108,83 @@ NOTHING = (np.nan, np.nan)
 
 
 def test_points_come_with_their_robots():
-    sensed = Sensed()
+    sensed = SensedPoints()
     sensed.add(0.0, (1, 4), np.array([[1.0, 1.0], [2.0, 2.0]]))
     sensed.add(0.5, (1, 4), np.array([[1.5, 1.0], NOTHING]))
-    points, robots = sensed.until(1.0)
+    points, robots = sensed.get_until(1.0)
     assert len(sensed) == 3
     assert points.tolist() == [[1.0, 1.0], [2.0, 2.0], [1.5, 1.0]]
     assert robots.tolist() == [1, 4, 1]
 
 
 def test_what_is_sensed_again_counts_once():
-    sensed = Sensed()
+    sensed = SensedPoints()
     for k in range(50):
-        sensed.add(k / 60, (1, 2), np.full((2, 2), CELL * (3.1 + 0.01 * k)))
+        sensed.add(k / 60, (1, 2), np.full((2, 2), CELL_SIZE_M * (3.1 + 0.01 * k)))
     # by each robot
     assert len(sensed) == 2
-    assert sensed.until(9.0)[0] == pytest.approx(np.full((2, 2), CELL * 3.1))
-    sensed.add(1.0, (1, 2), np.full((2, 2), CELL * 4.1))
+    assert sensed.get_until(9.0)[0] == pytest.approx(np.full((2, 2), CELL_SIZE_M * 3.1))
+    sensed.add(1.0, (1, 2), np.full((2, 2), CELL_SIZE_M * 4.1))
     assert len(sensed) == 4
     # on both sides of the axes
-    sensed.add(2.0, (1,), np.array([[0.4 * CELL, 0.4 * CELL]]))
-    sensed.add(2.0, (1,), np.array([[-0.4 * CELL, 0.4 * CELL]]))
+    sensed.add(2.0, (1,), np.array([[0.4 * CELL_SIZE_M, 0.4 * CELL_SIZE_M]]))
+    sensed.add(2.0, (1,), np.array([[-0.4 * CELL_SIZE_M, 0.4 * CELL_SIZE_M]]))
     assert len(sensed) == 6
 
 
 def test_nothing_sensed_is_nothing_known():
-    sensed = Sensed()
+    sensed = SensedPoints()
     sensed.add(0.0, (1, 2), np.array([NOTHING, NOTHING]))
     sensed.add(0.0, (), np.empty((0, 2)))
     assert len(sensed) == 0
-    points, robots = sensed.until(1.0)
+    points, robots = sensed.get_until(1.0)
     assert points.shape == (0, 2)
     assert robots.shape == (0,)
 
 
 def test_what_was_known_at_a_time():
-    sensed = Sensed()
+    sensed = SensedPoints()
     for k in range(10):
         sensed.add(float(k), (1,), np.array([[float(k), 0.0]]))
-    assert len(sensed.until(-0.5)[0]) == 0
-    assert len(sensed.until(0.0)[0]) == 1
-    assert sensed.until(4.5)[0][:, 0].tolist() == [0, 1, 2, 3, 4]
-    assert len(sensed.until(1e9)[0]) == 10
+    assert len(sensed.get_until(-0.5)[0]) == 0
+    assert len(sensed.get_until(0.0)[0]) == 1
+    assert sensed.get_until(4.5)[0][:, 0].tolist() == [0, 1, 2, 3, 4]
+    assert len(sensed.get_until(1e9)[0]) == 10
 
 
 def test_what_was_sensed_later_is_forgotten_and_can_be_sensed_again():
-    sensed = Sensed()
+    sensed = SensedPoints()
     for k in range(10):
         sensed.add(float(k), (1,), np.array([[float(k), 0.0]]))
-    sensed.cut(4.0)
+    sensed.remove_after(4.0)
     assert len(sensed) == 5
     sensed.add(5.0, (1,), np.array([[3.0, 0.0]]))
     assert len(sensed) == 5
     sensed.add(6.0, (1,), np.array([[9.0, 0.0]]))
-    assert sensed.until(9.0)[0][:, 0].tolist() == [0, 1, 2, 3, 4, 9]
+    assert sensed.get_until(9.0)[0][:, 0].tolist() == [0, 1, 2, 3, 4, 9]
 
 
 def test_a_copy_is_on_its_own():
-    sensed = Sensed()
+    sensed = SensedPoints()
     sensed.add(0.0, (1,), np.array([[1.0, 1.0]]))
     twin = sensed.copy()
     twin.add(1.0, (1,), np.array([[2.0, 1.0]]))
-    twin.cut(-1.0)
+    twin.remove_after(-1.0)
     twin.add(2.0, (7,), np.array([[5.0, 5.0]]))
-    assert sensed.until(9.0)[0].tolist() == [[1.0, 1.0]]
-    assert sensed.until(9.0)[1].tolist() == [1]
+    assert sensed.get_until(9.0)[0].tolist() == [[1.0, 1.0]]
+    assert sensed.get_until(9.0)[1].tolist() == [1]
     sensed.add(3.0, (1,), np.array([[1.0, 1.0]]))
     assert len(sensed) == 1
-    assert twin.until(9.0)[1].tolist() == [7]
+    assert twin.get_until(9.0)[1].tolist() == [7]
 
 
 def test_more_than_so_many_are_not_remembered(monkeypatch):
-    monkeypatch.setattr(module, "MOST", 1000)
-    sensed = Sensed()
+    monkeypatch.setattr(sensed_points, "MAX_POINTS", 1000)
+    sensed = SensedPoints()
     for k in range(3000):
         sensed.add(float(k), (1, 2), np.array([[float(k), 0.0], [0.0, float(k)]]))
     assert len(sensed) == 1000
-    assert sensed.until(1e9)[0][-1].tolist() == [0.0, 499.0]
+    assert sensed.get_until(1e9)[0][-1].tolist() == [0.0, 499.0]
 
 
 @given(
@@ -197,17 +198,19 @@ def test_more_than_so_many_are_not_remembered(monkeypatch):
     )
 )
 def test_it_is_what_was_sensed_first_in_each_square(steps):
-    sensed, time, kept = Sensed(), 0.0, []
+    sensed, time, kept = SensedPoints(), 0.0, []
     for seconds, points, back in steps:
         time += seconds
         sensed.add(time, range(len(points)), np.array(points).reshape(-1, 2))
         for number, point in enumerate(points):
-            square = number, *np.floor(np.array(point) / CELL).tolist()
+            square = number, *np.floor(np.array(point) / CELL_SIZE_M).tolist()
             if point[0] == point[0] and all(square != known for _, known, _ in kept):
                 kept.append((time, square, point))
         if back is not None:
             time *= back
-            sensed.cut(time)
+            sensed.remove_after(time)
             kept = [each for each in kept if each[0] <= time + 1e-6]
-        assert [tuple(point) for point in sensed.until(time)[0].tolist()] == [point for _, _, point in kept]
-        assert sensed.until(time)[1].tolist() == [square[0] for _, square, _ in kept]
+        assert [tuple(point) for point in sensed.get_until(time)[0].tolist()] == [
+            point for _, _, point in kept
+        ]
+        assert sensed.get_until(time)[1].tolist() == [square[0] for _, square, _ in kept]

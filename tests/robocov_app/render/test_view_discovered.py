@@ -12,7 +12,7 @@ from robocov.team import Team
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.knowledge import discovered_map
-from robocov_app.render.scene import Sensed
+from robocov_app.render.sensed_points import SensedPoints
 
 
 def scene(selected: int | None = 0):
@@ -28,7 +28,7 @@ def scene(selected: int | None = 0):
     memory = Atlas().begin(SQUARE.region, Team.homogeneous(len(plain.team)))
     memory = replace(memory, states=(replace(memory.states[0], known_map=known), *memory.states[1:]))
     snapshot = replace(plain.snapshot, decision=replace(plain.snapshot.decision, memory=memory))
-    return known, replace(plain, snapshot=snapshot, sensed=Sensed(), selected=selected)
+    return known, replace(plain, snapshot=snapshot, sensed=SensedPoints(), selected=selected)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])

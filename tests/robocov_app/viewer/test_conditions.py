@@ -162,7 +162,7 @@ def test_the_beliefs_of_the_selected_robot_are_drawn() -> None:
     session = start_session()
     advance_session(session, 12)
     pane = session.timeline.panes[0]
-    scene = Scene.of(HALL, pane.setup.team, pane.simulation.observe_and_decide())
+    scene = Scene.from_snapshot(HALL, pane.setup.team, pane.simulation.observe_and_decide())
     painter = Painter(HALL, (400, 300), LIGHT, standard_layers(), 1.0)
     # The cells of all robots are the true ones, which neither overlap nor leave gaps.
     assert scene.cells is not None

@@ -112,9 +112,9 @@ def test_sensed_points_are_noted_at_some_steps():
     pane = build_pane(steps=1)
     assert len(pane.sensed) == 3
     points = start_simulation(SETUP, STARTS, DT).observe_and_decide().seen.obstacle_points
-    np.testing.assert_array_equal(pane.sensed.until(0.0)[0], points)
+    np.testing.assert_array_equal(pane.sensed.get_until(0.0)[0], points)
     later = build_pane(steps=STEPS_BETWEEN_SENSED_POINTS)
-    assert later.sensed.until(1.0)[1].tolist() == [1, 2, 3]
+    assert later.sensed.get_until(1.0)[1].tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize("controller", [RAPF, RPF, LLOYD])

@@ -116,7 +116,7 @@ def test_trails_and_sensed_points_are_those_of_the_record(record: Record) -> Non
     np.testing.assert_array_equal(positions[-1], record.positions[round(times[-1] / DT)])
     np.testing.assert_array_equal(pane.starts, record.positions[0])
     simulated_pane = advance_session(start_session(robots=4), STEPS).timeline.panes[0]
-    np.testing.assert_array_equal(pane.sensed.until(0.9)[0], simulated_pane.sensed.until(0.9)[0])
+    np.testing.assert_array_equal(pane.sensed.get_until(0.9)[0], simulated_pane.sensed.get_until(0.9)[0])
 
 
 def test_the_cost_curve_is_that_of_the_file(record: Record) -> None:

@@ -12,7 +12,8 @@ from robocov.observation import Snapshot
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov.world.free_positions import relocate_robots
-from robocov_app.render.scene import Scene, Sensed
+from robocov_app.render.scene import Scene
+from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.states import PaneSetup, PaneState
@@ -62,7 +63,7 @@ class Pane:
         Cost curves by quantity, ``"distance"`` and ``"time"``.
     distance_curve : Curve
         Mean distance to the nearest robot.
-    sensed : Sensed
+    sensed : SensedPoints
         Points that robots have sensed.
     """
 
@@ -75,7 +76,7 @@ class Pane:
         self.trail.add(simulation.time, self.starts)
         self.curves = {"distance": Curve(), "time": Curve()}
         self.distance_curve = self.curves["distance"]
-        self.sensed = Sensed()
+        self.sensed = SensedPoints()
         self._steps = 0
 
     @property
@@ -133,7 +134,7 @@ class Pane:
         Scene
         """
         positions, times = trail
-        return Scene.of(
+        return Scene.from_snapshot(
             setup.environment,
             self.simulation.team if setup is self.setup else setup.team,
             snapshot,

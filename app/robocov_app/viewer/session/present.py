@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
-from robocov_app.render.scene import Sensed
+from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.decision_replay import get_sensor
 from robocov_app.viewer.session.document import MAX_CACHED_STATES, Node, SessionDocument, replay
 from robocov_app.viewer.session.history import RunHistory
@@ -215,14 +215,14 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Non
                 curve.extend(node.curves[pane.number, quantity], last_steps[node.number] * dt)
         if pane.number in old_panes:
             pane.sensed = old_panes[pane.number].sensed.copy()
-            pane.sensed.cut(new.run.time)
+            pane.sensed.remove_after(new.run.time)
         elif new.run.step > 0:
             pane.sensed = _rebuild_sensed_points(new.history, pane)
 
 
-def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> Sensed:
+def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> SensedPoints:
     """Sense again at some of the recorded states."""
-    sensed = Sensed()
+    sensed = SensedPoints()
     stride = max(1, len(history) // MAX_SENSED_STATES)
     for index in range(0, len(history), stride):
         time = history.get_time(index)

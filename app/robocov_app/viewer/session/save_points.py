@@ -116,7 +116,7 @@ def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
             pane.curves = old_panes[pane.number].curves
             pane.distance_curve = pane.curves["distance"]
             pane.sensed = old_panes[pane.number].sensed.copy()
-            pane.sensed.cut(run.time)
+            pane.sensed.remove_after(run.time)
     timeline.follow(None)
     timeline.replace_present(Present(point.head, run, point.history))
     timeline.shown_index = point.shown_index

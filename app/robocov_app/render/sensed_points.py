@@ -1,0 +1,80 @@
+"""Points of obstacles that robots have sensed so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+
+CELL_SIZE_M = 0.05
+"""Points that a robot senses within the same square of this size count once."""
+MAX_POINTS = 20_000
+"""Number of points from which on no more are stored."""
+_TIME_TOLERANCE_S = 1e-6
+
+
+class SensedPoints:
+    """A growing set of points, each with its robot and the time at which it was sensed first."""
+
+    def __init__(self) -> None:
+        self._times = np.empty(0)
+        self._robots = np.empty(0, dtype=np.intp)
+        self._points = np.empty((0, 2))
+        self._known: set[tuple[int, float, float]] = set()
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def add(self, time: float, numbers: Sequence[int], points: Array) -> None:
+        """Add the points that robots sense at a time.
+
+        Parameters
+        ----------
+        time : float, s
+            Not before that of earlier points.
+        numbers : sequence of int
+            Numbers of the robots.
+        points : (n, 2) array, m
+            A point of each robot; nan if it senses nothing.
+        """
+        if len(self) + len(numbers) > MAX_POINTS:
+            return
+        cells = np.floor(points / CELL_SIZE_M)
+        keys = list(zip(numbers, *cells.T.tolist(), strict=True))
+        is_sensed: BoolArray = np.asarray(np.isfinite(points).all(axis=1))
+        new_rows = [row for row, key in enumerate(keys) if is_sensed[row] and key not in self._known]
+        if not new_rows:
+            return
+        self._known.update(keys[row] for row in new_rows)
+        self._times = np.append(self._times, np.full(len(new_rows), time))
+        self._robots = np.append(self._robots, np.asarray(numbers, dtype=np.intp)[new_rows])
+        self._points = np.concatenate([self._points, points[new_rows]])
+
+    def get_until(self, time: float) -> tuple[Array, IntArray]:
+        """Return the points that were known at a time, s.
+
+        Returns
+        -------
+        points : (k, 2) array, m
+        robots : (k,) int array
+            Numbers of the robots.
+        """
+        count = int(np.searchsorted(self._times, time + _TIME_TOLERANCE_S, side="right"))
+        return self._points[:count], self._robots[:count]
+
+    def copy(self) -> SensedPoints:
+        """Return an independent copy."""
+        # The arrays are replaced, never changed.
+        twin = copy(self)
+        twin._known = set(self._known)
+        return twin
+
+    def remove_after(self, time: float) -> None:
+        """Remove the points that were not known at a time, s."""
+        self._points, self._robots = self.get_until(time)
+        self._times = self._times[: len(self._points)]
+        x, y = np.floor(self._points / CELL_SIZE_M).T.tolist()
+        self._known = set(zip(self._robots.tolist(), x, y, strict=True))
