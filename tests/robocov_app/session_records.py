@@ -3,7 +3,7 @@
 import numpy as np
 
 from robocov.record import ARRAYS, Record
-from robocov_app.viewer.headless import parts_of, records_of_part
+from robocov_app.viewer.branch_output.parts import SelectedBranch, build_part_records, split_branch
 from robocov_app.viewer.session.session import Session
 
 COUNTING = """
@@ -24,10 +24,16 @@ class Counting:
 """A controller with memory."""
 
 
+def select_present_branch(session: Session) -> SelectedBranch:
+    """Return the branch that leads to the present."""
+    timeline = session.timeline
+    return SelectedBranch(timeline.document, timeline.head, timeline.step)
+
+
 def build_records(session: Session) -> list[Record]:
     """Build the records of the time since the last edit, one for each pane."""
-    parts = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
-    return records_of_part(parts[-1], session.timeline.document.get_path(session.timeline.head)[0])
+    branch = select_present_branch(session)
+    return build_part_records(split_branch(branch)[-1], branch.root)
 
 
 def build_record(session: Session) -> Record:

@@ -67,16 +67,16 @@ def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
 
     A session is simulated first, into the scratch folder. A story has one folder for each of its parts.
     """
-    from robocov_app.viewer.headless import story_folders
+    from robocov_app.viewer.branch_output.folders import list_part_folders
 
     if path.suffix != _SESSION_SUFFIX:
-        return story_folders(path)
+        return list_part_folders(path)
     from robocov_app.commands import run
 
     run_options = run.Arguments(map=str(path), out=scratch / path.stem, all_branches=True, json=True)
     with Interruption() as interruption:
         stories = [Path(answer["out"]) for answer in run.save_branches(run_options, interruption)]
-    return [section for story in stories for section in story_folders(story)]
+    return [section for story in stories for section in list_part_folders(story)]
 
 
 def _write_report(

@@ -124,7 +124,8 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
     from robocov.errors import InputError
     from robocov.files.result_folder import create_result
     from robocov.kernel_compilation import compile_kernels
-    from robocov_app.viewer.headless import save_story
+    from robocov_app.viewer.branch_output.parts import SelectedBranch
+    from robocov_app.viewer.branch_output.save import save_branch
     from robocov_app.viewer.session.file import load_session, save_session
 
     path = Path(options.map)
@@ -138,7 +139,8 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
             session_copy = result.staging / f"session{path.suffix}"
             save_session(session_copy, session.document, node, step, session.view)
             try:
-                results = save_story(session.document, node, step, result, settings, interruption)
+                branch = SelectedBranch(session.document, node, step)
+                results = save_branch(branch, result, settings, interruption)
             except InputError as error:
                 raise InputError(f"{path}: {error}") from None
             result.save_progress()

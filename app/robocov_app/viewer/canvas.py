@@ -49,7 +49,7 @@ _NO_ROBOT = (-1, -1)
 
 
 class ViewerCanvas:
-    """Draws the panes of a session, and finds what is under the cursor.
+    """Draws the panes of a session, and finds points and robots at pixels.
 
     Parameters
     ----------
@@ -173,7 +173,9 @@ class ViewerCanvas:
         panes = session.timeline.panes
         # A pane that was just added has no place in the layout yet.
         for pane, painter, box in zip(panes, self._painters, self.layout.panes, strict=False):
-            painter.visible = self.viewer.view.layers | self._list_fixed_layers(painter)
+            # The caption of a pane cannot be hidden.
+            fixed_layers = {"caption"} & {layer.name for layer in painter.layers}
+            painter.visible = self.viewer.view.layers | fixed_layers
             scene = self._build_scene(pane, painter)
             surface = screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
@@ -193,11 +195,6 @@ class ViewerCanvas:
             painter.environment = environment
         if before is not None and before.region.bounds != environment.region.bounds:
             self.fit()
-
-    @staticmethod
-    def _list_fixed_layers(painter: Painter) -> set[str]:
-        """Return the layers that cannot be hidden."""
-        return {"caption"} & {layer.name for layer in painter.layers}
 
     def _build_scene(self, pane: Pane, painter: Painter) -> Scene:
         viewer = self.viewer
@@ -272,7 +269,7 @@ class ViewerCanvas:
         return Canvas(surface, self._painters[pane].camera, self.theme, self.layout.scale, hues)
 
     def _draw_overlay(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
-        """Draw on top of a pane what the mouse does."""
+        """Draw drags, highlights and previews on top of a pane."""
         canvas = self._build_canvas(surface, pane, scene)
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
         session = self.viewer.session

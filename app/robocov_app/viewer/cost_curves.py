@@ -11,7 +11,7 @@ TIME_TOLERANCE_S = 1e-9
 
 
 class CostCurves:
-    """Asks for the costs of what is shown, and adds the answers to the curves of the panes.
+    """Asks for the costs of the displayed step, and adds the answers to the curves of the panes.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from robocov_app.jobs.messages import Line, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_field import Field, FieldLattice
 
-PROGRESS_INTERVAL_S = 0.05  # between two reports of how far the preparation of a map is
+PROGRESS_INTERVAL_S = 0.05  # between two reports on the preparation of a map
 MIN_LISTED_TIME_S = 1.0  # a shorter remaining time is not shown
 
 

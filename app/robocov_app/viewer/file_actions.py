@@ -77,7 +77,7 @@ class FileActions:
 
     @property
     def view(self) -> dict[str, object]:
-        """What a session file says about the window."""
+        """Entries of a session file on the window."""
         view = self._viewer.view
         return {"shown": sorted(view.layers), "theme": view.theme, "map": self.map_name}
 

@@ -1,4 +1,4 @@
-"""What the user inspects: a robot, a pane, the point under the cursor."""
+"""Targets of the user's attention: a robot, a pane, the point under the cursor."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from robocov.environment import Point
 
 @dataclass
 class Inspection:
-    """What the user inspects.
+    """Robot, pane and point that the user inspects.
 
     Attributes
     ----------

@@ -28,12 +28,13 @@ from robocov_app.viewer.session.run_saver import RunSaver
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import find_recoverable_drafts
 from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window_dialogs import build_lesson_offer
 
 NO_DISPLAY = (
     "no display: the window needs one (over ssh, try ssh -X); --out DIR with --frames N "
     "(of a saved run, with --video) renders without, and robocov run needs none"
 )
-HEADLESS_FPS = 30  # frames per second of what is rendered without a display
+HEADLESS_FPS = 30  # frames per second without a display
 
 MIN_WIDTH_PX = 900
 MAX_WIDTH_PX = 7680
@@ -131,7 +132,7 @@ class Launcher:
 
     @contextmanager
     def window(self) -> Iterator[ViewerWindow]:
-        """Open the window with its settings, and keep what was changed of them.
+        """Open the window with its settings, and keep those that were changed.
 
         Raises
         ------
@@ -176,7 +177,7 @@ class Launcher:
         if drafts:
             window.offer_recovery(drafts)
         elif self.offers_lesson and settings_file is not None and not settings_file.exists():
-            window.offer_lesson()
+            window.dialogs.ask(build_lesson_offer(window.viewer, window.lesson.toggle))
 
     def _open_window(self, settings: WindowSettings) -> ViewerWindow:
         scale = choose_scale(self.scale or settings.scale, has_display=not self._needs_no_display)

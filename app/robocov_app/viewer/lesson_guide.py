@@ -45,7 +45,7 @@ class LessonGuide:
     fit_view : callable
         Shows the whole map.
     is_unattended : bool
-        Whether nobody answers and does tasks.
+        Whether there is no user who answers and does tasks.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class LessonGuide:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether the user plays with what a chapter shows, and can return to it."""
+        """Whether the user has taken over from a chapter, and can return to it."""
         return self.player is not None and self.shown is None
 
     @property

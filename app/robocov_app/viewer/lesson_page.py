@@ -24,7 +24,7 @@ class ClickArea(NamedTuple):
     box : Rect
         Where it is, px.
     action : callable
-        What a click does.
+        Called by a click.
     """
 
     box: pygame.Rect

@@ -40,13 +40,13 @@ BASE_LAYERS = frozenset(
 
 
 class LessonState(StrEnum):
-    """What a chapter is doing."""
+    """State of a chapter."""
 
     PLAYING = "playing"
     ASKING = "asking"  # for an answer, before it plays
     TASK = "task"  # the user does something
     ENDED = "ended"
-    LEFT = "left"  # the user plays with what the chapter shows
+    LEFT = "left"  # the user has taken over
 
 
 def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
@@ -95,7 +95,7 @@ def _is_robot_in_place(condition: ConditionModel, session: Session, robot: int) 
 
 @dataclass(frozen=True)
 class _ViewerBefore:
-    """What the viewer showed before a lesson."""
+    """State of the viewer before a lesson."""
 
     workspace: SessionWorkspace
     map_name: str
@@ -117,7 +117,7 @@ class LessonPlayer:
     saved : SavedSession
         A session with a lesson.
     is_unattended : bool
-        Whether nobody answers and does tasks, as in a video.
+        Whether there is no user who answers and does tasks, as in a video.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class LessonPlayer:
     number : int
         Index of the chapter.
     state : LessonState
-        What the chapter is doing.
+        State of the chapter.
     answer : int or None
         Number of the user's answer, from 1.
     is_done : bool
@@ -176,7 +176,7 @@ class LessonPlayer:
 
     @property
     def lines(self) -> list[str]:
-        """Question with its answers, comment on the user's answer, task: whatever the state shows."""
+        """Texts of the present state: question and answers, comment on the user's answer, task."""
         lines: list[str] = []
         if self.chapter.question is not None:
             lines += self._list_question_lines(self.chapter.question)
@@ -280,7 +280,7 @@ class LessonPlayer:
             self._start_chapter(max(number, 0))
 
     def leave(self, *, during_task: bool = False) -> None:
-        """Let the user play with what is shown; tasks are left only if `during_task`."""
+        """Let the user take over; during a task only if `during_task`."""
         if during_task or self.state is not LessonState.TASK:
             self._enter_state(LessonState.LEFT)
 
@@ -348,7 +348,7 @@ def _open_at_start(saved: SavedSession) -> Session:
 
 @dataclass(frozen=True)
 class ChapterResult:
-    """What a chapter does without a user.
+    """Outcome of a chapter without a user.
 
     Attributes
     ----------

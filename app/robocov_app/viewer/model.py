@@ -35,9 +35,9 @@ class ViewerModel:
     Attributes
     ----------
     view : ViewState
-        What the window shows.
+        Visible layers and other options of the window.
     inspection : Inspection
-        What the user inspects.
+        Selected robot, active pane and cursor.
     toolbox : Toolbox
         The tools, and the one in use.
     controllers : list of str

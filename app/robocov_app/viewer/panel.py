@@ -91,7 +91,7 @@ class ViewerPanel(SidePanel):
         self.report: RobotReport | None = None
         self.commands = commands
         self._do = do
-        self._age_s = 0.0  # of what is drawn
+        self._age_s = 0.0  # of the picture
         super().__init__(TABS[0])
 
     def show_tab(self, name: str) -> None:

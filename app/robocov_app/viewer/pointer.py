@@ -26,7 +26,7 @@ _NO_ROBOT = (-1, -1)
 
 
 class DragGesture:
-    """What a button does while it is held down: base class of the others."""
+    """Gesture of a button that is held down: base class of the others."""
 
     def move(self, event: pygame.event.Event) -> None:
         """Handle a move of the mouse."""
@@ -154,7 +154,7 @@ class ViewerPointer:
             self._turn_wheel(event)
 
     def show_action(self, cursor: MouseCursor) -> None:
-        """Show what a press would do: by the cursor's shape, and a ring around the robot under it."""
+        """Show the effect of a press: by the cursor's shape, and a ring around the robot under it."""
         viewer = self._viewer
         inspection = viewer.inspection
         canvas = self._canvas

@@ -1,4 +1,4 @@
-"""The viewer's presenter: the state of the window, and all actions on it, by what they are about."""
+"""The viewer's presenter: the state of the window, and all actions on it, grouped by subject."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -71,11 +71,11 @@ class Presenter(ViewerModel):
         self.show_message(f"{self.tool.title}: {self.tool.hint}")
 
     def finish_drawing(self) -> str | None:
-        """Complete what is being drawn; return a message."""
+        """Complete the drawing; return a message."""
         return self.tool.finish(self.session)
 
     def cancel(self) -> None:
-        """Give up what is being drawn, else return to the hand."""
+        """Give up the drawing, else return to the hand."""
         if not self.tool.cancel(self.session) and self.tool is not self.toolbox.hand:
             self.toolbox.current = self.toolbox.hand
 

@@ -16,9 +16,9 @@ MAX_WAITING_FRAMES = 45  # while more wait for the encoder, new frames are left 
 
 
 class ScreenVideo:
-    """Writes what a window shows to an MP4 video.
+    """Records a window as an MP4 video.
 
-    The encoder is a process of its own, which completes the video when its input ends, for whatever reason.
+    The encoder is a process of its own, which completes the video when its input ends, even after a crash.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class ScreenVideo:
         return self.frame_count / VIDEO_FPS
 
     def add(self, screen: pygame.Surface, seconds: float) -> None:
-        """Add what the window has shown for some time, s."""
+        """Add a picture that the window has shown for some time, s."""
         self._due_frames += seconds * VIDEO_FPS
         count = int(self._due_frames + 1e-6)
         self._due_frames -= count

@@ -27,9 +27,9 @@ class SharedLegend:
     def __init__(self, theme: Theme) -> None:
         self.theme = theme
         self._rows = 1
-        self._rows_key: object = None  # what the number of rows belongs to
+        self._rows_key: object = None  # layout and layers of the number of rows
         self._picture = pygame.Surface((1, 1))
-        self._picture_key: object = None  # what the picture shows
+        self._picture_key: object = None  # entries and size of the picture
 
     def count_rows(self, entries: list[LegendEntry], layout: Layout, layers: frozenset[str]) -> int:
         """Return how many rows are needed; never fewer than before in a layout, so that panes do not jump."""

@@ -30,7 +30,7 @@ _SUGGESTIONS = {
 def list_facts(
     viewer: ViewerModel, frame_rate: float, step_rate: float, video_duration: float | None
 ) -> list[str]:
-    """Return what the status line says, the most important first.
+    """Return the facts in the status line, the most important first.
 
     Parameters
     ----------

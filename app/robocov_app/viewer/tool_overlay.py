@@ -1,4 +1,4 @@
-"""What the mouse does, drawn on top of a pane: dragged and hovered robots, previews of tools."""
+"""Overlay of a pane: dragged and hovered robots, previews of tools."""
 
 from functools import partial
 
@@ -22,7 +22,7 @@ _LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
 
 _OBSTACLE_ALPHA = 89  # of an obstacle that would be drawn
 _PREMULTIPLIED_FRACTION = 0.35  # the same as a factor of its color
-_FARTHEST_PIXEL = 1e4  # polygons are drawn up to it
+_MAX_PIXEL = 1e4  # polygons are drawn up to it
 
 
 def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> None:
@@ -60,7 +60,7 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
 
 
 def draw_preview(canvas: Canvas, preview: Preview) -> None:
-    """Draw what a tool will do next."""
+    """Draw the preview of a tool."""
     if preview.obstacle is not None:
         _draw_obstacle(canvas, preview.obstacle)
     if not preview.line:
@@ -81,7 +81,7 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
     fill = [round(channel * _PREMULTIPLIED_FRACTION) for channel in canvas.theme.obstacle]
     for polygon in shapely.get_parts(obstacle.polygon):
         corners = canvas.camera.to_pixels(np.asarray(polygon.exterior.coords)[:-1])
-        ring = np.rint(np.clip(corners, -_FARTHEST_PIXEL, _FARTHEST_PIXEL)).tolist()
+        ring = np.rint(np.clip(corners, -_MAX_PIXEL, _MAX_PIXEL)).tolist()
         page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)

@@ -1,4 +1,4 @@
-"""What the window shows, whatever the session is: layers, theme, panel, options of the picture."""
+"""Appearance of the window: layers, theme, panel, options of the picture."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ FADE_S = 12.0  # length of path that fading trajectories show
 
 @dataclass
 class ViewState:
-    """What the window shows.
+    """Appearance of the window, independent of the session.
 
     Attributes
     ----------

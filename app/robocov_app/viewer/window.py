@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pygame
 
-from robocov.errors import RobocovError
 from robocov_app.look.theme import get_theme
 from robocov_app.render.picture import standard_layers
 from robocov_app.storage.autosave import Draft
@@ -21,26 +20,23 @@ from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.commands import GROUPS, list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.cost_curves import CostCurves
-from robocov_app.viewer.explanation.explain import explain_robot
 from robocov_app.viewer.lesson_guide import LessonGuide
-from robocov_app.viewer.model import simplify_message
 from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.pointer import LEFT_BUTTON, ViewerPointer
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.robot_inspector import RobotInspector
 from robocov_app.viewer.screen_video import ScreenVideo
 from robocov_app.viewer.session.run_saver import RunSaver
+from robocov_app.viewer.session_runner import SessionRunner
 from robocov_app.viewer.status import HINT, list_facts, suggest_actions
 from robocov_app.viewer.window_commands import ViewerWindowActions, list_window_commands
 from robocov_app.viewer.window_dialogs import (
     build_branch_dialog,
     build_file_dialog,
-    build_lesson_offer,
     build_palette,
     build_recovery_offer,
 )
 
-REPORT_INTERVAL_S = 0.2  # between two explanations of the selected robot
-STEP_RATE_WEIGHT = 0.1  # of the newest frame in the displayed number of steps per second
 _KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 _LESSON_HINT = "F2 back to the lesson · Esc ends it"
 
@@ -57,7 +53,7 @@ class ViewerWindow(BaseWindow):
     scale : float
         Size of texts and widgets.
     is_unattended : bool
-        Whether nobody watches: videos wait for their encoder instead of leaving frames out, lessons answer
+        Whether there is no user: videos wait for their encoder instead of leaving frames out, lessons answer
         themselves.
     screen : Surface, optional
         Window that exists already.
@@ -116,12 +112,11 @@ class ViewerWindow(BaseWindow):
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.pointer = ViewerPointer(viewer, self.canvas, self.chart, self.panel, self.lesson.leave)
         self._cost_curves = CostCurves(viewer)
-        self._arranged: tuple[object, ...] | None = None  # what the layout depends on
-        self._reported: object = None  # what the explanation of the robot depends on
-        self._reported_at = 0.0
+        self._runner = SessionRunner(viewer)
+        self._inspector = RobotInspector(viewer, self.panel)
+        self._arranged: tuple[object, ...] | None = None  # key of the layout
         self._now = 0.0
         self._unrecorded_s = 0.0  # time since the last frame of the video
-        self._steps_per_s = 0.0
         self._arrange()
         self.draw()
 
@@ -146,10 +141,6 @@ class ViewerWindow(BaseWindow):
         """Show the message of a command that was run by its name."""
         self.viewer.attempt(lambda: message or None)
         self.panel.report = None
-
-    def offer_lesson(self) -> None:
-        """Offer the lesson to a new user."""
-        self.dialogs.ask(build_lesson_offer(self.viewer, self.lesson.toggle))
 
     def offer_recovery(self, drafts: Sequence[Draft]) -> None:
         """Offer to recover unsaved work, the newest first."""
@@ -205,13 +196,13 @@ class ViewerWindow(BaseWindow):
         self._pass_time(seconds)
         self._cost_curves.update()
         self._arrange()
-        self._explain_selected_robot()
+        self._inspector.update(self._now)
         self.panel.is_covered = self.lesson.shown is not None
         self.panel.update(seconds)
         self.pointer.show_action(self.cursor)
 
     def get_visible_state(self) -> object:
-        """Return all that decides what is drawn; None while something moves."""
+        """Return a key of the picture; None while something moves."""
         viewer = self.viewer
         session = viewer.session
         is_at_rest = (
@@ -242,41 +233,9 @@ class ViewerWindow(BaseWindow):
         for message, is_error in self.run_saver.poll():
             viewer.show_message(message, is_error=is_error)
         self.lesson.advance(seconds)
-        session = viewer.session
-        was_playing = session.playback.is_playing
-        steps = self._simulate(seconds)
-        if session.timeline.is_settled:
-            viewer.settled_change = session.timeline.head
-        if session.playback.is_playing != was_playing:
-            viewer.revision += 1
-            self._report_end()
-        if seconds > 0:
-            self._steps_per_s += STEP_RATE_WEIGHT * (steps / seconds - self._steps_per_s)
-        viewer.update_cost_map()
-
-    def _simulate(self, seconds: float) -> int:
-        """Let the simulation advance, and show its errors; return the number of steps."""
-        session = self.viewer.session
         # A window that waited for events has let many frames pass at once.
         slices = max(round(seconds * FPS), 1) if self.is_resting else 1
-        try:
-            steps = sum(session.playback.advance(seconds / slices) for _ in range(slices))
-            # Controllers decide as part of the simulation, not of drawing.
-            for pane in session.timeline.panes:
-                session.displayed.get_snapshot(pane)
-        except RobocovError as error:
-            self.viewer.show_message(simplify_message(str(error)), is_error=True)
-            return 0
-        return steps
-
-    def _report_end(self) -> None:
-        """Say why the simulation has stopped."""
-        viewer = self.viewer
-        session = viewer.session
-        if session.timeline.is_settled:
-            viewer.show_message(f"settled at {session.displayed.time:.1f} s")
-        elif session.timeline.is_at_record_end and session.timeline.is_live and not viewer.has_error_message:
-            viewer.show_message("the record ends here; Space continues by simulating")
+        self._runner.advance(seconds, slices)
 
     def _arrange(self) -> None:
         """Lay the window out if its size, or the number or shape of the panes, has changed."""
@@ -325,7 +284,7 @@ class ViewerWindow(BaseWindow):
 
     def _draw_status(self) -> None:
         duration = None if self.video is None else self.video.duration
-        facts = list_facts(self.viewer, self.frame_rate, self._steps_per_s, duration)
+        facts = list_facts(self.viewer, self.frame_rate, self._runner.step_rate, duration)
         hint = self.hint
         if self.lesson.is_waiting:
             hint = _LESSON_HINT
@@ -341,20 +300,6 @@ class ViewerWindow(BaseWindow):
             message = suggest_actions(viewer)
         arena = self.layout.arena
         draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
-
-    def _explain_selected_robot(self) -> None:
-        """Bring the explanation of the selected robot up to date, if it is visible."""
-        number = self.viewer.selected_robot
-        if number is None or self.panel.tab != "robot" or self.panel.hidden:
-            self.panel.report = None
-            return
-        session = self.viewer.session
-        shown = (number, session.displayed.time, session.timeline.past_version, self.viewer.revision)
-        is_old = shown != self._reported and self._now - self._reported_at >= REPORT_INTERVAL_S
-        if self.panel.report is None or is_old:
-            self._reported = shown
-            self._reported_at = self._now
-            self.panel.report = explain_robot(self.viewer, number)
 
     def do(self, name: str) -> None:
         """Run a command by its name; lesson and help take some of them."""

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sample_sessions import HALL, LLOYD, RAPF, advance_session, advance_with_costs, start_session
-from session_records import build_record, have_same_arrays
+from session_records import build_record, have_same_arrays, select_present_branch
 
 from robocov.environment import CircleObstacle
 from robocov.metrics import compute_path_lengths
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.settings import VideoSettings
-from robocov_app.viewer.headless import parts_of, story_frames
+from robocov_app.viewer.branch_output.parts import split_branch
+from robocov_app.viewer.branch_output.video import draw_branch_frames
 from robocov_app.viewer.session.edits import PlaceRobot
 from robocov_app.viewer.session.file import load_session, save_session
 from robocov_app.viewer.session.map_edits import add_obstacle
@@ -115,10 +116,8 @@ def test_a_report_takes_stories_and_sessions(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) -> None:
     session, film = played(), VideoSettings(size=(640, 360), fps=10, speed=1.0)
-    parts = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
-    frames = list(
-        story_frames(session.timeline.document, session.timeline.head, session.timeline.step, parts, [], film)
-    )
+    branch = select_present_branch(session)
+    frames = list(draw_branch_frames(branch, split_branch(branch), [], film))
     assert {frame.shape for frame in frames} == {(360, 640, 3)}
     first, last = frames[0].astype(int), frames[-1].astype(int)
     header = first[:20]
@@ -136,9 +135,9 @@ def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
         session.playback.advance(1 / 60)
     session.release()
     advance_session(session, 6)
-    (part,) = parts_of(session.timeline.document, session.timeline.head, session.timeline.step)
+    (part,) = split_branch(select_present_branch(session))
     record = build_record(session)
-    assert part.begin == 0 and len(record) == 19
+    assert part.first_step == 0 and len(record) == 19
     (touch,) = record.session["touched"]
     assert touch["robots"] == [2] and touch["from_s"] == pytest.approx(0.1)
     assert record.session["repeatable"] is False

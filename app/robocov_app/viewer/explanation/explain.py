@@ -29,7 +29,7 @@ class RobotReport:
     title : str
         Name of the robot.
     verdict : str
-        What it does, in one sentence.
+        Its motion and its goal, in one sentence.
     lines : tuple of ReportLine
         Position, forces, reasons and surroundings.
     """

@@ -128,7 +128,7 @@ def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: co
 
 
 def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
-    """Return the sentence on a force of which only the name is known."""
+    """Return the sentence on a force with a name only."""
     source = _name_force(kind)
     if kind == UNEXPLAINED_FORCE and len(situation.forces) > 1:
         source = "other forces of its controller"
@@ -210,7 +210,7 @@ def _name_force(kind: str) -> str:
 
 
 def list_surroundings(situation: RobotSituation) -> list[str]:
-    """Return what the robot touches, senses and communicates with."""
+    """Return the objects that the robot touches, senses and communicates with."""
     texts = [f"touches {touched.side_text}" for touched in situation.touched]
     goal = situation.goal
     if goal is not None and "attraction" not in situation.forces:

@@ -1,4 +1,4 @@
-"""The situation of one robot: its forces, its goal, and what is near it.
+"""The situation of one robot: its forces, its goal and its surroundings.
 
 Plane vectors are complex numbers, x + i y. Distances to goals, obstacle points and other robots are measured
 from the robot's center, as controllers do; gaps are measured from its rim.
@@ -41,7 +41,7 @@ class NearbyObject:
     gap : float
         From the robot's rim, m.
     obstruction : str
-        What is between the robot and it; empty for nothing.
+        The obstacle between the robot and it, in words; empty for none.
     """
 
     name: str
@@ -100,7 +100,7 @@ class RobotSituation:
     neighbors : list of NearbyObject
         Robots in communication range, the nearest first.
     forces : dict of str to complex
-        Terms of the controller's force, N, and what they do not explain of it; empty if it is not finite.
+        Terms of the controller's force, N, and the rest of it; empty if it is not finite.
     drag : complex
         Viscous force, N.
     resultant : complex
@@ -108,9 +108,9 @@ class RobotSituation:
     is_balanced : bool
         Whether the resultant is too small to move the robot visibly from rest.
     touched : list of NearbyObject
-        What it touches.
+        Objects that it touches.
     holding_names : str
-        Names of what it is pressed against; empty for nothing.
+        Names of the objects against which it is pressed; empty for none.
     is_stuck : bool
         Whether it is far from its goal, and something is in between.
     """
@@ -249,7 +249,7 @@ def _build_obstacle(
 
 
 def _name_obstacle(environment: Environment, position: complex) -> str:
-    """Return the name of what has a point on its rim."""
+    """Return the name of the obstacle that has a point on its rim."""
     point = shapely.Point(position.real, position.imag)
     name = "the obstacle"
     nearest = MAX_CONTACT_GAP_M

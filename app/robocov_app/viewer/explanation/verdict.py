@@ -24,7 +24,7 @@ _BRAKING_ALIGNMENT = -0.5
 
 
 def describe_motion(situation: RobotSituation, motion: Motion) -> str:
-    """Return what a robot does, and with respect to its goal, in one sentence."""
+    """Describe the motion of a robot and its goal in one sentence."""
     return _DESCRIPTIONS[motion](situation)
 
 

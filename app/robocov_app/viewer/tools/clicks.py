@@ -1,4 +1,4 @@
-"""Tools that act on what is clicked: delete, add a robot, let a robot fail."""
+"""Tools that act on a click: delete, add a robot, let a robot fail."""
 
 from robocov.environment import Point
 from robocov_app.viewer.session import map_edits

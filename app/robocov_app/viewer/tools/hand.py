@@ -22,7 +22,7 @@ class HandTool(Tool):
     Attributes
     ----------
     inspection : Inspection
-        What is selected: a press on a robot selects it.
+        The selection: a press on a robot selects it.
     robot : int or None
         Number of the robot that is held.
     obstacle : int or None
@@ -88,7 +88,7 @@ class HandTool(Tool):
         return change_map(session, environment, f"{map_edits.describe_obstacle(moved)} moved")
 
     def cancel(self, session: Session) -> bool:
-        """Let go of what is held, else clear the selection."""
+        """Let go of the robot or the obstacle, else clear the selection."""
         if not self.is_holding:
             had_selection = self.inspection.selected is not None
             self.inspection.selected = None
@@ -103,8 +103,9 @@ class HandTool(Tool):
         moved = self._move_obstacle(session)
         if moved is None:
             return None
+        distance = dist(self._pressed_at, self._cursor)
         line = (self._pressed_at, self._cursor)
-        return Preview(line, obstacle=moved, label=f"{dist(*line):.2f} m")
+        return Preview(line, obstacle=moved, label=f"{distance:.2f} m")
 
     def _move_obstacle(self, session: Session) -> Obstacle | None:
         """Return the obstacle that is held, moved with the cursor; None if it stays where it is."""

@@ -1,4 +1,4 @@
-"""Base class of the tools, what they show on the canvas, and how they change the map. Lengths in meters."""
+"""Base class of the tools, their previews, and changes of the map. Lengths in meters."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from robocov_app.viewer.session.session import Session
 
 @dataclass(frozen=True)
 class Preview:
-    """Preview of what a tool will do next.
+    """Preview of a tool's next action.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Tool:
         point : Point
             Position of the cursor, m.
         reach : float
-            Width of a finger on the map, m: what is closer counts as hit.
+            Width of a finger on the map, m: closer objects count as hit.
         number : int or None
             Number of the robot under the cursor.
 
@@ -106,15 +106,15 @@ class Tool:
         return None
 
     def finish(self, session: Session) -> str | None:
-        """Complete what is being drawn: Enter, a double click or a right click."""
+        """Complete the drawing: Enter, a double click or a right click."""
         return None
 
     def cancel(self, session: Session) -> bool:
-        """Give up what is being done, and return whether there was something to give up."""
+        """Give up the action, and return whether there was one."""
         return False
 
     def build_preview(self, session: Session) -> Preview | None:
-        """Return what the tool shows on the canvas, if anything."""
+        """Return the preview of the next action, if there is one."""
         return None
 
     def resize(self, session: Session, factor: float) -> str:
@@ -132,7 +132,7 @@ def change_map(session: Session, environment: Environment, description: str) -> 
     environment : Environment
         The new map.
     description : str
-        What was done, for the list of changes.
+        Description of the change, for the list of changes.
 
     Returns
     -------

@@ -15,7 +15,7 @@ class Toolbox:
     Parameters
     ----------
     inspection : Inspection
-        What the user inspects; the hand changes it.
+        The selection, which the hand changes.
 
     Attributes
     ----------

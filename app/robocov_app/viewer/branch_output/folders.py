@@ -1,0 +1,53 @@
+"""Folders of the parts of a saved branch, as ``story.json`` lists them."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from robocov.errors import InputError, to_one_line
+from robocov_app.terminal.output import write_json
+
+BRANCH_FILE = "story.json"
+_FORMAT = "robocov-story"
+_VERSION = 1
+
+
+def write_branch_file(folder: Path, parts: list[dict[str, Any]]) -> None:
+    """Write the file that lists the parts of a branch."""
+    write_json(folder / BRANCH_FILE, {"format": _FORMAT, "version": _VERSION, "parts": parts})
+
+
+def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
+    """Return the folders of the parts of a branch.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of a branch, or of any other result.
+
+    Returns
+    -------
+    list of (Path, str)
+        Folders and descriptions of the parts; the folder itself if it is not that of a branch.
+
+    Raises
+    ------
+    InputError
+        If the list is damaged.
+    """
+    file = folder / BRANCH_FILE
+    try:
+        content = json.loads(file.read_bytes())
+        if content["format"] != _FORMAT:
+            return [(folder, "")]
+        return [_read_part(folder, part) for part in content["parts"]]
+    except OSError:
+        # Without the file it is another result. What cannot be read, its reader reports.
+        return [(folder, "")]
+    except (ValueError, LookupError, TypeError) as error:
+        raise InputError(f"{file}: cannot be read: {to_one_line(error)}") from None
+
+
+def _read_part(folder: Path, part: dict[str, Any]) -> tuple[Path, str]:
+    description = "{from_s:.1f} to {to_s:.1f} s, {words}".format(**part)
+    return folder / to_one_line(part["folder"]), description

@@ -1,0 +1,279 @@
+"""Parts of a branch: from edit to edit, each with one map, one team and one controller for each pane."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from robocov.controllers import has_memory
+from robocov.environment import CircleObstacle
+from robocov.metrics import CostHistory
+from robocov.record import Record, Recorder
+from robocov_app.render.density import cost_label, mean_label
+from robocov_app.render.scene import Scene
+from robocov_app.runs.saved_runs import name_failed_robot
+from robocov_app.viewer.session.document import Node, SessionDocument, replay
+from robocov_app.viewer.session.edits import PlaceRobot
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.states import PaneSetup
+
+_TIME_TOLERANCE_S = 1e-9
+
+
+@dataclass(frozen=True)
+class SelectedBranch:
+    """A branch of a session up to a step.
+
+    Attributes
+    ----------
+    document : SessionDocument
+        The session.
+    node : Node
+        Last node of the branch.
+    last_step : int
+        Step at which it ends.
+    """
+
+    document: SessionDocument
+    node: Node
+    last_step: int
+
+    @property
+    def root(self) -> Node:
+        """The node at which the run starts."""
+        return self.document.get_path(self.node)[0]
+
+    @property
+    def scenario(self) -> SessionScenario:
+        """Scenario at the start of the run."""
+        return self.root.require_scenario()
+
+    def replay(self) -> Iterator[tuple[Lockstep, Node]]:
+        """Simulate the branch, and yield its run after each step, with the node it belongs to."""
+        return replay(self.document, self.node, self.last_step)
+
+    def is_end(self, run: Lockstep, node: Node) -> bool:
+        """Return whether a run has come to the end of the branch."""
+        return node is self.node and run.step >= self.last_step
+
+
+@dataclass
+class HandledTime:
+    """Time during which the user dragged or placed a robot.
+
+    Attributes
+    ----------
+    robot : int
+        Number of the robot.
+    first_step, last_step : int
+        First step, and the step after the last.
+    """
+
+    robot: int
+    first_step: int
+    last_step: int
+
+
+@dataclass(frozen=True)
+class PartCost:
+    """Cost along a record.
+
+    Attributes
+    ----------
+    start_time : float
+        Time at which the part starts, s.
+    controller : str
+        Name of the controller.
+    history : CostHistory
+        The cost; its time starts at 0.
+    """
+
+    start_time: float
+    controller: str
+    history: CostHistory
+
+
+@dataclass(eq=False)
+class BranchPart:
+    """A part of a branch.
+
+    Attributes
+    ----------
+    node : Node
+        Node at which it starts.
+    first_step, last_step : int
+        First and last step.
+    setups : dict of int to PaneSetup
+        Setups by the number of the pane.
+    recorders : dict of int to Recorder
+        Recorders by the number of the pane.
+    scenes : list of Scene
+        First scenes of all panes, and last scenes of the branch, for the legend.
+    handled : list of HandledTime
+        When the user dragged or placed robots.
+    placed : list of (int, int)
+        Steps at which the user placed robots, with their numbers.
+    """
+
+    node: Node
+    first_step: int
+    setups: dict[int, PaneSetup]
+    recorders: dict[int, Recorder]
+    scenes: list[Scene]
+    handled: list[HandledTime] = field(default_factory=list)
+    placed: list[tuple[int, int]] = field(default_factory=list)
+    last_step: int = 0
+
+    def add_step(self, run: Lockstep, node: Node) -> None:
+        """Record a step."""
+        self.last_step = run.step
+        for pane in run.panes:
+            self.recorders[pane.number].add(pane.simulation.observe_and_decide())
+        placed = {edit.robot for edit in node.edits if edit.step == run.step and isinstance(edit, PlaceRobot)}
+        self.placed += [(run.step, robot) for robot in sorted(placed)]
+        dragged = set() if run.drag is None else {run.drag[0]}
+        for robot in dragged | placed:
+            self._add_handled(robot, run.step)
+
+    def _add_handled(self, robot: int, step: int) -> None:
+        """Note that a robot is handled at a step; steps that follow each other are one time."""
+        for time in self.handled:
+            if time.robot == robot and time.last_step >= step - 1:
+                time.last_step = step + 1
+                return
+        self.handled.append(HandledTime(robot, step, step + 1))
+
+
+def split_branch(branch: SelectedBranch) -> list[BranchPart]:
+    """Simulate a branch, and record its parts."""
+    parts: list[BranchPart] = []
+    panes: list[Pane] = []
+    for run, node in branch.replay():
+        panes = run.panes
+        setups = {pane.number: pane.setup for pane in panes}
+        if not parts or parts[-1].setups != setups:
+            # Within an edit that lasts several steps a part would be too short.
+            if parts and parts[-1].node is node and node.scenario is None:
+                parts.pop()
+            recorders = {number: _build_recorder(setup, run.scenario.dt) for number, setup in setups.items()}
+            scenes = [build_pane_scene(pane) for pane in panes]
+            parts.append(BranchPart(node, run.step, setups, recorders, scenes))
+        parts[-1].add_step(run, node)
+    parts[-1].scenes += [build_pane_scene(pane) for pane in panes]
+    return parts
+
+
+def _build_recorder(setup: PaneSetup, dt: float) -> Recorder:
+    """Build the recorder of a pane. Failed robots are obstacles of its map."""
+    environment = setup.environment
+    controller = setup.controller
+    for number, position in setup.failed.items():
+        name = name_failed_robot(number)
+        environment = add_obstacle(
+            environment, CircleObstacle(position, setup.properties.get_radius(number), name)
+        )
+    return Recorder(
+        environment,
+        setup.team,
+        controller.build(),
+        dt,
+        name=controller.name,
+        conditions=setup.conditions,
+    )
+
+
+def build_part_records(part: BranchPart, root: Node) -> list[Record]:
+    """Return the records of a part, one for each pane; their time starts at 0.
+
+    Parameters
+    ----------
+    part : BranchPart
+        The part.
+    root : Node
+        Node at which the run starts.
+    """
+    scenario = root.require_scenario()
+    is_reproducible_start = part.first_step == 0 and part.node is root and scenario.given_starts is None
+    records: list[Record] = []
+    for number, recorder in part.recorders.items():
+        record = recorder.record()
+        record = replace(
+            record,
+            time=np.arange(len(record), dtype=float) * scenario.dt,
+            session=_describe_origin(part, part.setups[number], record, scenario.dt),
+        )
+        if is_reproducible_start:
+            record = replace(record, start=scenario.start_name, seed=scenario.seed)
+        records.append(record)
+    return records
+
+
+def _describe_origin(part: BranchPart, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
+    """Return the entries of ``run.json`` on the origin of a record; none if it starts like any run."""
+    origin = {**_describe_start(part, setup, record, dt), **_describe_user_actions(part, dt)}
+    is_repeatable = _is_repeatable(part, setup, record)
+    if not origin and is_repeatable:
+        return {}
+    return {**origin, "repeatable": is_repeatable}
+
+
+def _describe_start(part: BranchPart, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
+    origin: dict[str, Any] = {}
+    if part.first_step:
+        origin["began_at_s"] = part.first_step * dt
+    if record.velocities[0].any():
+        origin["start_velocities_m_per_s"] = record.velocities[0].tolist()
+    if setup.failed or setup.numbers != tuple(range(1, len(setup.numbers) + 1)):
+        origin["robots"] = list(setup.numbers)
+        origin["failed"] = {str(number): list(position) for number, position in setup.failed.items()}
+    return origin
+
+
+def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
+    origin: dict[str, Any] = {}
+    if part.handled:
+        origin["touched"] = [_describe_handled(time, part.first_step, dt) for time in part.handled]
+    if part.placed:
+        origin["placed"] = [
+            {"time_s": (step - part.first_step) * dt, "robots": [robot]} for step, robot in part.placed
+        ]
+    return origin
+
+
+def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
+    """Return whether the record leads from its start to its end without the user."""
+    has_known_memory = part.first_step == 0 or not has_memory(setup.controller.build())
+    is_turned = record.steering is not None and bool(record.steering[0].any())
+    return has_known_memory and not part.handled and not is_turned
+
+
+def _describe_handled(time: HandledTime, first_step: int, dt: float) -> dict[str, Any]:
+    start = (time.first_step - first_step) * dt
+    end = (time.last_step - first_step) * dt
+    return {"from_s": start, "to_s": end, "robots": [time.robot]}
+
+
+def build_pane_scene(pane: Pane, costs: list[PartCost] | None = None, name: str = "") -> Scene:
+    """Return the scene of a pane at its present step.
+
+    Parameters
+    ----------
+    pane : Pane
+        The pane.
+    costs : list of PartCost, optional
+        Costs along the branch, for the caption.
+    name : str
+        Name of the pane's controller among them.
+    """
+    known: list[float] = []
+    for cost in costs or []:
+        if cost.controller == name:
+            times = cost.start_time + cost.history.time
+            known += cost.history.mean_distance[times <= pane.time + _TIME_TOLERANCE_S].tolist()
+    caption = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
+    snapshot = pane.simulation.observe_and_decide()
+    return pane.build_scene(pane.setup, snapshot, pane.trail.get_until(pane.time), cost=caption)

@@ -1,0 +1,164 @@
+"""The video of a branch: trajectories continue through all edits, and each edit is named below."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pygame
+
+from robocov_app.look.theme import Theme
+from robocov_app.render.fonts import label, shortened
+from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
+from robocov_app.runs.encoding import Frame
+from robocov_app.runs.pane_layout import PaneLayout, build_pane_layout
+from robocov_app.runs.saved_runs import name_folders
+from robocov_app.runs.settings import VideoSettings
+from robocov_app.runs.video import VIDEO_HOLD_S
+from robocov_app.viewer.branch_output.parts import (
+    BranchPart,
+    PartCost,
+    SelectedBranch,
+    build_pane_scene,
+    build_part_records,
+)
+from robocov_app.viewer.screen_video import copy_pixels
+from robocov_app.viewer.session.document import Node
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.pane import Pane
+
+CAPTION_PX = 30  # height of the strip with the last edit, px at scale 1
+_TIME_TOLERANCE_S = 1e-9
+
+
+def count_video_frames(branch: SelectedBranch, settings: VideoSettings) -> int:
+    """Return the number of frames of a branch's video."""
+    duration = branch.last_step * branch.scenario.dt / settings.speed + VIDEO_HOLD_S
+    return round(duration * settings.fps) + 1
+
+
+def draw_branch_frames(
+    branch: SelectedBranch, parts: list[BranchPart], costs: list[PartCost], settings: VideoSettings
+) -> Iterator[Frame]:
+    """Draw a branch from its start; its last frame is held for a while.
+
+    All frames have the same layout and one legend, of everything that the branch shows.
+
+    Parameters
+    ----------
+    branch : SelectedBranch
+        The branch.
+    parts : list of BranchPart
+        Its parts.
+    costs : list of PartCost
+        Costs along the parts, for captions.
+    settings : VideoSettings
+        Size, speed and layers.
+    """
+    drawer = _build_drawer(branch, parts, costs, settings)
+    due = 0.0
+    frame: Frame | None = None
+    for run, node in branch.replay():
+        if run.time + _TIME_TOLERANCE_S < due and not branch.is_end(run, node):
+            continue
+        due += settings.speed / settings.fps
+        frame = drawer.draw(run, node)
+        yield frame
+    assert frame is not None
+    for _ in range(round(VIDEO_HOLD_S * settings.fps)):
+        yield frame
+
+
+def _build_drawer(
+    branch: SelectedBranch, parts: list[BranchPart], costs: list[PartCost], settings: VideoSettings
+) -> "_FrameDrawer":
+    widest = max(parts, key=lambda part: len(part.setups))
+    width, height = settings.video_size
+    caption_height = round(CAPTION_PX * scale_for((width, height)))
+    layout: PaneLayout | None = None
+    if len(widest.setups) > 1:
+        scenes = [scene for part in parts for scene in part.scenes]
+        records = build_part_records(widest, branch.root)
+        layout = build_pane_layout(records, settings, (width, height - caption_height), legend_scenes=scenes)
+    return _FrameDrawer(settings, costs, layout, (width, height - caption_height), caption_height, {})
+
+
+@dataclass(frozen=True)
+class _FrameDrawer:
+    """Draws frames of a branch.
+
+    Attributes
+    ----------
+    settings : VideoSettings
+        Layers and colors.
+    costs : list of PartCost
+        Costs along the branch.
+    layout : PaneLayout or None
+        Layout of several panes.
+    picture_size : tuple of int
+        Width and height of a frame without its caption, px.
+    caption_height : int
+        Height of the caption, px.
+    painters : dict of int to Painter
+        Painters by the number of the pane.
+    """
+
+    settings: VideoSettings
+    costs: list[PartCost]
+    layout: PaneLayout | None
+    picture_size: tuple[int, int]
+    caption_height: int
+    painters: dict[int, Painter]
+
+    def draw(self, run: Lockstep, node: Node) -> Frame:
+        """Draw the present step of a run."""
+        names = name_folders([pane.controller.name for pane in run.panes])
+        frames: list[Frame] = []
+        for pane, name in zip(run.panes, names, strict=True):
+            painter = self._get_painter(run, pane)
+            frames.append(painter.frame(build_pane_scene(pane, self.costs, name)))
+        theme = self.settings.color_theme
+        page = frames[0] if self.layout is None else self.layout.compose_page(frames, theme)
+        size = (self.picture_size[0], self.caption_height)
+        caption = _draw_caption(_describe_edit(node, run.scenario.dt), size, theme)
+        return np.concatenate([page, caption])
+
+    def _get_painter(self, run: Lockstep, pane: Pane) -> Painter:
+        """Return the painter of a pane; a new one after the boundary has changed."""
+        environment = run.scenario.environment
+        painter = self.painters.get(pane.number)
+        if painter is None or painter.environment.boundary != environment.boundary:
+            painter = self._build_painter(run)
+            self.painters[pane.number] = painter
+        painter.environment = environment
+        return painter
+
+    def _build_painter(self, run: Lockstep) -> Painter:
+        settings = self.settings
+        if self.layout is None:
+            layers = standard_layers(settings.colors)
+            size = self.picture_size
+            scale = None
+        else:
+            layers = pane_layers(settings.colors)
+            size = self.layout.pane
+            scale = self.layout.scale
+        painter = Painter(run.scenario.environment, size, settings.color_theme, layers, scale)
+        painter.change(settings.shown_layers, settings.hidden_layers)
+        return painter
+
+
+def _describe_edit(node: Node, dt: float) -> str:
+    """Return the caption for an edit; empty for the start of a run."""
+    if node.scenario is not None:
+        return ""
+    return f"{node.branch_step * dt:.1f} s   {node.description}"
+
+
+def _draw_caption(text: str, size: tuple[int, int], theme: Theme) -> Frame:
+    strip = pygame.Surface(size, 0, 32)
+    strip.fill(theme.panel)
+    text_size = round(0.5 * size[1])
+    short_text = shortened(text, text_size, size[0] - 2 * text_size, True)
+    picture = label(short_text, text_size, theme.ink, True)
+    strip.blit(picture, picture.get_rect(midleft=(text_size, size[1] // 2)))
+    return copy_pixels(strip)
