@@ -1,15 +1,15 @@
 """Settings that the editor remembers between sessions, and the layers that it can show."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov_app.editor.tools.snapping import SNAPS
+from robocov_app.toolkit.window_settings import WindowSettings
 
 SETTINGS_FILE = "editor.json"
 MAX_RECENT = 10  # recent maps
-SIZE_LIMITS_PX = {"width": (900, 7680), "height": (600, 4320)}
 
 
 class Layer(NamedTuple):
@@ -48,19 +48,13 @@ SETTING_ATTRIBUTES = {
 """Attribute of the editor that holds each setting."""
 
 
-class EditorSettings(BaseModel):
+class EditorSettings(WindowSettings):
     """Appearance and snapping of the editor, and its recent maps.
 
     Attributes
     ----------
-    theme : {"light", "dark"}
-        Colors of the window.
-    scale : float or None
-        Size of texts and widgets; None for that of the screen.
-    width, height : int
-        Size of the window, px.
-    tab : str
-        Page of the panel.
+    theme, scale, width, height, tab, recent
+        See `WindowSettings`. Recent files are maps.
     grid : float
         Spacing of the grid, m.
     angle : float
@@ -75,16 +69,8 @@ class EditorSettings(BaseModel):
         Number of robots in the team.
     wall : float
         Width of new walls, m.
-    recent : tuple of str
-        Paths of recent maps, the newest first.
     """
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-    theme: Literal["light", "dark"] = "light"
-    scale: float | None = Field(default=None, ge=0.5, le=4.0)
-    width: int = Field(default=1280, ge=SIZE_LIMITS_PX["width"][0], le=SIZE_LIMITS_PX["width"][1])
-    height: int = Field(default=720, ge=SIZE_LIMITS_PX["height"][0], le=SIZE_LIMITS_PX["height"][1])
     tab: str = "map"
     grid: float = Field(default=0.1, ge=0.001, le=100.0)
     angle: float = Field(default=15.0, gt=0.0, le=90.0)
@@ -93,4 +79,3 @@ class EditorSettings(BaseModel):
     radius: float = Field(default=DEFAULT_RADIUS_M, ge=0.001, le=10.0)
     robots: int = Field(default=6, ge=1, le=1000)
     wall: float = Field(default=0.1, ge=0.001, le=100.0)
-    recent: tuple[str, ...] = ()

@@ -141,7 +141,7 @@ class CommandGroup:
         name : str
             Unique name.
         title : str
-            What it does, for people; empty to leave it out of palette and help.
+            Text for people; empty to leave the command out of palette and help.
         action : callable
             Does it; a text that it returns is shown as message.
         *keys : str

@@ -14,9 +14,11 @@ from pathlib import Path
 from robocov.text import remove_controls
 
 LOG_FILE = "errors.log"
-_MAX_LOG_BYTES = 1_000_000  # of the file; one older file of this size is kept beside it
+_MAX_LOG_BYTES = 1_000_000
+"""Size of the file; one older file of this size is kept."""
 _MAX_MESSAGE_CHARS = 120
-_MAX_LEVELS = 30  # entries of a traceback: one of endless recursion has thousands
+_MAX_LEVELS = 30
+"""Entries of a traceback; endless recursion has thousands."""
 
 
 class FaultLog:
@@ -41,9 +43,8 @@ class FaultLog:
         Parameters
         ----------
         error : BaseException
-            What was raised.
         action : str
-            What the window was doing, as in "drawing".
+            The action that raised it, as in "drawing".
 
         Returns
         -------
@@ -58,8 +59,10 @@ class FaultLog:
             self._write(error, action, count)
         message = remove_controls(" ".join(str(error).split()), single_line=True)[:_MAX_MESSAGE_CHARS]
         name = type(error).__name__
-        where = "the terminal" if self.file is None else str(self.file)
-        return f"Internal error while {action} ({name}{': ' if message else ''}{message}). Details: {where}."
+        if message:
+            name = f"{name}: {message}"
+        log = "the terminal" if self.file is None else str(self.file)
+        return f"Internal error while {action} ({name}). Details: {log}."
 
     def _write(self, error: BaseException, action: str, count: int) -> None:
         repeated = f" (number {count})" if count > 1 else ""
@@ -68,7 +71,7 @@ class FaultLog:
         handler = self._open_handler()
         handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
         try:
-            # a handler reports its own trouble, such as a full disk, on standard error, and raises nothing
+            # A handler reports its own errors, such as a full disk, on standard error, and raises nothing.
             handler.handle(logging.LogRecord("robocov", logging.ERROR, "", 0, text, None, None))
         finally:
             handler.close()
@@ -90,7 +93,7 @@ class FaultLog:
 
 
 def describe_os_error(error: OSError) -> str:
-    """Return what the system refused, and of which file, on one line."""
+    """Return the file and the reason of an error of the system, on one line."""
     reason = error.strerror or str(error) or type(error).__name__
     text = reason if error.filename is None else f"{os.fsdecode(error.filename)}: {reason}"
     return remove_controls(text, single_line=True)

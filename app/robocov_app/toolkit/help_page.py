@@ -41,14 +41,17 @@ class _Columns:
 
     @property
     def width(self) -> float:
+        """Width of a column, px."""
         return (self.box.width - 2 * _MARGIN_PX * self.scale) / self.count
 
     @property
     def top(self) -> float:
+        """Upper end of the columns, px."""
         return self.box.top + _TOP_PX * self.scale
 
     @property
     def bottom(self) -> float:
+        """Lower end of the columns, px."""
         return self.box.bottom - _BOTTOM_PX * self.scale
 
 

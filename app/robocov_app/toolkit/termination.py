@@ -19,9 +19,14 @@ from types import FrameType
 
 from robocov_app.storage.autosave import flush_all
 
-_LOOP_GRACE_S = 0.7  # for the loop to notice that the process is to end
-_CLOSING_GRACE_S = 3.0  # in all, once it has, for closing films and saving settings
-_CLOSED_GRACE_S = 0.1  # once everything is closed, for Python's own end
+_SIGNALS = ("SIGTERM", "SIGHUP")
+"""Signals that end the process; some systems lack one."""
+_LOOP_GRACE_S = 0.7
+"""Time for the loop to notice that the process is to end."""
+_CLOSING_GRACE_S = 3.0
+"""Time in all once it has noticed, for closing videos and saving settings."""
+_CLOSED_GRACE_S = 0.1
+"""Time for Python's own end once everything is closed."""
 _FLUSH_S = 0.2
 _POLL_S = 0.02
 
@@ -29,7 +34,7 @@ _active: _Watcher | None = None
 
 
 def is_ending() -> bool:
-    """Return whether the process is to end by a signal; a loop that asks stops, and closes what it has."""
+    """Return whether a signal has asked the process to end. The caller then stops and closes its files."""
     if _active is None or not _active.number:
         return False
     _active.is_closing = True
@@ -51,12 +56,12 @@ def ending_on_signals() -> Iterator[None]:
         watcher.start()
         yield
     except BaseException:
-        watcher.note_closed(failed=True)
+        watcher.handle_closing(failed=True)
         raise
     else:
-        watcher.note_closed(failed=False)
+        watcher.handle_closing(failed=False)
     finally:
-        if not watcher.number:  # else it sees to the end of the process
+        if not watcher.number:  # Otherwise it still has to end the process.
             watcher.stop()
             _active = None
 
@@ -65,10 +70,10 @@ class _Watcher:
     """A thread that waits for signals, and ends the process if it does not end by itself."""
 
     def __init__(self) -> None:
-        self.number = 0  # of the signal that has come
+        self.number = 0  # Number of the signal that has arrived.
         self.is_closing = False
         self._closed_at: float | None = None
-        self._status: int | None = None  # of the process, once everything is closed
+        self._status: int | None = None  # Exit status, once everything is closed.
         self._receiver, self._sender = socket.socketpair()
         self._sender.setblocking(False)
         self._former_fd = -1
@@ -76,16 +81,17 @@ class _Watcher:
         self._thread = threading.Thread(target=self._watch, name="termination", daemon=True)
 
     def start(self) -> None:
-        wanted = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
-        for number in filter(None, wanted):
-            if signal.getsignal(number) is not signal.SIG_IGN:
+        """Start to wait for signals, except for those that the process ignores."""
+        for name in _SIGNALS:
+            number = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 self._former[number] = signal.signal(number, self._note)
-        # Python's handler runs only when the main thread is back in Python; this wakes the thread at once
+        # Python's handler runs only when the main thread is back in Python; this wakes the thread at once.
         self._former_fd = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
         self._thread.start()
 
-    def note_closed(self, *, failed: bool) -> None:
-        """Take note that there is nothing left to save: all that is missing is Python's own end."""
+    def handle_closing(self, *, failed: bool) -> None:
+        """Shorten the time to the end of the process, because everything is closed and saved."""
         if self.number:
             with suppress(OSError, ValueError):
                 sys.stdout.flush()
@@ -93,6 +99,7 @@ class _Watcher:
             self._closed_at = time.monotonic()
 
     def stop(self) -> None:
+        """Restore the former handlers of signals, and end the thread."""
         signal.set_wakeup_fd(self._former_fd)
         for number, handler in self._former.items():
             if signal.getsignal(number) == self._note:
@@ -107,22 +114,22 @@ class _Watcher:
     def _watch(self) -> None:
         with suppress(OSError):
             while data := self._receiver.recv(64):
-                found = [number for number in data if number in self._former]
-                if found:
-                    self.number = found[0]
+                numbers = [number for number in data if number in self._former]
+                if numbers:
+                    self.number = numbers[0]
                     self._end()
 
     def _end(self) -> None:
-        began = time.monotonic()
+        start_s = time.monotonic()
         flush_all(_FLUSH_S)
-        while time.monotonic() < self._compute_deadline(began):
+        while time.monotonic() < self._compute_deadline(start_s):
             time.sleep(_POLL_S)
         if self._status is None:
             flush_all(_FLUSH_S)
             self._status = 128 + self.number
         os._exit(self._status)
 
-    def _compute_deadline(self, began: float) -> float:
+    def _compute_deadline(self, start_s: float) -> float:
         if self._closed_at is not None:
             return self._closed_at + _CLOSED_GRACE_S
-        return began + (_CLOSING_GRACE_S if self.is_closing else _LOOP_GRACE_S)
+        return start_s + (_CLOSING_GRACE_S if self.is_closing else _LOOP_GRACE_S)

@@ -98,7 +98,7 @@ class SidePanel:
         self.drawn_state: object = None
 
     def show_content(self, ui: Ui) -> None:
-        """Show and edit what is in the panel."""
+        """Show and edit the content."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Take the place of the panel in a layout, and its colors and scale."""

@@ -4,9 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
-
-from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.defaults import DEFAULT_LATTICE
 from robocov_app.render.picture import standard_layers
@@ -21,6 +18,7 @@ from robocov_app.terminal.output import echo
 from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.layout import MIN_SIZE_PX
+from robocov_app.toolkit.window_settings import WindowSettings, limit_window_size
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
@@ -36,46 +34,26 @@ NO_DISPLAY = (
 )
 HEADLESS_FPS = 30  # frames per second without a display
 
-MIN_WIDTH_PX = 900
-MAX_WIDTH_PX = 7680
-MIN_HEIGHT_PX = 600
-MAX_HEIGHT_PX = 4320
 
-
-class WindowSettings(BaseModel):
-    """Appearance of the window, kept in the user's folder for settings.
+class ViewerSettings(WindowSettings):
+    """Appearance of the viewer, kept in the user's folder for settings.
 
     Attributes
     ----------
-    theme : {"light", "dark"}
-        Colors.
-    scale : float or None
-        Size of texts and widgets; None for that of the screen.
-    width, height : int
-        Size of the window, px.
+    theme, scale, width, height, tab, recent
+        See `WindowSettings`. Recent files are sessions.
     shown : tuple of str or None
         Names of the visible layers; None for the default ones.
-    tab : str
-        Page of the panel.
     fade : bool
         Whether trajectories show the last seconds only.
     suggests : bool
         Whether the window suggests what to try.
-    recent : tuple of str
-        Session files used last.
     """
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-    theme: Literal["light", "dark"] = "light"
-    scale: float | None = Field(default=None, ge=0.5, le=4.0)
-    width: int = Field(default=1280, ge=MIN_WIDTH_PX, le=MAX_WIDTH_PX)
-    height: int = Field(default=720, ge=MIN_HEIGHT_PX, le=MAX_HEIGHT_PX)
-    shown: tuple[str, ...] | None = None
     tab: str = "parameters"
+    shown: tuple[str, ...] | None = None
     fade: bool = False
     suggests: bool = True
-    recent: tuple[str, ...] = ()
 
 
 @dataclass
@@ -143,7 +121,7 @@ class Launcher:
         try:
             with open_display(headless=self._needs_no_display, missing_message=NO_DISPLAY):
                 file = None if self._needs_no_display else find_settings_file()
-                settings, message = load_settings(WindowSettings, file)
+                settings, message = load_settings(ViewerSettings, file)
                 window = self._open_window(settings)
                 saver = window.run_saver
                 window.viewer.show_message(message)
@@ -179,7 +157,7 @@ class Launcher:
         elif self.offers_lesson and settings_file is not None and not settings_file.exists():
             window.dialogs.ask(build_lesson_offer(window.viewer, window.lesson.toggle))
 
-    def _open_window(self, settings: WindowSettings) -> ViewerWindow:
+    def _open_window(self, settings: ViewerSettings) -> ViewerWindow:
         scale = choose_scale(self.scale or settings.scale, has_display=not self._needs_no_display)
         size = self._choose_size(settings, scale)
         if not self.headless:
@@ -202,7 +180,7 @@ class Launcher:
         window.panel.show_tab(settings.tab)
         return window
 
-    def _build_presenter(self, costs: Costs, settings: WindowSettings) -> Presenter:
+    def _build_presenter(self, costs: Costs, settings: ViewerSettings) -> Presenter:
         layers = (_list_usual_layers(settings) | self.shown_layers) - self.hidden_layers
         viewer = Presenter(
             self.session,
@@ -220,7 +198,7 @@ class Launcher:
         viewer.files.recent = list(settings.recent)
         return viewer
 
-    def _choose_size(self, settings: WindowSettings, scale: float) -> tuple[int, int]:
+    def _choose_size(self, settings: ViewerSettings, scale: float) -> tuple[int, int]:
         if self.size is not None:
             return self.size
         size = (settings.width, settings.height)
@@ -229,13 +207,13 @@ class Launcher:
             size = (max(size[0], round(MIN_SIZE_PX[0] * scale)), max(size[1], round(MIN_SIZE_PX[1] * scale)))
         return size if self._needs_no_display else fit_to_screen(size)
 
-    def _read_settings(self, window: ViewerWindow, before: WindowSettings) -> WindowSettings:
+    def _read_settings(self, window: ViewerWindow, before: ViewerSettings) -> ViewerSettings:
         """Return the settings of a window; layers chosen by options of the command line do not count."""
         viewer = window.viewer
         view = viewer.view
         usual = _list_usual_layers(before)
         layers = view.layers - (self.shown_layers - usual) | (self.hidden_layers & usual)
-        width, height = window.windowed_size or window.screen.get_size()
+        width, height = limit_window_size(window.windowed_size or window.screen.get_size())
         changes = {
             "theme": view.theme,
             "fade": view.fades_trajectories,
@@ -243,13 +221,13 @@ class Launcher:
             "recent": tuple(viewer.files.recent),
             "shown": tuple(sorted(layers)),
             "tab": window.panel.tab,
-            "width": min(max(width, MIN_WIDTH_PX), MAX_WIDTH_PX),
-            "height": min(max(height, MIN_HEIGHT_PX), MAX_HEIGHT_PX),
+            "width": width,
+            "height": height,
         }
         return before.model_copy(update=changes)
 
 
-def _list_usual_layers(settings: WindowSettings) -> set[str]:
+def _list_usual_layers(settings: ViewerSettings) -> set[str]:
     """Return the layers used last, or the default ones."""
     layers = standard_layers()
     if settings.shown is None:

@@ -18,7 +18,7 @@ from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, lo
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.display import open_display
 from robocov_app.viewer import launch as opening
-from robocov_app.viewer.launch import Launcher, WindowSettings
+from robocov_app.viewer.launch import Launcher, ViewerSettings
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.workspace import SessionWorkspace, find_recoverable_drafts
 from robocov_app.viewer.status import describe_cursor, list_facts, suggest_actions
@@ -312,7 +312,7 @@ def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_pat
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
         window.viewer.files.save_session(tmp_path / "mine.robocov")
         window.viewer.view.has_suggestions = False
-    settings, _ = load_settings(WindowSettings, find_settings_file())
+    settings, _ = load_settings(ViewerSettings, find_settings_file())
     assert settings.recent == (str(tmp_path / "mine.robocov"),) and not settings.suggests
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
         assert (

@@ -15,11 +15,11 @@ from robocov_app.storage.settings import (
     merge_changed_settings,
     save_settings,
 )
-from robocov_app.viewer.launch import WindowSettings
+from robocov_app.viewer.launch import ViewerSettings
 
-load_window_settings = partial(load_settings, WindowSettings)
+load_window_settings = partial(load_settings, ViewerSettings)
 
-OTHERS = WindowSettings(
+OTHERS = ViewerSettings(
     theme="dark", scale=2.0, width=1600, height=900, shown=("cells", "robots"), tab="robot", fade=True
 )
 
@@ -29,13 +29,13 @@ def test_what_is_saved_is_loaded(tmp_path):
     assert save_settings(OTHERS, file) == ""
     assert load_window_settings(file) == (OTHERS, "")
     assert [path.name for path in file.parent.iterdir()] == ["window.json"]
-    assert save_settings(WindowSettings(), file) == ""
-    assert load_window_settings(file) == (WindowSettings(), "")
+    assert save_settings(ViewerSettings(), file) == ""
+    assert load_window_settings(file) == (ViewerSettings(), "")
 
 
 @given(
     st.builds(
-        WindowSettings,
+        ViewerSettings,
         theme=st.sampled_from(["light", "dark"]),
         scale=st.none() | st.floats(0.5, 4.0),
         width=st.integers(900, 7680),
@@ -46,12 +46,12 @@ def test_what_is_saved_is_loaded(tmp_path):
     )
 )
 def test_whatever_they_are_they_come_back(settings):
-    assert WindowSettings.model_validate_json(settings.model_dump_json()) == settings
+    assert ViewerSettings.model_validate_json(settings.model_dump_json()) == settings
 
 
 def test_the_first_time_there_are_none(tmp_path):
-    assert load_window_settings(tmp_path / "window.json") == (WindowSettings(), "")
-    assert load_window_settings(None) == (WindowSettings(), "")
+    assert load_window_settings(tmp_path / "window.json") == (ViewerSettings(), "")
+    assert load_window_settings(None) == (ViewerSettings(), "")
 
 
 @pytest.mark.parametrize(
@@ -74,31 +74,31 @@ def test_what_cannot_be_read_is_told_and_left_out(tmp_path, text):
     file = tmp_path / "window.json"
     file.write_text(text)
     settings, words = load_window_settings(file)
-    assert settings == WindowSettings()
+    assert settings == ViewerSettings()
     assert words == f"{file} cannot be read; using default settings"
     # and is put right the next time
     assert save_settings(settings, file) == ""
-    assert load_window_settings(file) == (WindowSettings(), "")
+    assert load_window_settings(file) == (ViewerSettings(), "")
 
 
 def test_bytes_that_are_no_text(tmp_path):
     file = tmp_path / "window.json"
     file.write_bytes(b'{"tab": "\xff\xfe"}')
-    assert load_window_settings(file)[0] == WindowSettings()
+    assert load_window_settings(file)[0] == ViewerSettings()
 
 
 def test_a_folder_in_its_place(tmp_path):
     (tmp_path / "window.json").mkdir()
     settings, words = load_window_settings(tmp_path / "window.json")
-    assert settings == WindowSettings()
+    assert settings == ViewerSettings()
     assert "cannot be read" in words
-    assert save_settings(WindowSettings(), tmp_path / "window.json").startswith("settings cannot be saved: ")
+    assert save_settings(ViewerSettings(), tmp_path / "window.json").startswith("settings cannot be saved: ")
 
 
 def test_settings_of_other_versions(tmp_path):
     file = tmp_path / "window.json"
     file.write_text(json.dumps({"theme": "dark", "of_tomorrow": [1, 2]}))
-    assert load_window_settings(file) == (WindowSettings(theme="dark"), "")
+    assert load_window_settings(file) == (ViewerSettings(theme="dark"), "")
 
 
 def test_what_cannot_be_written_is_told(tmp_path):
@@ -126,7 +126,7 @@ def test_where_they_are_kept(tmp_path, monkeypatch):
 
 
 def test_only_what_was_changed_is_kept():
-    before, opened = WindowSettings(width=1000), WindowSettings(theme="dark", width=1300)
+    before, opened = ViewerSettings(width=1000), ViewerSettings(theme="dark", width=1300)
     assert merge_changed_settings(before, opened, opened) == before
     closed = opened.model_copy(update={"fade": True, "width": 1400})
-    assert merge_changed_settings(before, opened, closed) == WindowSettings(width=1400, fade=True)
+    assert merge_changed_settings(before, opened, closed) == ViewerSettings(width=1400, fade=True)

@@ -14,7 +14,6 @@ from robocov_app.editor.settings import (
     LAYERS,
     SETTING_ATTRIBUTES,
     SETTINGS_FILE,
-    SIZE_LIMITS_PX,
     EditorSettings,
 )
 from robocov_app.editor.tools.snapping import SNAPS
@@ -30,6 +29,7 @@ from robocov_app.storage.settings import (
 from robocov_app.toolkit.dialogs import create_recovery_question
 from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
 from robocov_app.toolkit.faults import FaultLog
+from robocov_app.toolkit.window_settings import limit_window_size
 
 NO_DISPLAY = (
     "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "
@@ -164,7 +164,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
 def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:
     """Return the present settings of a window; what it does not change is as before."""
     editor = window.editor
-    width, height = window.windowed_size or window.screen.get_size()
+    width, height = limit_window_size(window.windowed_size or window.screen.get_size())
     changes: dict[str, object] = {
         setting: getattr(editor, attribute) for setting, attribute in SETTING_ATTRIBUTES.items()
     }
@@ -173,11 +173,6 @@ def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSetting
     changes["snaps"] = tuple(name for name in SNAPS if name in editor.snaps)
     changes["shown"] = tuple(name for name in LAYERS if name in editor.shown)
     changes["recent"] = tuple(editor.recent)
-    changes["width"] = _limit_size("width", width)
-    changes["height"] = _limit_size("height", height)
+    changes["width"] = width
+    changes["height"] = height
     return before.model_copy(update=changes)
-
-
-def _limit_size(side: str, length: int) -> int:
-    minimum, maximum = SIZE_LIMITS_PX[side]
-    return min(max(length, minimum), maximum)

@@ -32,7 +32,7 @@ class Dialog:
     is_done = False
 
     def show_content(self, ui: Ui) -> None:
-        """Show and edit what is in the dialog."""
+        """Show and edit the content."""
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
         """Move the box of the dialog to its place on the screen."""
@@ -58,4 +58,4 @@ class Dialog:
         """Read what an event has changed in the widgets."""
 
     def handle_cancel(self) -> None:
-        """Do what is to be done if the dialog was canceled."""
+        """Handle that the dialog was canceled."""

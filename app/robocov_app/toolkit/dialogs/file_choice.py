@@ -9,7 +9,7 @@ from pathlib import Path
 from robocov_app.toolkit.dialogs.choice import Choice, Option
 
 MAX_FOLDER_ENTRIES = 5000
-"""Files of a folder that are looked at."""
+"""Maximum number of files and folders that are listed."""
 _HINT = "↑ ↓ choose · Tab completes · Enter accepts · Esc closes"
 
 
@@ -79,11 +79,12 @@ class _FileBrowser:
     _options: dict[str, list[Option]] = field(default_factory=dict)
 
     def resolve(self, text: str) -> Path:
-        # Unlike Path.expanduser, this does not raise if there is no such user.
+        """Return the path that was typed."""
+        # Unlike Path.expanduser, this does not raise if the user does not exist.
         return self.folder / os.path.expanduser(text)  # noqa: PTH111
 
     def list_options(self, text: str) -> list[Option]:
-        """List what a typed path may become; a folder is read once while the dialog is open."""
+        """List completions of a typed path; a folder is read once while the dialog is open."""
         if text not in self._options:
             self._options[text] = self._build_options(text)
         return self._options[text]

@@ -31,6 +31,7 @@ class _Range:
 
     @property
     def span(self) -> float:
+        """Difference of the values at the ends."""
         return max(self.high - self.low, 1e-300)
 
     @property
