@@ -244,7 +244,7 @@ class CommandTable:
         Returns
         -------
         object
-            What the command returns.
+            Return value of the command.
 
         Raises
         ------

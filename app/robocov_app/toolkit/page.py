@@ -1,7 +1,7 @@
 """The page of an immediate-mode interface: it runs for every event, handles the focus, and draws.
 
 `Page` knows no widgets. A widget is a function of a page, in `toolkit.widgets`, that takes a cell, reports
-what was done to it, and draws itself; `toolkit.ui.Ui` is a page that has them as methods.
+how the user has used it, and draws itself; `toolkit.ui.Ui` is a page that has them as methods.
 """
 
 from collections.abc import Iterator
@@ -65,7 +65,7 @@ class Page(RowLayout):
     background : color or None
         Color behind the widgets; None if they are drawn over something else.
     needs_redraw : bool
-        Whether the page may look different from what was drawn last.
+        Whether the page may have changed since it was drawn.
     surface : pygame.Surface or None
         Surface to draw on; None in a run for an event.
     pointer : tuple of int

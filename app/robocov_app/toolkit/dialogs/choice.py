@@ -122,7 +122,7 @@ class Choice(Dialog):
         box.midtop = screen.width // 2, round(_TOP_PX * scale)
 
     def read_widgets(self, ui: Ui) -> None:
-        """Read what was typed, also if more events come within the same frame."""
+        """Read the typed text, also if more events come within the same frame."""
         if ui.focus == _FIELD and ui.edit is not None and ui.edit.text != self.text:
             self._set_text(ui.edit.text)
 

@@ -55,7 +55,7 @@ class Dialog:
         return False
 
     def read_widgets(self, ui: Ui) -> None:
-        """Read what an event has changed in the widgets."""
+        """Read the widgets after an event."""
 
     def handle_cancel(self) -> None:
         """Handle that the dialog was canceled."""

@@ -1,0 +1,43 @@
+"""What both windows share when they are opened: sizes, and the question about unsaved work."""
+
+from __future__ import annotations
+
+import pytest
+
+from robocov_app.toolkit.dialogs import create_recovery_question
+from robocov_app.toolkit.display import choose_scale
+from robocov_app.toolkit.window_settings import WindowSettings, limit_window_size
+
+
+@pytest.mark.parametrize(
+    ("size", "limited"),
+    [((1280, 720), (1280, 720)), ((1, 1), (900, 600)), ((100_000, 100_000), (7680, 4320))],
+)
+def test_every_size_of_a_window_can_be_saved(size: tuple[int, int], limited: tuple[int, int]) -> None:
+    width, height = limit_window_size(size)
+    assert (width, height) == limited
+    assert WindowSettings(width=width, height=height).width == width
+
+
+def test_a_requested_scale_goes_before_that_of_the_display() -> None:
+    assert choose_scale(1.5, has_display=True) == 1.5
+    assert choose_scale(None, has_display=False) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("others", "ending"), [(0, "Draft."), (1, "\n1 more is kept."), (3, "\n3 more are kept.")]
+)
+def test_the_recovery_question_counts_other_drafts(others: int, ending: str) -> None:
+    calls: list[str] = []
+    question = create_recovery_question(
+        "Draft.",
+        others=others,
+        recover=lambda: calls.append("recover"),
+        discard=lambda: calls.append("discard"),
+        postpone=lambda: calls.append("postpone"),
+    )
+    assert question.text.endswith(ending)
+    for answer in question.answers:
+        answer.call()
+    question.handle_cancel()
+    assert calls == ["recover", "discard", "postpone", "postpone"]
