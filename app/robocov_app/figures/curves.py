@@ -7,8 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import TEXT, Tone, even_ticks, figure_of, quiet_axes, tone, value_axis
+from robocov_app.figures.page import TEXT, Tone, figure_of, quiet_axes, set_even_ticks, set_value_axis, tone
+from robocov_app.look.axes import MAX_TIME_INTERVALS
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
+from robocov_app.look.labels import spread_labels
 from robocov_app.look.theme import Theme
 
 # label, controller's name, times (T,) s and mean distances (T,) m
@@ -48,8 +50,8 @@ def draw_curves(
     lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
     axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
-    even_ticks(axes.xaxis, 8)
-    value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
+    set_even_ticks(axes.xaxis, MAX_TIME_INTERVALS)
+    set_value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
     quiet_axes(axes, theme, "time (s)", label, grid="y")
     for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:
@@ -74,7 +76,7 @@ def _draw_end_labels(axes: Axes, ends: Sequence[tuple[float, float, Tone, str]])
     dpi, box = figure_of(axes).dpi, axes.get_window_extent()
     point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72
     places = axes.transData.transform([(x, y) for x, y, _, _ in ends])[:, 1]
-    heights = spread(places, line_height, float(box.y0), float(box.y1))
+    heights = spread_labels(places.tolist(), line_height, float(box.y0), float(box.y1))
     words: Any = {"textcoords": axes.transAxes, "annotation_clip": False, "va": "center", "ha": "left"}
     words |= {"fontsize": TEXT, "fontweight": "bold"}
     for (x, y, color, text), place, height in zip(ends, places, heights, strict=True):
@@ -83,14 +85,3 @@ def _draw_end_labels(axes: Axes, ends: Sequence[tuple[float, float, Tone, str]])
         if abs(height - place) > 0.3 * line_height:
             line = [1.0 + 4 * point, 1.0 + 10 * point], [(place - box.y0) / box.height, fraction]
             axes.plot(*line, transform=axes.transAxes, color=color, linewidth=0.8, clip_on=False)
-
-
-def spread(heights: Array, gap: float, low: float, high: float) -> Array:
-    """Return (m,) heights at least `gap` apart, near to the given ones, from `low` to `high` if they fit."""
-    from scipy.optimize import isotonic_regression
-
-    order, steps = np.argsort(heights, kind="stable"), gap * np.arange(len(heights))
-    placed = isotonic_regression(heights[order] - steps).x + steps
-    result = np.empty(len(heights))
-    result[order] = np.minimum(np.maximum(placed, low + steps), (high - steps)[::-1])
-    return result

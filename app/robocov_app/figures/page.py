@@ -1,6 +1,6 @@
 """The page of a plot: a matplotlib figure of an exact size, laid out in pixels from its top left."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias, cast
 
 from matplotlib.artist import Artist
@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from robocov.arrays import Array
 from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
+from robocov_app.look.axes import MAX_VALUE_INTERVALS, TICK_FACTORS, VALUE_MARGIN, choose_value_limits
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import format_scale_length, round_length
@@ -55,31 +56,19 @@ def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal
         axes.set_axisbelow(True)
 
 
-def value_limits(low: float, high: float, *, room: float = 0.08, origin: float = 0.0) -> tuple[float, float]:
-    """Return the ends of an axis for values: from `origin` where they come near it, with some room."""
-    more = room * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
-    near = 0.0 <= low - origin < 0.4 * (high - origin)
-    return (origin if near else low - more), high + more
-
-
-def even_ticks(axis: Any, most: int) -> None:
-    axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
+def set_even_ticks(axis: Any, max_intervals: int) -> None:
+    """Give an axis round ticks in at most so many intervals; they follow when a notebook zooms."""
+    axis.set_major_locator(MaxNLocator(nbins=max_intervals, steps=list(TICK_FACTORS)))
     axis.set_major_formatter("{x:g}")
 
 
-def value_axis(axis: Any, values: Array, **ends: float) -> None:
-    """Give an axis even ticks, and ends that suit finite values: those of `value_limits`."""
-    limits = value_limits(float(values.min()), float(values.max()), **ends)
+def set_value_axis(axis: Any, values: Array, *, margin: float = VALUE_MARGIN, origin: float = 0.0) -> None:
+    """Give an axis the limits and ticks that suit finite values, see `choose_value_limits`."""
+    low = float(values.min())
+    high = float(values.max())
+    limits = choose_value_limits(low, high, margin=margin, origin=origin)
     axis.axes.set(**{f"{axis.axis_name}lim": limits})
-    even_ticks(axis, 6)
-
-
-def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
-    """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it: "Lloyd's…"."""
-    kept = text
-    while len(kept) > 1 and width_of(text if kept == text else f"{kept}…") > room:
-        kept = kept[:-1]
-    return text if kept == text else f"{kept.rstrip()}…"
+    set_even_ticks(axis, MAX_VALUE_INTERVALS)
 
 
 class PageAxes(Axes):

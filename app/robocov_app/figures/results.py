@@ -18,9 +18,10 @@ from robocov.arrays import Array
 from robocov.controllers.gains import Value, format_value
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, Page, cut_to, figure_of, quiet_axes, tone, value_axis
+from robocov_app.figures.page import SMALL, TEXT, Page, figure_of, quiet_axes, set_value_axis, tone
 from robocov_app.figures.statistics import Interval
 from robocov_app.look.curve_styles import CurveStyle
+from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT, Theme
 
 _REACH = 1.5  # so much farther than its pairs an axis of ratios goes for their intervals
@@ -77,7 +78,9 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
             return page.text_width(end_label((name, "", time, middle), unit), bold=True)
 
         # what stands at a curve's end takes no more than half of the page
-        curves.append((cut_to(name, width_of, 0.5 * size[0] - 30), style.name, time, middle))
+        curves.append(
+            (shorten_text(name, width_of, 0.5 * size[0] - 30, min_chars=1), style.name, time, middle)
+        )
     right = 30 + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
     axes = page.axes((44, 44, size[0] - 44 - right, size[1] - 94))
     # lines as in a picture of the usual size would fill a small one
@@ -107,7 +110,7 @@ def plot_final_costs(
     for sample, values, place in zip(samples, finite, places, strict=True):
         draw_box(axes, values, place, sample.style, theme)
     _row_frame(axes, places, names, theme, label, [sample.style for sample in samples])
-    value_axis(axes.xaxis, np.concatenate(finite), room=0.06, origin=origin)
+    set_value_axis(axes.xaxis, np.concatenate(finite), margin=0.06, origin=origin)
     box, ink = axes.get_position(), tone(theme.ink)
     style: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "color": ink}
     for (name, _), head in zip(rows, heads, strict=True):
@@ -164,7 +167,7 @@ def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[floa
 def rows_page(rows: float, names: list[str], theme: Theme, wide: int, scale: float) -> tuple[Axes, list[str]]:
     """Return axes on a page high enough for so many rows, and the names as they fit to the left of them."""
     page = Page((wide, 200), theme, scale)
-    short = [cut_to(name, page.text_width, 0.42 * wide) for name in names]
+    short = [shorten_text(name, page.text_width, 0.42 * wide, min_chars=1) for name in names]
     left = max(page.text_width(name) for name in short) + 32 * scale
     above, below = 8 * scale, 46 * scale
     height = round(above + _ROW * scale * rows + below)
@@ -264,8 +267,8 @@ def plot_gains(
     null = _gain_axis(axes, np.concatenate([each.gains for each in dependences]), words)
     for each in dependences:
         _draw_dependence(axes, each, null, joined=not words)
-    value_axis(axes.yaxis, np.concatenate([each.values for each in dependences]))
-    quiet_axes(axes, LIGHT, cut_to(gain, len, MOST_LETTERS), label, grid="y")
+    set_value_axis(axes.yaxis, np.concatenate([each.values for each in dependences]))
+    quiet_axes(axes, LIGHT, shorten_text(gain, len, MOST_LETTERS), label, grid="y")
     if len(dependences) > 1:
         axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(LIGHT.ink), borderaxespad=0.2)
     return figure_of(axes)
@@ -302,7 +305,7 @@ def plot_gain_grid(
     axes.set(xlim=(-0.5, len(first) - 0.5), ylim=(-0.5, len(second) - 0.5))
     axes.set_xticks(range(len(first)), [format_value(value, digits=4) for value in first])
     axes.set_yticks(range(len(second)), [format_value(value, digits=4) for value in second])
-    x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)
+    x, y = (shorten_text(gain, len, MOST_LETTERS) for gain in gains)
     quiet_axes(axes, theme, x, y)
     axes.tick_params(length=0.0)
     return figure_of(axes)
@@ -342,7 +345,7 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
 
 
 def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined: bool) -> None:
-    style, label = each.style, cut_to(each.label, len, MOST_LETTERS)
+    style, label = each.style, shorten_text(each.label, len, MOST_LETTERS)
     color = tone(style.get_color(LIGHT))
     where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
     step = -(-len(where) // MOST_RUNS)

@@ -16,6 +16,8 @@ MAX_LOW_FRACTION = 0.4
 """An axis starts at zero if its lowest value is below this fraction of its highest."""
 VALUE_MARGIN = 0.08
 """Free space above and below the values, as a fraction of their range."""
+GROWTH_FRACTION = 0.5
+"""Space for lower values below a curve that still grows, as a fraction of its range."""
 TICK_FACTORS = (1, 2, 5, 10)
 """Steps between ticks are one of these times a power of ten."""
 MAX_VALUE_INTERVALS = 6
@@ -112,7 +114,8 @@ def list_ticks(start: float, end: float, step: float) -> Array:
 def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> Axis:
     """Choose the axis of curves that grow while they are watched.
 
-    Its start is a multiple of the step, so that it moves seldom.
+    Costs fall at first, so there is space for values that are still lower, and the start is a multiple of the
+    step: the axis moves seldom.
 
     Parameters
     ----------
@@ -133,6 +136,8 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
     if not math.isfinite(low) or not math.isfinite(high) or high <= 0.0:
         return Axis(0.0, 1.0, 0.5)
     start, end = choose_value_limits(low, high)
+    if start > 0.0:
+        start -= GROWTH_FRACTION * (high - low)
     start = max(start, 0.0)
     step = choose_tick_step(end - start, max_intervals)
     start = float(f"{step * math.floor(start / step):.12g}")

@@ -8,6 +8,7 @@ import pygame
 
 from robocov.text import escape_controls
 from robocov_app.look.colors import Color
+from robocov_app.look.labels import shorten_text
 from robocov_app.render.surface_cache import kept
 
 
@@ -49,14 +50,5 @@ def text_width(text: str, size: int, bold: bool = False) -> int:
 
 
 def shortened(text: str, size: int, width: float, bold: bool = False) -> str:
-    """Return `text`, cut and ended with an ellipsis where it is wider than `width` pixels."""
-    if text_width(text, size, bold) <= width:
-        return text
-    low, high = 0, len(text)
-    while low < high:
-        middle = (low + high + 1) // 2
-        if text_width(text[:middle].rstrip() + "…", size, bold) <= width:
-            low = middle
-        else:
-            high = middle - 1
-    return text[:low].rstrip() + "…" if low else ""
+    """Return a text, shortened to a width, px."""
+    return shorten_text(text, lambda candidate: text_width(candidate, size, bold), width)

@@ -1,355 +1,502 @@
-"""The plot of the cost against time, and the time line below it."""
+"""The chart of the cost against time, and the time line below it."""
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import pygame
 
 from robocov.arrays import Array
+from robocov_app.look.axes import MAX_TIME_INTERVALS, choose_tick_step, list_ticks
 from robocov_app.look.colors import Color, mix
+from robocov_app.look.labels import spread_labels
+from robocov_app.look.robot_colors import choose_curve_colors
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
-from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
-from robocov_app.render.fonts import shortened, text_width
+from robocov_app.render.fonts import shortened
 from robocov_app.toolkit.layout import Box, Layout, is_inside
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_tag
+from robocov_app.viewer.chart_scale import (
+    BOTTOM_PX,
+    TOP_PX,
+    ChartScale,
+    TimeScale,
+    build_chart_scale,
+    build_time_scale,
+)
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.curves import DISTANCE, TIME, PlottedQuantity
+from robocov_app.viewer.session.curves import DISTANCE, TIME, Curve, GhostCurve, PlottedQuantity
 from robocov_app.viewer.session.pane import Pane
 
-LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
-SHORTEST = 10.0  # seconds that the axis shows at least
-REFRESHED = 0.1  # seconds after which growing curves are drawn anew
-_GRASP = 6.0  # pixels at scale 1 from a ghost curve within which a click enters its branch
-_TOUCHES = "obstacle", "robot", "failure", "law", "limits", "hand", "density"
-_GLYPHS = dict(zip(_TOUCHES, "■+×◆◆●▲", strict=True))
+REFRESH_INTERVAL_S = 0.1
+"""Curves that grow are drawn again after this time, not in each frame."""
+LABEL_GAP_PX = 15.0
+"""Minimum distance of the captions at the right, at scale 1."""
+EVENT_REACH_PX = 5
+"""The pointer shows an event within this distance, at scale 1."""
+GHOST_REACH_PX = 6.0
+"""A click within this distance of the curve of another branch opens it, at scale 1."""
+MAX_GHOST_POINTS_WITHOUT_GAPS = 12
+"""Curves of other branches with at least this many points are dashed."""
+MIN_POINTS_TO_THIN = 400
+_SAMPLES_PER_PX = 1.5
+_SMALL_GAP_PERCENT = 99.95
+"""Gaps to the best curve below this have a decimal."""
+_EVENT_GLYPHS = {
+    "obstacle": "■",
+    "robot": "+",
+    "failure": "×",
+    "law": "◆",
+    "limits": "◆",
+    "hand": "●",
+    "density": "▲",
+}
+"""Sign of each kind of event."""
+_OTHER_EVENT_GLYPH = "•"
 
 
-def time_axis(end: float) -> float:
-    """Return where the axis of time ends: a little beyond now, in steps, so that it rests mostly.
+class GhostLine(NamedTuple):
+    """Curve of another branch as it is drawn.
 
-    >>> [time_axis(t) for t in (0.0, 9.0, 9.9, 61.0)]
-    [10.0, 10.0, 15.0, 70.0]
+    Attributes
+    ----------
+    node : int
+        Node at which the branch ends.
+    points : (k, 2) array, px
+        On the page of the chart.
     """
-    if end <= 0.96 * SHORTEST:
-        return SHORTEST
-    step = max(round_length(max(end / 4.0, 1.0)) / 2.0 if end < 40.0 else round_length(end / 5.0), 5.0)
-    return float(np.ceil((end * 1.03 + 1e-9) / step) * step)
 
-
-def value_axis(low: float, high: float) -> tuple[float, float, float]:
-    """Return begin, end and step of an axis that holds values between `low` and `high`.
-
-    It begins at zero unless that would leave the curves in the upper fifth.
-
-    >>> value_axis(0.9, 3.2)
-    (0.0, 3.36, 1.0)
-    """
-    if not np.isfinite([low, high]).all() or high <= 0.0:
-        return 0.0, 1.0, 0.5
-    begin = 0.0 if low < 0.8 * high else max(low - 1.5 * (high - low) - 0.02 * high, 0.0)
-    step = round_length(max((high - begin) / 2.5, 1e-6))
-    begin = float(np.floor(begin / step) * step)
-    return begin, float(f"{high + 0.05 * (high - begin):.6g}"), step
+    node: int
+    points: Array
 
 
 class Chart:
-    """Draws the plot and the time line of a session; keeps what changes seldom."""
+    """Chart and time line of a session. What changes seldom is kept as a page.
+
+    Parameters
+    ----------
+    viewer : Presenter
+
+    Attributes
+    ----------
+    hover : (x, y) or None, px
+        Where the pointer is in the window.
+    ghosts : list of GhostLine
+        Curves of other branches on the page.
+    switch_box : Box or None
+        Box in the window that switches to the other quantity; None if there is none.
+    """
 
     def __init__(self, viewer: Presenter) -> None:
         self.viewer = viewer
+        self.hover: tuple[int, int] | None = None
+        self.ghosts: list[GhostLine] = []
+        self.switch_box: Box | None = None
+        self._quantity = DISTANCE
         self._page: pygame.Surface | None = None
-        self._place: Callable[[Array, Array], Array]
-        self._key: object = None
-        self._samples: object = None
-        self._drawn_at, self._wanted = -1.0, DISTANCE
-        self._other: Box | None = None
-        self._ghosts: list[tuple[int, Array]] = []
-        self.hover: tuple[int, int] | None = None  # where the cursor is in the window
+        self._scale: ChartScale
+        self._page_key: object = None
+        self._page_samples: object = None
+        self._page_time = -1.0
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        self.layout, self.theme, self._page = layout, theme, None
+        """Take the layout and the theme of the window."""
+        self.layout = layout
+        self.theme = theme
+        self._page = None
 
     @property
     def plotted(self) -> PlottedQuantity:
-        return self._wanted if self._timed else DISTANCE
+        """The quantity that the chart shows."""
+        return self._quantity if self._has_times else DISTANCE
 
     @property
-    def _timed(self) -> bool:
+    def times(self) -> TimeScale:
+        """The axis of times, in pixels of the window."""
+        return build_time_scale(self.layout, self.viewer.session.timeline, self.theme.small_text)
+
+    @property
+    def _has_times(self) -> bool:
+        """Whether mean times are known, since robots are not equally fast."""
         return any(len(pane.curves["time"]) for pane in self.viewer.session.timeline.panes)
 
-    def switch(self) -> str:
-        if not self._timed:
-            return "all robots are equally fast: the mean time goes as the mean distance"
-        self._wanted, self._page = TIME if self.plotted is DISTANCE else DISTANCE, None
-        return f"plotted: {self._wanted.title[:1].lower()}{self._wanted.title[1:]}"
-
-    def offers(self, at: tuple[int, int]) -> bool:
-        return self._other is not None and is_inside(self._other, at)
-
-    def ghost_at(self, at: tuple[int, int]) -> int | None:
-        at = at[0], at[1] - self.layout.chart[1]
-        near = [(float(np.hypot(*(points - at).T).min()), node) for node, points in self._ghosts]
-        best = min(near, default=(np.inf, 0))
-        return best[1] if best[0] < _GRASP * self.layout.scale else None
-
     @property
-    def _span(self) -> tuple[float, float, float]:
-        """Left and right of the axis in pixels of the window, and the time at its end."""
-        left, _, width, _ = self.layout.chart
-        scale, panes, beside = (
-            self.layout.scale,
-            self.viewer.session.timeline.panes,
-            RIGHT * self.layout.scale,
-        )
-        if len(panes) > 1:  # their names stand there, too
-            size = round(self.theme.small_text * scale)
-            names = (text_width(f"{pane.controller.label}  8.888  +88.8 %", size, True) for pane in panes)
-            beside = min(max(names) + 20 * scale, 0.4 * width)
-        ghosts = max((float(ghost.times[-1]) for ghost in self.viewer.session.timeline.ghosts), default=0.0)
-        return (
-            left + LEFT * scale,
-            left + width - beside,
-            time_axis(max(self.viewer.session.timeline.end_time, ghosts)),
-        )
+    def _ghost_curves(self) -> list[GhostCurve]:
+        """Curves of other branches of the quantity that is shown."""
+        ghosts = self.viewer.session.timeline.ghosts
+        return [ghost for ghost in ghosts if ghost.quantity == self.plotted.name]
 
-    def time_at(self, x: float) -> float:
-        left, right, end = self._span
-        return float(
-            np.clip((x - left) / max(right - left, 1.0) * end, 0.0, self.viewer.session.timeline.end_time)
-        )
+    def switch_quantity(self) -> str:
+        """Show the other quantity, and return the status message."""
+        if not self._has_times:
+            return "all robots are equally fast: the mean time goes as the mean distance"
+        self._quantity = TIME if self.plotted is DISTANCE else DISTANCE
+        self._page = None
+        title = self._quantity.title
+        return f"plotted: {title[:1].lower()}{title[1:]}"
 
-    def column(self, time: Any) -> Any:
-        left, right, end = self._span
-        return left + (right - left) * time / end
+    def is_on_switch(self, pixel: tuple[int, int]) -> bool:
+        """Return whether a click at a pixel of the window switches the quantity."""
+        return self.switch_box is not None and is_inside(self.switch_box, pixel)
+
+    def find_ghost(self, pixel: tuple[int, int]) -> int | None:
+        """Return the node of the branch whose curve is at a pixel of the window; None if none is."""
+        point = np.array([pixel[0], pixel[1] - self.layout.chart[1]])
+        nearest_node = None
+        nearest_distance = GHOST_REACH_PX * self.layout.scale
+        for ghost in self.ghosts:
+            distance = float(np.hypot(*(ghost.points - point).T).min())
+            if distance < nearest_distance:
+                nearest_distance = distance
+                nearest_node = ghost.node
+        return nearest_node
+
+    def to_time(self, column: float) -> float:
+        """Return the time, s, of a column of the window, within the session."""
+        end_time = self.viewer.session.timeline.end_time
+        return float(np.clip(self.times.to_time(column), 0.0, end_time))
+
+    def to_column(self, time: float) -> float:
+        """Return the column of a time, s, in the window."""
+        return self.times.to_column(time)
 
     def draw(self, screen: pygame.Surface) -> None:
-        session, layout = self.viewer.session, self.layout
-        curves = [pane.curves[self.plotted.name] for pane in session.timeline.panes]
+        """Draw the chart and the time line onto the window."""
+        if self._is_page_outdated():
+            self._draw_page()
+        assert self._page is not None
+        screen.blit(self._page, self.layout.chart[:2])
+        self._draw_values(screen)
+        self._draw_present(screen)
+        self._draw_hover(screen)
+
+    def _is_page_outdated(self) -> bool:
+        """Return whether the page has to be drawn again, and remember what it will show."""
+        timeline = self.viewer.session.timeline
+        curves = self._list_curves()
         samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in curves]
-        panes = tuple(pane.number for pane in session.timeline.panes)
-        told = panes, len(session.timeline.events), len(session.timeline.ghosts), self._span, self.plotted
-        rest = (
-            *told,
+        key = (
+            tuple(pane.number for pane in timeline.panes),
+            len(timeline.events),
+            len(timeline.ghosts),
+            self.times,
+            self.plotted,
             self.viewer.costs.state,
-            None if session.timeline.is_live else session.displayed.time,
-            session.timeline.past_version,
+            None if timeline.is_live else self.viewer.session.displayed.time,
+            timeline.past_version,
         )
-        # curves grow sixty times a second, which nobody sees
-        old = self.viewer.now - self._drawn_at >= REFRESHED
-        if self._page is None or rest != self._key or (old and samples != self._samples):
-            self._page = pygame.Surface((layout.chart[2], layout.chart[3] + layout.track[3]), 0, 32)
-            self._key, self._samples, self._drawn_at = rest, samples, self.viewer.now
-            canvas = create_flat_canvas(self._page, self.theme, layout.scale)
-            self._plot(canvas)
-            self._track(canvas)
-        screen.blit(self._page, layout.chart[:2])
-        self._values(screen)
-        self._cursor(screen)
-        self._hovered(screen)
+        is_old = self.viewer.now - self._page_time >= REFRESH_INTERVAL_S
+        has_grown = is_old and samples != self._page_samples
+        if self._page is not None and key == self._page_key and not has_grown:
+            return False
+        self._page_key = key
+        self._page_samples = samples
+        return True
 
-    def _plot(self, canvas: Canvas) -> None:
-        theme, scale, session, what = self.theme, self.layout.scale, self.viewer.session, self.plotted
-        canvas.surface.fill(theme.panel)
-        left, right, end = self._span
-        height = self.layout.chart[3]
-        top, bottom = TOP * scale, height - BOTTOM * scale
-        weighed = ", weighed by φ" if density_label(session.displayed.environment) else ""
-        title = f"{what.title}{weighed}, {what.unit}"
-        canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
-        named = 12 * scale + canvas.text_width(title, bold=True)
-        self._offer(canvas, named)
+    def _list_curves(self) -> list[Curve]:
+        """Return the curve of each pane of the quantity that is shown."""
+        return [pane.curves[self.plotted.name] for pane in self.viewer.session.timeline.panes]
+
+    def _draw_page(self) -> None:
+        """Draw what changes seldom: axes, events, curves and the time line."""
+        layout = self.layout
+        size = (layout.chart[2], layout.chart[3] + layout.track[3])
+        self._page = pygame.Surface(size, 0, 32)
+        self._page_time = self.viewer.now
+        canvas = create_flat_canvas(self._page, self.theme, layout.scale)
+        canvas.surface.fill(self.theme.panel)
+        values = [curve.values for curve in self._list_curves()]
+        values += [ghost.values for ghost in self._ghost_curves]
+        self._scale = build_chart_scale(self.times, layout, values)
+        self._draw_title(canvas)
+        self._draw_axes(canvas)
+        self._draw_events(canvas)
+        self._draw_ghosts(canvas)
+        self._draw_curves(canvas)
+        self._draw_time_line(canvas)
+
+    def _draw_title(self, canvas: Canvas) -> None:
+        """Write the name of the quantity, that of the other one, and the state of its computation."""
+        scale = self.layout.scale
+        row = 0.5 * TOP_PX * scale
+        density = density_label(self.viewer.session.displayed.environment)
+        weighted = ", weighed by φ" if density else ""
+        title = f"{self.plotted.title}{weighted}, {self.plotted.unit}"
+        canvas.text(title, (12 * scale, row), bold=True)
+        title_end = 12 * scale + canvas.text_width(title, bold=True)
+        self._draw_switch(canvas, title_end + 16 * scale)
         state = self.viewer.costs.state
-        if state and right - canvas.text_width(state) > named:
-            canvas.text(state, (right, 0.5 * TOP * scale), color=theme.faint, anchor="right")
-        ghosts = [ghost for ghost in session.timeline.ghosts if ghost.quantity == what.name]
-        values = [pane.curves[what.name].values for pane in session.timeline.panes] + [
-            ghost.values for ghost in ghosts
-        ]
-        some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
-        low, high, step = value_axis(float(some.min()), float(some.max()))
+        right = self._scale.times.right
+        if state and right - canvas.text_width(state) > title_end:
+            canvas.text(state, (right, row), color=self.theme.faint, anchor="right")
 
-        def place(time: Array, cost: Array) -> Array:
-            return np.column_stack([self.column(time), bottom + (top - bottom) * (cost - low) / (high - low)])
+    def _draw_switch(self, canvas: Canvas, left: float) -> None:
+        """Write the name of the other quantity next to the title, if there is one: a click shows it."""
+        self.switch_box = None
+        if not self._has_times:
+            return
+        scale = self.layout.scale
+        size = self.theme.small_text
+        other = DISTANCE if self.plotted is TIME else TIME
+        text = f"{other.short_title} ›"
+        canvas.text(text, (left, 0.5 * TOP_PX * scale), color=self.theme.faint, size=size)
+        chart_left, chart_top, _, _ = self.layout.chart
+        width = canvas.text_width(text, size) + 12 * scale
+        self.switch_box = (
+            round(chart_left + left - 6 * scale),
+            chart_top,
+            round(width),
+            round(TOP_PX * scale),
+        )
 
-        self._place, faint = place, mix(theme.panel, theme.ink, 0.12)
-        note = partial(canvas.text, size=theme.small_text, color=theme.faint)
-        for mark in np.arange(low, high, step):
-            y = bottom - (bottom - top) * (mark - low) / (high - low)
-            canvas.surface.fill(faint, (round(left), round(y), round(right - left), 1))
-            note(f"{mark:.6g}", (left - 7 * scale, y), anchor="right")
-        seconds = max(round_length(end / 6.0), 1.0)
-        room = max(seconds * (right - left) / end, 1.0)  # px from one to the next
-        seconds *= math.ceil((canvas.text_width(f"{end:.0f} s", theme.small_text) + 4 * scale) / room)
-        for mark in np.arange(0.0, end + 1e-9, seconds):
-            note(f"{mark:g} s", (self.column(mark), height - 0.5 * BOTTOM * scale), anchor="middle")
-        for event in session.timeline.events:
-            self._rule(canvas.surface, self.column(event.time), mix(theme.panel, theme.ink, 0.3), 0)
-        free = left
-        for event in session.timeline.events:  # in words where there is room
-            x, glyph = self.column(event.time), _GLYPHS.get(event.kind, "•")
-            words = f"{glyph} {event.text}"
-            wide = canvas.text_width(words, theme.small_text)
-            if x + wide > right:
-                words, wide = glyph, round(8 * scale)
-            if x >= free:
-                note(words, (x + 3 * scale, top + 6 * scale))
-                free = x + wide + 8 * scale
-        self._ghosts = [(ghost.node, place(ghost.times, ghost.values)) for ghost in ghosts]
-        for ghost, (_, points) in zip(ghosts, self._ghosts, strict=True):
-            color = mix(theme.panel, theme.get_controller_color(ghost.controller), 0.45)
+    def _draw_axes(self, canvas: Canvas) -> None:
+        """Draw the grid with its values, and the times below it."""
+        scale = self.layout.scale
+        times = self._scale.times
+        size = self.theme.small_text
+        faint = self.theme.faint
+        line_color = mix(self.theme.panel, self.theme.ink, 0.12)
+        for value in self._scale.values.ticks.tolist():
+            row = self._scale.to_row(value)
+            canvas.surface.fill(line_color, (round(times.left), round(row), round(times.width), 1))
+            label = f"{value:.6g}"
+            canvas.text(label, (times.left - 7 * scale, row), size=size, color=faint, anchor="right")
+        label_width = canvas.text_width(f"{times.end:.0f} s", size) + 4 * scale
+        max_intervals = min(MAX_TIME_INTERVALS, times.width / label_width)
+        step = max(choose_tick_step(times.end, max_intervals), 1.0)
+        row = self.layout.chart[3] - 0.5 * BOTTOM_PX * scale
+        for time in list_ticks(0.0, times.end, step).tolist():
+            center = (times.to_column(time), row)
+            canvas.text(f"{time:g} s", center, size=size, color=faint, anchor="middle")
+
+    def _draw_events(self, canvas: Canvas) -> None:
+        """Draw a line for each event, with its text if there is space, else with its sign alone."""
+        events = self.viewer.session.timeline.events
+        line_color = mix(self.theme.panel, self.theme.ink, 0.3)
+        for event in events:
+            self._draw_rule(canvas.surface, self.to_column(event.time), line_color, top=0)
+        scale = self.layout.scale
+        size = self.theme.small_text
+        row = self._scale.top + 6 * scale
+        free_from = self._scale.times.left
+        for event in events:
+            column = self.to_column(event.time)
+            glyph = _EVENT_GLYPHS.get(event.kind, _OTHER_EVENT_GLYPH)
+            text = f"{glyph} {event.text}"
+            width = canvas.text_width(text, size)
+            if column + width > self._scale.times.right:
+                text = glyph
+                width = round(8 * scale)
+            if column >= free_from:
+                canvas.text(text, (column + 3 * scale, row), size=size, color=self.theme.faint)
+                free_from = column + width + 8 * scale
+
+    def _draw_ghosts(self, canvas: Canvas) -> None:
+        """Draw the curves of other branches, pale and dashed, with their names at their ends."""
+        scale = self.layout.scale
+        size = self.theme.small_text
+        self.ghosts = []
+        for ghost in self._ghost_curves:
+            points = self._scale.to_points(ghost.times, ghost.values)
+            self.ghosts.append(GhostLine(ghost.node, points))
+            color = mix(self.theme.panel, self.theme.get_controller_color(ghost.controller), 0.45)
+            is_dashed = len(points) >= MAX_GHOST_POINTS_WITHOUT_GAPS
             for k in range(len(points) - 1):
-                if k % 4 < 3 or len(points) < 12:
+                if not is_dashed or k % 4 < 3:
                     canvas.line(points[k].tolist(), points[k + 1].tolist(), color)
             if len(points):
-                x = max(
-                    points[-1][0] - 4 * scale, left + canvas.text_width(ghost.description, theme.small_text)
-                )
-                note(ghost.description, (x, points[-1][1] - 9 * scale), anchor="right", color=color)
-        colors = curve_colors(session.timeline.panes, theme)
-        for pane in session.timeline.panes:
-            curve = pane.curves[what.name]
-            points = _thinned(place(curve.times, curve.values))
+                name_width = canvas.text_width(ghost.description, size)
+                right = max(points[-1][0] - 4 * scale, self._scale.times.left + name_width)
+                place = (right, points[-1][1] - 9 * scale)
+                canvas.text(ghost.description, place, size=size, color=color, anchor="right")
+
+    def _draw_curves(self, canvas: Canvas) -> None:
+        """Draw the curve of each pane."""
+        panes = self.viewer.session.timeline.panes
+        colors = map_curve_colors(panes, self.theme)
+        for pane in panes:
+            curve = pane.curves[self.plotted.name]
+            points = thin_points(self._scale.to_points(curve.times, curve.values))
             if len(points) > 1:
-                canvas.segments(np.hstack([points[:-1], points[1:]]), colors[pane.number], canvas.width(1.8))
+                segments = np.hstack([points[:-1], points[1:]])
+                canvas.segments(segments, colors[pane.number], canvas.width(1.8))
 
-    def _offer(self, canvas: Canvas, left: float) -> None:
-        """Name the other quantity beside the title, where there are two: a click plots it."""
-        scale, size, self._other = self.layout.scale, self.theme.small_text, None
-        if not self._timed:
-            return
-        words, left = f"{(DISTANCE if self.plotted is TIME else TIME).short_title} ›", left + 16 * scale
-        canvas.text(words, (left, 0.5 * TOP * scale), color=self.theme.faint, size=size)
-        (x, y, _, _), wide = self.layout.chart, canvas.text_width(words, size)
-        self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
-
-    def _values(self, screen: pygame.Surface) -> None:
-        """Write the captions' values, newer than the page, at the right, with the gaps; none over another."""
-        session, theme, scale = self.viewer.session, self.theme, self.layout.scale
-        chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
-        canvas = create_flat_canvas(chart, theme, scale)
-        (_, right, _), colors = self._span, curve_colors(session.timeline.panes, theme)
-        time, known = session.displayed.get_costs(self.plotted.name)
-        best = min(known.values(), default=0.0)
-        panes = [pane for pane in session.timeline.panes if pane.number in known]
-        panes.sort(key=lambda pane: -known[pane.number])
-        values = np.array([known[pane.number] for pane in panes])
-        wanted = self._place(np.full(len(panes), time), values)[:, 1]
-        rows = spread(wanted, 15.0 * scale, self.layout.chart[3] - 8 * scale)
-        for y, pane, value in zip(rows, panes, values.tolist(), strict=True):
-            words = f"{value:.3f}"
-            if len(known) > 1:
-                more = 100 * (value / best - 1)
-                gap = f"  +{more:.{1 if more < 99.95 else 0}f} %" if value > best else "  best"
-                room = chart.get_width() - right - 15 * scale
-                room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
-                name = shortened(pane.controller.label, canvas.text_size(theme.small_text), room, True)
-                words = f"{name}  {words}{gap}"
-            at, color = (right + 9 * scale, y), colors[pane.number]
-            canvas.text(words, at, color=color, bold=True, size=theme.small_text)
-
-    def _track(self, canvas: Canvas) -> None:
-        theme, scale, session = self.theme, self.layout.scale, self.viewer.session
-        left, right, _ = self._span
+    def _draw_time_line(self, canvas: Canvas) -> None:
+        """Draw the empty bar of the time line, and whether the present or the past is shown."""
+        theme = self.theme
+        scale = self.layout.scale
+        times = self._scale.times
         top = self.layout.chart[3]
         middle = top + 0.5 * self.layout.track[3]
         canvas.surface.fill(theme.panel, pygame.Rect(0, top, *self.layout.track[2:]))
-        thick = max(4, round(5 * scale))
-        box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
-        pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
-        canvas.text("time", (12 * scale, middle), color=theme.faint, size=theme.small_text)
-        words, color = ("live", theme.start) if session.timeline.is_live else ("past", theme.final)
-        beside, size, thinned = (
-            right + 9 * scale,
-            theme.small_text,
-            session.timeline.is_live and session.timeline.history.thinned,
+        thickness = self._bar_thickness
+        bar = pygame.Rect(
+            round(times.left), round(middle - thickness / 2), round(times.right - times.left), thickness
         )
-        if thinned:
-            words = "live · past thinned"
-            fits = beside + canvas.text_width(words, size=size) <= self.layout.track[2]
-            words = words if fits else "thinned"
-        canvas.text(words, (beside, middle), color=color, bold=not thinned, size=size)
+        bar_color = mix(theme.panel, theme.ink, 0.13)
+        pygame.draw.rect(canvas.surface, bar_color, bar, border_radius=thickness)
+        canvas.text("time", (12 * scale, middle), color=theme.faint, size=theme.small_text)
+        self._draw_state(canvas, times.right + 9 * scale, middle)
 
-    def _rule(self, screen: pygame.Surface, x: float, color: Color, top: int) -> None:
-        height, scale = self.layout.chart[3], self.layout.scale
-        screen.fill(color, (round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale)))
-
-    def _cursor(self, screen: pygame.Surface) -> None:
-        theme, scale, session = self.theme, self.layout.scale, self.viewer.session
-        canvas = create_flat_canvas(screen, theme, scale)
-        middle, thick = self.layout.track[1] + 0.5 * self.layout.track[3], max(4, round(5 * scale))
-        x, begin = self.column(session.displayed.time), round(self.column(0.0))
-        bars = [(self.column(session.timeline.end_time), mix(theme.panel, theme.ink, 0.4))]
-        if not session.timeline.is_live:
-            bars.append((x, theme.final))
-            self._rule(screen, x, theme.final, self.layout.chart[1])
-        for end, color in bars:
-            bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
-            pygame.draw.rect(screen, color, bar, border_radius=thick)
-        dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
-        for event in session.timeline.events:
-            canvas.stamp(dot, (self.column(event.time), middle))
-        fill, radius = theme.ink if session.timeline.is_live else theme.final, round(2 * 6.5 * scale) / 2
-        handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
-        canvas.stamp(handle, (x, middle))
-
-    def _hovered(self, screen: pygame.Surface) -> None:
-        over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.viewer.session
-        (left, right, _), boxes = self._span, (self.layout.chart, self.layout.track)
-        if over is None or not left <= over[0] <= right or not any(is_inside(box, over) for box in boxes):
+    def _draw_state(self, canvas: Canvas, left: float, middle: float) -> None:
+        """Write whether the present is shown, and whether the past is coarser than it was."""
+        timeline = self.viewer.session.timeline
+        size = self.theme.small_text
+        if not timeline.is_live:
+            canvas.text("past", (left, middle), color=self.theme.final, bold=True, size=size)
             return
-        time = self.time_at(over[0])
-        near = [
-            event for event in session.timeline.events if abs(self.column(event.time) - over[0]) < 5 * scale
-        ]
-        if near:
-            words = "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
-        else:
-            what = self.plotted
-            values = [
-                (pane.controller.label, pane.curves[what.name].interpolate(time))
-                for pane in session.timeline.panes
-            ]
-            known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
-            words = "   ".join([f"{time:.1f} s", *known])
-        x = round(self.column(time))
-        self._rule(screen, x, mix(theme.panel, theme.ink, 0.35), self.layout.chart[1])
-        room = right - create_flat_canvas(screen, theme, scale).text_width(words)
-        at = min(x + 12 * scale, room), self.layout.chart[1] + (TOP + 16) * scale
-        draw_tag(screen, words, at, theme, scale)
+        if not timeline.history.thinned:
+            canvas.text("live", (left, middle), color=self.theme.start, bold=True, size=size)
+            return
+        text = "live · past thinned"
+        if left + canvas.text_width(text, size=size) > self.layout.track[2]:
+            text = "thinned"
+        canvas.text(text, (left, middle), color=self.theme.start, size=size)
+
+    @property
+    def _bar_thickness(self) -> int:
+        """Thickness of the time line, px."""
+        return max(4, round(5 * self.layout.scale))
+
+    def _draw_values(self, screen: pygame.Surface) -> None:
+        """Write the current value of each curve at the right, with the gap to the best.
+
+        Values are newer than the page, so they are not part of it.
+        """
+        session = self.viewer.session
+        scale = self.layout.scale
+        chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
+        canvas = create_flat_canvas(chart, self.theme, scale)
+        _, values = session.displayed.get_costs(self.plotted.name)
+        colors = map_curve_colors(session.timeline.panes, self.theme)
+        panes = [pane for pane in session.timeline.panes if pane.number in values]
+        panes.sort(key=lambda pane: -values[pane.number])
+        rows = spread_labels(
+            [self._scale.to_row(values[pane.number]) for pane in panes],
+            gap=LABEL_GAP_PX * scale,
+            low=0.5 * LABEL_GAP_PX * scale,
+            high=self.layout.chart[3] - 8 * scale,
+        )
+        left = self.times.right + 9 * scale
+        for row, pane in zip(rows, panes, strict=True):
+            text = f"{values[pane.number]:.3f}"
+            if len(values) > 1:
+                text = f"{text}{format_gap(values[pane.number], min(values.values()))}"
+                free_width = chart.get_width() - left - 6 * scale
+                text = self._add_name(canvas, pane.controller.label, text, free_width)
+            color = colors[pane.number]
+            canvas.text(text, (left, row), color=color, bold=True, size=self.theme.small_text)
+
+    def _add_name(self, canvas: Canvas, name: str, text: str, width: float) -> str:
+        """Return a name and a text, the name shortened so that both fit into a width, px."""
+        size = self.theme.small_text
+        name_width = width - canvas.text_width(f"  {text}", size, bold=True)
+        return f"{shortened(name, canvas.text_size(size), name_width, True)}  {text}"
+
+    def _draw_rule(self, surface: pygame.Surface, column: float, color: Color, *, top: int) -> None:
+        """Draw a vertical line over the curves; the chart is at row `top` of the surface."""
+        scale = self.layout.scale
+        height = self.layout.chart[3] - (TOP_PX + BOTTOM_PX) * scale
+        surface.fill(color, (round(column), round(top + TOP_PX * scale), 1, round(height)))
+
+    def _draw_present(self, screen: pygame.Surface) -> None:
+        """Draw how far the session and the displayed time are on the time line, and its events."""
+        theme = self.theme
+        scale = self.layout.scale
+        timeline = self.viewer.session.timeline
+        canvas = create_flat_canvas(screen, theme, scale)
+        middle = self.layout.track[1] + 0.5 * self.layout.track[3]
+        column = self.to_column(self.viewer.session.displayed.time)
+        end_column = self.to_column(timeline.end_time)
+        self._draw_bar(screen, end_column, middle, mix(theme.panel, theme.ink, 0.4))
+        if not timeline.is_live:
+            self._draw_bar(screen, column, middle, theme.final)
+            self._draw_rule(screen, column, theme.final, top=self.layout.chart[1])
+        dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
+        for event in timeline.events:
+            canvas.stamp(dot, (self.to_column(event.time), middle))
+        fill = theme.ink if timeline.is_live else theme.final
+        radius = round(2 * 6.5 * scale) / 2
+        handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
+        canvas.stamp(handle, (column, middle))
+
+    def _draw_bar(self, screen: pygame.Surface, end: float, middle: float, color: Color) -> None:
+        """Fill the time line from its start to a column."""
+        thickness = self._bar_thickness
+        left = round(self.to_column(0.0))
+        width = max(round(end) - left, thickness)
+        bar = pygame.Rect(left, round(middle - thickness / 2), width, thickness)
+        pygame.draw.rect(screen, color, bar, border_radius=thickness)
+
+    def _draw_hover(self, screen: pygame.Surface) -> None:
+        """Write the events or the values at the pointer."""
+        if self.hover is None or not self._is_over_axis(self.hover):
+            return
+        theme = self.theme
+        scale = self.layout.scale
+        top = self.layout.chart[1]
+        time = self.to_time(self.hover[0])
+        text = self._describe_events(self.hover[0]) or self._describe_values(time)
+        column = round(self.to_column(time))
+        self._draw_rule(screen, column, mix(theme.panel, theme.ink, 0.35), top=top)
+        text_width = create_flat_canvas(screen, theme, scale).text_width(text)
+        left = min(column + 12 * scale, self.times.right - text_width)
+        draw_tag(screen, text, (left, top + (TOP_PX + 16) * scale), theme, scale)
+
+    def _is_over_axis(self, pixel: tuple[int, int]) -> bool:
+        """Return whether a pixel of the window is over the curves or the time line."""
+        times = self.times
+        is_in_box = is_inside(self.layout.chart, pixel) or is_inside(self.layout.track, pixel)
+        return is_in_box and times.left <= pixel[0] <= times.right
+
+    def _describe_events(self, column: int) -> str:
+        """Return the last events near a column of the window as text; empty if there are none."""
+        reach = EVENT_REACH_PX * self.layout.scale
+        events = self.viewer.session.timeline.events
+        near = [event for event in events if abs(self.to_column(event.time) - column) < reach]
+        return "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
+
+    def _describe_values(self, time: float) -> str:
+        """Return the values of all curves at a time, s, as text."""
+        texts = [f"{time:.1f} s"]
+        for pane in self.viewer.session.timeline.panes:
+            value = pane.curves[self.plotted.name].interpolate(time)
+            if np.isfinite(value):
+                texts.append(f"{pane.controller.label} {value:.3f} {self.plotted.unit}")
+        return "   ".join(texts)
 
 
-def curve_colors(panes: Iterable[Pane], theme: Theme) -> dict[int, Color]:
-    """Return the colors of curves by pane: the controller's, or another one where that is taken."""
-    taken: dict[int, Color] = {}
-    for pane in panes:
-        wanted = [theme.controllers.get(pane.controller.name), *theme.others]
-        taken[pane.number] = next(each for each in wanted if each and each not in taken.values())
-    return taken
+def format_gap(value: float, best: float) -> str:
+    """Return how much a value is above the best one, as text.
 
-
-def spread(wanted: Array, gap: float, limit: float) -> list[float]:
-    """Return heights near the wanted ones, ascending as those are, apart by a gap, none beyond a limit.
-
-    >>> spread(np.array([10.0, 11.0, 40.0]), 5.0, 42.0)
-    [10.0, 15.0, 40.0]
+    Examples
+    --------
+    >>> format_gap(2.2, 2.0), format_gap(5.0, 2.0), format_gap(2.0, 2.0)
+    ('  +10.0 %', '  +150 %', '  best')
     """
-    rows: list[float] = []
-    for y in wanted.tolist():
-        rows.append(max(y, rows[-1] + gap) if rows else y)
-    for k in range(len(rows)):
-        rows[-1 - k] = min(rows[-1 - k], limit - gap * k)
-    return rows
+    if value <= best:
+        return "  best"
+    percent = 100 * (value / best - 1)
+    decimals = 1 if percent < _SMALL_GAP_PERCENT else 0
+    return f"  +{percent:.{decimals}f} %"
 
 
-def _thinned(points: Array) -> Array:
-    """Return the points of a curve that differ by a pixel's part, the last one always."""
-    if len(points) < 400:
+def map_curve_colors(panes: Iterable[Pane], theme: Theme) -> dict[int, Color]:
+    """Return the color of the curve of each pane by its number."""
+    some_panes = list(panes)
+    colors = choose_curve_colors([pane.controller.name for pane in some_panes], theme)
+    return dict(zip([pane.number for pane in some_panes], colors, strict=True))
+
+
+def thin_points(points: Array) -> Array:
+    """Return the points of a curve, (k, 2) px, without those that nobody could tell apart.
+
+    The last point always stays, since the curve grows there.
+    """
+    if len(points) < MIN_POINTS_TO_THIN:
         return points
-    columns = np.rint(points[:, 0] * 1.5)
+    columns = np.rint(points[:, 0] * _SAMPLES_PER_PX)
     return np.asarray(points[np.append(columns[1:] != columns[:-1], True)])

@@ -91,7 +91,7 @@ class TimeGesture(DragGesture):
 
     def move(self, event: pygame.event.Event) -> None:
         """Show the time under the mouse."""
-        self._viewer.attempt(lambda: self._viewer.playback.look_at(self._chart.time_at(event.pos[0])))
+        self._viewer.attempt(lambda: self._viewer.playback.look_at(self._chart.to_time(event.pos[0])))
 
 
 class ViewerPointer:
@@ -179,7 +179,7 @@ class ViewerPointer:
             return pygame.SYSTEM_CURSOR_CROSSHAIR
         if not self._is_over_time():
             return pygame.SYSTEM_CURSOR_ARROW
-        return pygame.SYSTEM_CURSOR_HAND if self._chart.offers(self.at) else pygame.SYSTEM_CURSOR_SIZEWE
+        return pygame.SYSTEM_CURSOR_HAND if self._chart.is_on_switch(self.at) else pygame.SYSTEM_CURSOR_SIZEWE
 
     def _is_over_time(self) -> bool:
         layout = self._canvas.layout
@@ -218,16 +218,16 @@ class ViewerPointer:
     def _press_chart(self, pixel: tuple[int, int]) -> None:
         viewer = self._viewer
         chart = self._chart
-        if chart.offers(pixel):
-            viewer.attempt(chart.switch)
+        if chart.is_on_switch(pixel):
+            viewer.attempt(chart.switch_quantity)
             return
-        node = chart.ghost_at(pixel)
+        node = chart.find_ghost(pixel)
         if node is not None:
             viewer.attempt(lambda: viewer.playback.enter_node(node))
             return
         self._leave_lesson()
         self._gesture = TimeGesture(viewer, chart)
-        viewer.attempt(lambda: viewer.playback.look_at(chart.time_at(pixel[0])))
+        viewer.attempt(lambda: viewer.playback.look_at(chart.to_time(pixel[0])))
 
     def _press_tool(self, pixel: tuple[int, int], pane: int, now: float) -> None:
         viewer = self._viewer

@@ -84,7 +84,7 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
         Command("pan:right", "Pan right", "View", pan_right, ("ctrl+right",), repeats=True),
         Command("pan:up", "Pan up", "View", pan_up, ("ctrl+up",), repeats=True),
         Command("pan:down", "Pan down", "View", pan_down, ("ctrl+down",), repeats=True),
-        Command("plot", "Plot mean distance or mean time", "View", chart.switch, ("y",)),
+        Command("plot", "Plot mean distance or mean time", "View", chart.switch_quantity, ("y",)),
         Command("tab", "Next page of the panel", "View", actions.show_next_tab, ("ctrl+tab",)),
         Command("fullscreen", "Full screen", "View", actions.toggle_fullscreen, ("f11",)),
     ]

@@ -9,8 +9,6 @@ import pygame
 import pytest
 from clear_pages import all_clear, overlap
 from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -21,7 +19,7 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.team import Team
 from robocov.voronoi import partition
-from robocov_app.figures.curves import end_label, spread
+from robocov_app.figures.curves import end_label
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_cost, plot_environment, plot_trajectories
@@ -332,16 +330,6 @@ class TestCost:
     def test_what_cannot_be_plotted_is_named(self, bad):
         with pytest.raises(ParameterError, match="curve"):
             plot_cost(bad)
-
-    @given(st.lists(st.floats(0, 100), min_size=1, max_size=8), st.floats(0.1, 10))
-    def test_spread_keeps_order_gap_and_limits(self, heights, gap):
-        given_heights = np.array(heights)
-        placed = spread(given_heights, gap, 0.0, 100.0)
-        order = np.argsort(given_heights, kind="stable")
-        assert (np.diff(placed[order]) >= gap * (1 - 1e-9)).all()
-        assert placed.min() >= -1e-9 and placed.max() <= 100 + 1e-9
-        if len(heights) == 1 or np.diff(np.sort(given_heights)).min() >= gap:
-            assert placed == pytest.approx(given_heights)
 
 
 _LAZY = """

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import value_limits
 from robocov_app.figures.results import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
@@ -64,23 +63,6 @@ def test_of_very_many_values_some_points_are_drawn() -> None:
     drawn = axes.lines[0].get_xdata()
     assert len(drawn) == MOST_POINTS
     assert (drawn[0], drawn[-1]) == (0.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("values", "origin", "begin"),
-    [
-        ((1.0, 9.0), 0.0, 0.0),
-        ((8.0, 9.0), 0.0, 7.94),
-        ((2.0, 2.0), 0.0, 1.8),
-        ((-0.1, 0.9), 0.0, -0.16),
-        ((1.01, 1.2), 1.0, 1.0),
-        ((0.98, 1.2), 1.0, 0.9668),
-        ((3.0, 4.0), 1.0, 2.94),
-    ],
-)
-def test_an_axis_begins_at_its_origin_where_values_come_near_it(values, origin, begin) -> None:
-    low, high = value_limits(*values, room=0.06, origin=origin)
-    assert low == pytest.approx(begin) and low < values[0] + 1e-9 and high > values[1]
 
 
 @given(st.lists(st.floats(1e-3, 1e4), min_size=1, max_size=8))

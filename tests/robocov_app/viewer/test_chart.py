@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from driven_window import Driver, opened
-from hypothesis import given
-from hypothesis import strategies as st
 
 from robocov_app.render.canvas import Canvas
-from robocov_app.viewer.chart import curve_colors, spread, time_axis, value_axis
+from robocov_app.viewer.chart import map_curve_colors
 from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 
@@ -30,31 +28,6 @@ def played(driver: Driver, frames: int = 60) -> None:
     driver.frames(frames)
     driver.session.playback.is_playing = False
     driver.frames(8)
-
-
-@given(st.floats(0.0, 1e5))
-def test_the_axis_of_time_has_room_for_now_but_not_much_more(end: float) -> None:
-    axis = time_axis(end)
-    assert end < axis <= max(10.0, 2.0 * end)
-
-
-@given(st.floats(1e-3, 1e3), st.floats(0.0, 1e3))
-def test_the_axis_of_values_holds_all_of_them(low: float, more: float) -> None:
-    begin, end, step = value_axis(low, low + more)
-    assert 0.0 <= begin <= low
-    assert end >= low + more
-    assert 1 <= (end - begin) / step <= 12
-
-
-def test_an_axis_without_values_is_no_trouble() -> None:
-    assert value_axis(float("nan"), float("nan")) == (0.0, 1.0, 0.5)
-
-
-@given(st.lists(st.floats(0, 200), min_size=1, max_size=4))
-def test_words_at_the_right_keep_apart_and_in_the_chart(wanted: list[float]) -> None:
-    rows = spread(np.sort(wanted), 15.0, 200.0)
-    assert all(below - above >= 15.0 - 1e-9 for above, below in pairwise(rows))
-    assert max(rows) <= 200.0 + 1e-9
 
 
 @pytest.mark.parametrize("width", [480, 900])
@@ -82,9 +55,9 @@ def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
     played(driver)
     chart = driver.window.chart
     for time in (0.0, 0.3, driver.session.timeline.end_time):
-        assert chart.time_at(chart.column(time)) == pytest.approx(time, abs=1e-9)
-    assert chart.time_at(-100.0) == 0.0
-    assert chart.time_at(1e5) == driver.session.timeline.end_time
+        assert chart.to_time(chart.to_column(time)) == pytest.approx(time, abs=1e-9)
+    assert chart.to_time(-100.0) == 0.0
+    assert chart.to_time(1e5) == driver.session.timeline.end_time
 
 
 def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> None:
@@ -93,7 +66,7 @@ def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> 
     left, top, width, height = window.layout.chart
     picture = copy_pixels(window.screen)[top : top + height, left : left + width].astype(int)
     for pane in driver.session.timeline.panes:
-        color = np.array(curve_colors(driver.session.timeline.panes, window.theme)[pane.number])
+        color = np.array(map_curve_colors(driver.session.timeline.panes, window.theme)[pane.number])
         assert (np.abs(picture - color).max(axis=2) < 12).sum() > 20, pane.controller.name
 
 
@@ -105,7 +78,7 @@ def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
         ControllerChoice("rpf"),
         ControllerChoice("rpf"),
     ) as driver:
-        colors = set(curve_colors(driver.session.timeline.panes, driver.window.theme).values())
+        colors = set(map_curve_colors(driver.session.timeline.panes, driver.window.theme).values())
         assert len(colors) == 4
 
 
@@ -116,7 +89,7 @@ def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.fail_robot(1))
     driver.frames(8)
     after = copy_pixels(window.screen)
-    column = round(window.chart.column(driver.session.timeline.end_time))
+    column = round(window.chart.to_column(driver.session.timeline.end_time))
     _, top, _, height = window.layout.chart
     middle = top + height // 2
     changed = np.abs(after[middle].astype(int) - before[middle]).max(axis=1)

@@ -119,7 +119,7 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
         bounds = driver.session.displayed.environment.region.bounds
         assert low - high > 0.65 * boxes[0][3] or across * (bounds[2] - bounds[0]) > 0.85 * boxes[0][2]
         (left, _, width, _), scale = driver.window.layout.chart, driver.window.layout.scale
-        room = left + width - driver.window.chart._span[1] - 9 * scale
+        room = left + width - driver.window.chart.times.right - 9 * scale
         name = max((pane.controller.label for pane in driver.session.timeline.panes), key=len)
         assert (
             text_width(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True) <= room

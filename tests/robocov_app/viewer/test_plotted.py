@@ -55,7 +55,7 @@ def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
         driver.frames(2)
         assert chart.plotted is TIME
         assert not driver.same(before)
-        left, top, width, _ = chart._other
+        left, top, width, _ = chart.switch_box
         driver.click(left + width / 2, top + 6)
         assert chart.plotted is DISTANCE
         # the click was none on the time line
@@ -81,4 +81,4 @@ def test_where_all_are_equally_fast_there_is_no_choice(tmp_path: Path) -> None:
         driver.key("y")
         assert driver.window.chart.plotted is DISTANCE
         assert "equally fast" in driver.viewer.message
-        assert driver.window.chart._other is None
+        assert driver.window.chart.switch_box is None

@@ -23,7 +23,7 @@ def played(driver: Driver, steps: int) -> Driver:
 def at(driver: Driver, time: float) -> tuple[float, float]:
     """Return the pixel on the time line of a time."""
     _, top, _, high = driver.window.layout.track
-    return driver.window.chart.column(time), top + high / 2
+    return driver.window.chart.to_column(time), top + high / 2
 
 
 def test_the_time_line_is_dragged_to_look_back_and_to_the_end_again(driver: Driver) -> None:

@@ -149,7 +149,7 @@ def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
         driver.frames(90)
         driver.key("ctrl+z")
         driver.frames(30)
-        ((node, points),) = driver.window.chart._ghosts
+        ((node, points),) = driver.window.chart.ghosts
         x, y = points[-1].tolist()
         driver.click(x, y + driver.window.layout.chart[1])
         assert "robot 2 failed" in driver.viewer.message

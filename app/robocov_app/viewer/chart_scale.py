@@ -1,0 +1,140 @@
+"""Where times and values are on the chart of a session."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.look.axes import Axis, choose_growing_time_limit, choose_growing_value_axis
+from robocov_app.render.fonts import text_width
+from robocov_app.toolkit.layout import Layout
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.timeline import Timeline
+
+LEFT_PX = 52
+"""Space to the left of the curves, at scale 1: numbers of the axis of values."""
+RIGHT_PX = 70
+"""Space to the right: values of the captions."""
+TOP_PX = 26
+"""Space above: the title."""
+BOTTOM_PX = 20
+"""Space below: numbers of the axis of times."""
+MIN_TICK_GAP_PX = 22
+"""Minimum distance between the lines of the grid."""
+_WIDEST_VALUE = "  8.888  +88.8 %"
+_MAX_NAMES_FRACTION = 0.4
+"""Fraction of the chart that names of controllers may take."""
+
+
+@dataclass(frozen=True)
+class TimeScale:
+    """Columns of times in the window.
+
+    Attributes
+    ----------
+    left, right : float, px
+        Ends of the axis.
+    end : float, s
+        Time at the right end; the left end is at 0.
+    """
+
+    left: float
+    right: float
+    end: float
+
+    @property
+    def width(self) -> float:
+        """Length of the axis, px."""
+        return self.right - self.left
+
+    def to_column(self, time: float) -> float:
+        """Return the column of a time, s, px."""
+        return self.left + self.width * time / self.end
+
+    def to_time(self, column: float) -> float:
+        """Return the time, s, of a column, px; it may be outside the axis."""
+        return (column - self.left) / max(self.width, 1.0) * self.end
+
+
+def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> TimeScale:
+    """Build the axis of times.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the window.
+    timeline : Timeline
+    text_size : float
+        Size of the captions at scale 1.
+
+    Returns
+    -------
+    TimeScale
+    """
+    left, _, width, _ = layout.chart
+    caption_width = RIGHT_PX * layout.scale
+    if len(timeline.panes) > 1:
+        names_width = _measure_captions(timeline.panes, round(text_size * layout.scale))
+        caption_width = min(names_width + 20 * layout.scale, _MAX_NAMES_FRACTION * width)
+    ghost_ends = [float(ghost.times[-1]) for ghost in timeline.ghosts]
+    end = choose_growing_time_limit(max([timeline.end_time, *ghost_ends]))
+    return TimeScale(left + LEFT_PX * layout.scale, left + width - caption_width, end)
+
+
+def _measure_captions(panes: Sequence[Pane], text_size: int) -> int:
+    """Return the width of the longest name with its value, px."""
+    return max(text_width(f"{pane.controller.label}{_WIDEST_VALUE}", text_size, True) for pane in panes)
+
+
+@dataclass(frozen=True)
+class ChartScale:
+    """Pixels of times and values on the page of the chart.
+
+    Attributes
+    ----------
+    times : TimeScale
+    values : Axis
+    top, bottom : float, px
+        Rows of the end and of the start of the axis of values.
+    """
+
+    times: TimeScale
+    values: Axis
+    top: float
+    bottom: float
+
+    def to_row(self, value: float) -> float:
+        """Return the row of a value, px."""
+        fraction = (value - self.values.start) / (self.values.end - self.values.start)
+        return self.bottom + (self.top - self.bottom) * fraction
+
+    def to_points(self, times: Array, values: Array) -> Array:
+        """Return the points of a curve, (k, 2) px, of (k,) times, s, and values."""
+        columns = self.times.left + self.times.width * times / self.times.end
+        fractions = (values - self.values.start) / (self.values.end - self.values.start)
+        rows = self.bottom + (self.top - self.bottom) * fractions
+        return np.column_stack([columns, rows])
+
+
+def build_chart_scale(times: TimeScale, layout: Layout, curves: Sequence[Array]) -> ChartScale:
+    """Build the scale of a chart that shows all values of some curves.
+
+    Parameters
+    ----------
+    times : TimeScale
+    layout : Layout
+    curves : sequence of (k,) arrays
+        Values of the curves; they may be empty.
+
+    Returns
+    -------
+    ChartScale
+    """
+    top = TOP_PX * layout.scale
+    bottom = layout.chart[3] - BOTTOM_PX * layout.scale
+    values = np.concatenate([*curves, np.empty(0)])
+    low = float(values.min()) if len(values) else np.nan
+    high = float(values.max()) if len(values) else np.nan
+    max_intervals = (bottom - top) / (MIN_TICK_GAP_PX * layout.scale)
+    return ChartScale(times, choose_growing_value_axis(low, high, max_intervals), top, bottom)
