@@ -120,6 +120,7 @@ class ViewerPanel(SidePanel):
             self.ui.needs_redraw = True
 
     def show_content(self, ui: Ui) -> None:
+        """Show the settings that stay in sight, and the page that is chosen."""
         ui.inset(12, 8, 12)
         self._show_environment(ui)
         self._show_controllers(ui)
