@@ -10,6 +10,17 @@ from shapely import Polygon
 from robocov.arrays import Array, BoolArray, compute_lengths, freeze
 from robocov.errors import InputError
 
+SIDE_X = 0
+"""Column of a side of the region: x of its start, m."""
+SIDE_Y = 1
+"""Column of a side: y of its start, m."""
+SIDE_NORMAL_X = 2
+"""Column of a side: x of its outward unit normal."""
+SIDE_NORMAL_Y = 3
+"""Column of a side: y of its outward unit normal."""
+SIDE_OFFSET = 4
+"""Column of a side: scalar product of its start and its normal, m."""
+
 _MIN_BEND = 1e-9
 """Change of direction at a vertex, rad, up to which it counts as collinear with its neighbors."""
 
@@ -34,7 +45,8 @@ class Region:
     offsets : (k,) array, m
         ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``.
     sides : (k, 5) array
-        The vertex, the normal and the offset of each edge in one row, for kernels.
+        The vertex, the normal and the offset of each edge in one row, for kernels. For the columns, see the
+        constants `SIDE_...`.
     area : float, m²
     centroid : (2,) array, m
 

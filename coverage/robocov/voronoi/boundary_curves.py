@@ -21,6 +21,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
+from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET
 from robocov.voronoi.arcs import BEYOND, CELL, END_X, END_Y, HALF_ANGLE, START_X, START_Y
 
 _NORMAL_X = 0
@@ -226,9 +227,9 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
     middle_y = 0.5 * (edge[_EDGE_START_Y] + edge[_EDGE_END_Y])
     min_offset = np.inf
     for s in range(len(sides)):
-        normal_x = sides[s, 2]
-        normal_y = sides[s, 3]
-        distance = sides[s, 4] - (point[0] * normal_x + point[1] * normal_y)
+        normal_x = sides[s, SIDE_NORMAL_X]
+        normal_y = sides[s, SIDE_NORMAL_Y]
+        distance = sides[s, SIDE_OFFSET] - (point[0] * normal_x + point[1] * normal_y)
         offset = abs(middle_x * normal_x + middle_y * normal_y - distance)
         if offset < min_offset:
             min_offset = offset

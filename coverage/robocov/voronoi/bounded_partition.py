@@ -200,11 +200,11 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     return cells
 
 
-def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
+def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
     """Create the mesh from which the triangulation starts; it has no columns if cells must be clipped."""
-    if not is_complete or robots < _MIN_TRIANGULATED_ROBOTS:
+    if not is_complete or robot_count < _MIN_TRIANGULATED_ROBOTS:
         return np.empty((2, 0), dtype=np.int32)
-    size = 8 * robots + 4
+    size = 8 * robot_count + 4
     if previous is not None and previous.shape[1] == size:
         return previous.copy()
     return np.full((2, size), -1, dtype=np.int32)

@@ -11,6 +11,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.cell_edges import REGION
+from robocov.observation.region import SIDE_X, SIDE_Y
 
 X = 0
 """Column of a vertex: its offset from the generator in x, m."""
@@ -56,11 +57,13 @@ class Workspace(NamedTuple):
 
 
 class CellPolygon(NamedTuple):
-    """The polygon of a cell in a `Workspace`: which ring it is, its number of vertices, and the first one."""
+    """The polygon of a cell in a `Workspace`."""
 
     ring: int
-    vertices: int
+    """Index of the ring."""
+    vertex_count: int
     start: int
+    """Index of the first vertex in the ring."""
 
 
 class CellArrays(NamedTuple):
@@ -123,15 +126,14 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
 
 
 @inlined_kernel
-def clip_cell(workspace: Workspace, neighbors: int, points: Array, sides: Array, i: int) -> CellPolygon:
+def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: Array, i: int) -> CellPolygon:
     """Cut the region by the bisectors between robot i and its neighbors.
 
     Parameters
     ----------
     workspace : Workspace
         Its first rows are the neighbors; they are reordered.
-    neighbors : int
-        Number of neighbors.
+    neighbor_count : int
     points : (n, 2) array, m
         The generators.
     sides : (k, 5) array
@@ -148,14 +150,14 @@ def clip_cell(workspace: Workspace, neighbors: int, points: Array, sides: Array,
     ring = 0
     count = len(sides)
     for k in range(count):
-        rings[ring, k, X] = sides[k, 0] - points[i, 0]
-        rings[ring, k, Y] = sides[k, 1] - points[i, 1]
+        rings[ring, k, X] = sides[k, SIDE_X] - points[i, 0]
+        rings[ring, k, Y] = sides[k, SIDE_Y] - points[i, 1]
         rings[ring, k, BEYOND] = REGION
     # A neighbor can only cut the cell if it is at most twice as far away as the farthest vertex.
     squared_range = _compute_squared_range(rings, ring, count)
-    for row in range(neighbors):
+    for row in range(neighbor_count):
         if row < _SORTED_NEIGHBORS:
-            _move_nearest(neighbor_rows, row, neighbors)
+            _move_nearest(neighbor_rows, row, neighbor_count)
         if neighbor_rows[row, SQUARED_DISTANCE] <= squared_range:
             new_count = _cut(rings, ring, count, neighbor_rows, row)
             if new_count >= 0:
@@ -293,8 +295,8 @@ def write_cell(
     moment_x = 0.0
     moment_y = 0.0
     k = polygon.start
-    for edge in range(total, total + polygon.vertices):
-        after = k + 1 if k + 1 < polygon.vertices else 0
+    for edge in range(total, total + polygon.vertex_count):
+        after = k + 1 if k + 1 < polygon.vertex_count else 0
         x = rings[polygon.ring, k, X]
         y = rings[polygon.ring, k, Y]
         u = rings[polygon.ring, after, X]
@@ -315,4 +317,4 @@ def write_cell(
     cells.mass[i] = max(0.5 * doubled_area, 0.0)
     cells.centroid[i, 0] = points[i, 0] + moment_x * factor
     cells.centroid[i, 1] = points[i, 1] + moment_y * factor
-    return total + polygon.vertices
+    return total + polygon.vertex_count

@@ -6,6 +6,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
+from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET, SIDE_X, SIDE_Y
 from robocov.voronoi.clipping import (
     BEYOND,
     DX,
@@ -102,6 +103,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
         # Within this distance, robots lie in the triangle of the sentinels, and no sentinel cuts a cell.
         if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
             return False
+    # The sentinels are the corners of a large triangle around the region.
     corners[n, 0] = x - 8.0 * size
     corners[n, 1] = y - 5.0 * size
     corners[n + 1, 0] = x + 8.0 * size
@@ -114,7 +116,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     if not update_triangulation(mesh, corners, triangulation.cotangents, half_edges):
         return False
     for h in range(mesh.shape[1]):
-        if h & 3 < 3:
+        if h & 3 < 3:  # The fourth entry of each triangle is unused.
             half_edges[mesh[CORNER, h]] = h
     return True
 
@@ -122,15 +124,15 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
 @kernel
 def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
     """Return the center of the region's bounding box and the sum of its width and height, m."""
-    left = sides[0, 0]
-    right = sides[0, 0]
-    low = sides[0, 1]
-    high = sides[0, 1]
+    left = sides[0, SIDE_X]
+    right = sides[0, SIDE_X]
+    low = sides[0, SIDE_Y]
+    high = sides[0, SIDE_Y]
     for k in range(1, len(sides)):
-        left = min(left, sides[k, 0])
-        right = max(right, sides[k, 0])
-        low = min(low, sides[k, 1])
-        high = max(high, sides[k, 1])
+        left = min(left, sides[k, SIDE_X])
+        right = max(right, sides[k, SIDE_X])
+        low = min(low, sides[k, SIDE_Y])
+        high = max(high, sides[k, SIDE_Y])
     return 0.5 * (left + right), 0.5 * (low + high), right - left + high - low
 
 
@@ -144,7 +146,10 @@ def _compute_region_area(sides: Array) -> float:
     area = 0.0
     for k in range(len(sides)):
         after = k + 1 if k + 1 < len(sides) else 0
-        area += 0.5 * ((sides[k, 0] - x) * (sides[after, 1] - y) - (sides[after, 0] - x) * (sides[k, 1] - y))
+        area += 0.5 * (
+            (sides[k, SIDE_X] - x) * (sides[after, SIDE_Y] - y)
+            - (sides[after, SIDE_X] - x) * (sides[k, SIDE_Y] - y)
+        )
     return area
 
 
@@ -156,7 +161,11 @@ def _find_cell(
     fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])
     clearance = np.inf
     for k in range(len(sides)):
-        clearance = min(clearance, sides[k, 4] - (sides[k, 2] * points[i, 0] + sides[k, 3] * points[i, 1]))
+        clearance = min(
+            clearance,
+            sides[k, SIDE_OFFSET]
+            - (sides[k, SIDE_NORMAL_X] * points[i, 0] + sides[k, SIDE_NORMAL_Y] * points[i, 1]),
+        )
     if clearance > 0.0 and fan.squared_reach < clearance * clearance:
         return CellPolygon(0, fan.neighbors, fan.lowest)
     # Start at the neighbor with the lowest number, so that the result does not depend on the order of the
