@@ -15,7 +15,7 @@ from robocov_app.terminal.progress import make_counter, show_progress
 
 if TYPE_CHECKING:
     from robocov.metrics.run_metrics import RunMetrics
-    from robocov_app.figures.runs import Measured
+    from robocov_app.figures.runs import MeasuredRun
     from robocov_app.runs.saved_runs import SavedRun
 
 _COLUMNS = {
@@ -58,12 +58,12 @@ def command(options: Arguments) -> None:
     """Run `robocov metrics`."""
     from robocov.files.result_folder import extend_result
     from robocov.metrics.run_metrics import COLUMNS
-    from robocov_app.figures.runs import Measured
+    from robocov_app.figures.runs import MeasuredRun
     from robocov_app.runs.saved_runs import load_saved_runs
 
     saved_runs = load_saved_runs(options.folder)
     folder = options.folder if options.folder.is_dir() else options.folder.parent
-    measured_runs: list[Measured] = []
+    measured_runs: list[MeasuredRun] = []
     rows: list[dict[str, Any]] = []
     with extend_result(folder) as result:
         for saved in saved_runs:
@@ -71,7 +71,7 @@ def command(options: Arguments) -> None:
             target = result.staging / saved.folder.relative_to(folder)
             target.mkdir(exist_ok=True)
             write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), metrics.rows())
-            measured_runs.append(Measured(saved.record.label, saved.record.controller, metrics))
+            measured_runs.append(MeasuredRun(saved.record.label, saved.record.controller, metrics))
             rows.append(_build_row(saved, metrics))
     if options.plot is not None:
         _save_figure(options, options.plot, measured_runs)
@@ -110,7 +110,7 @@ def _build_row(saved: SavedRun, metrics: RunMetrics) -> dict[str, Any]:
     }
 
 
-def _save_figure(options: Arguments, path: Path, measured_runs: list[Measured]) -> None:
+def _save_figure(options: Arguments, path: Path, measured_runs: list[MeasuredRun]) -> None:
     """Draw the metrics of all runs against time."""
     from robocov_app.figures.files import save_figure
     from robocov_app.figures.runs import plot_metrics

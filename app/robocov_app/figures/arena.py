@@ -1,6 +1,6 @@
-"""World layers of a plot: the map, and a whole run in it."""
+"""The world as matplotlib draws it: a map, and a whole run in it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,214 +10,453 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Polygon
-from matplotlib.path import Path as Outline
+from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov_app.figures.page import figure_of, tone
+from robocov_app.look import legend
+from robocov_app.look.axes import TICK_FACTORS
 from robocov_app.look.colors import Color, choose_text_color, mix
 from robocov_app.look.robot_colors import ColorScheme, choose_robot_hues, choose_trail_colors
 from robocov_app.look.theme import Theme
 from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
-from robocov_app.render.scene import CENTROID, GOAL, are_centroids
+from robocov_app.render.scene import are_centroids
 
-# radius of a robot where it has room and in the densest crowd, and least size of its number, in points
-_DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
-_START, _AIM = 6.2, 8.0  # sizes of marks where they have room, in points
-_ARROW = 16.0  # length of the arrow on an obstacle that moves, in points
-_DOTS = 400  # dots of the shading of a density along the longer side of a map
+POINTS_PER_INCH = 72.0
+_DISC_PT = 6.4
+"""Radius of a robot if there is space."""
+_MIN_DISC_PT = 1.7
+"""Radius of a robot in the densest crowd."""
+_MIN_NUMBER_PT = 4.2
+"""Numbers of robots that would be smaller are left out."""
+_NUMBER_SIZES = (1.25, 1.1, 0.85, 0.65)
+"""Text sizes of numbers of one, two, three and more digits, in radii of the robot."""
+_START_PT = 6.2
+_GOAL_PT = 8.0
+_MIN_MARK_PT = 3.2
+"""Sizes of starts and goals if there is space, and in the densest crowd."""
+_ARROW_PT = 16.0
+"""Length of the arrow on a moving obstacle."""
+_DENSITY_DOTS = 400
+"""Dots of the image of a density along the longer side of a map."""
 
 
-def ticks_in_meters(axes: Axes, environment: Environment, theme: Theme) -> None:
+def set_meter_axes(axes: Axes, environment: Environment, theme: Theme) -> None:
+    """Give axes of a notebook ticks in meters, and limits that show the whole map."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     axes.set(aspect="equal", xlim=(low_x, high_x), ylim=(low_y, high_y), xlabel="x (m)", ylabel="y (m)")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+        axis.set_major_locator(MaxNLocator("auto", steps=list(TICK_FACTORS)))
     axes.set_facecolor(tone(theme.background))
 
 
-def _static_style(theme: Theme) -> dict[str, Any]:
-    return {"facecolor": tone(theme.obstacle), "edgecolor": tone(theme.obstacle_edge), "linewidth": 0.8}
+def _build_obstacle_style(theme: Theme) -> dict[str, Any]:
+    """Return the look of obstacles."""
+    return {
+        "facecolor": tone(theme.obstacle),
+        "edgecolor": tone(theme.obstacle_edge),
+        "linewidth": 0.8,
+    }
 
 
-def _path_style(theme: Theme) -> dict[str, Any]:
+def _build_path_style(theme: Theme) -> dict[str, Any]:
+    """Return the look of the paths of moving obstacles."""
     return {"color": tone(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
 
 
 def draw_map(
-    axes: Axes, environment: Environment, theme: Theme, *, density: bool = True, time: float = 0.0
+    axes: Axes, environment: Environment, theme: Theme, *, has_density: bool = True, time: float = 0.0
 ) -> None:
-    if density and environment.density is not None and not environment.density.is_uniform:
-        low_x, low_y, high_x, high_y = environment.region.bounds
-        # limits stay as they are, which imshow would change
-        extent = low_x, high_x, low_y, high_y
-        image = AxesImage(axes, extent=extent, origin="lower", interpolation="bilinear", zorder=1.5)
-        image.set_data(shading(environment, _DOTS, theme))
-        axes.add_image(image)
-        image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
-    for part in environment.at(time).blocked.geoms:
-        rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
-        outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
-        axes.add_patch(PathPatch(outline, zorder=2, **_static_style(theme)))
+    """Draw a map.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes that show the map in meters.
+    environment : Environment
+    theme : Theme
+    has_density : bool
+        Whether the density is drawn.
+    time : float, s
+        For obstacles that move.
+    """
+    if has_density and environment.density is not None and not environment.density.is_uniform:
+        _draw_density(axes, environment, theme)
+    for polygon in environment.at(time).blocked.geoms:
+        rings = [
+            Path(np.asarray(ring.coords), closed=True) for ring in (polygon.exterior, *polygon.interiors)
+        ]
+        outline = Path.make_compound_path(*rings)
+        axes.add_patch(PathPatch(outline, zorder=2, **_build_obstacle_style(theme)))
     for obstacle in list_moving_obstacles(environment, time):
-        _draw_motion(axes, environment, obstacle, theme)
-    rim: Any = {"edgecolor": tone(theme.boundary), "linewidth": 1.6, "joinstyle": "miter"}
-    vertices = environment.region.vertices
-    axes.add_patch(Polygon(vertices, closed=True, fill=False, clip_on=False, zorder=3, **rim))
+        _draw_moving_obstacle(axes, environment, obstacle, theme)
+    boundary = Polygon(
+        environment.region.vertices,
+        closed=True,
+        fill=False,
+        edgecolor=tone(theme.boundary),
+        linewidth=1.6,
+        joinstyle="miter",
+        clip_on=False,
+        zorder=3,
+    )
+    axes.add_patch(boundary)
 
 
-def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme) -> None:
-    ring, hollow = np.asarray(obstacle.polygon.exterior.coords), bool(obstacle.polygon.interiors)
-    fill: Any = {"facecolor": "none" if hollow else tone(theme.moving_obstacle)}
-    shape = Polygon(ring, edgecolor=tone(theme.obstacle_edge), linewidth=1.4, zorder=2.1, **fill)
+def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
+    """Draw the density as an image. Unlike `imshow`, this leaves the limits of the axes as they are."""
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    image = AxesImage(
+        axes,
+        extent=(low_x, high_x, low_y, high_y),
+        origin="lower",
+        interpolation="bilinear",
+        zorder=1.5,
+    )
+    image.set_data(shading(environment, _DENSITY_DOTS, theme))
+    axes.add_image(image)
+    image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
+
+
+def _draw_moving_obstacle(
+    axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme
+) -> None:
+    """Draw an obstacle that moves, its path, and an arrow in its direction."""
+    is_hollow = bool(obstacle.polygon.interiors)
+    shape = Polygon(
+        np.asarray(obstacle.polygon.exterior.coords),
+        facecolor="none" if is_hollow else tone(theme.moving_obstacle),
+        edgecolor=tone(theme.obstacle_edge),
+        linewidth=1.4,
+        zorder=2.1,
+    )
     axes.add_patch(shape)
     shape.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
-    axes.plot(*obstacle.path.T, zorder=2.2, **_path_style(theme))
-    half = 0.5 * _ARROW * obstacle.heading
-    origin, one = _in_points(axes, np.eye(2)[::-1])
-    half /= abs(float(one[0] - origin[0]))
-    arrow: Any = {"arrowstyle": "-|>", "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
-    arrow["color"] = tone(theme.ink)
-    begin, end = (obstacle.middle - half).tolist(), (obstacle.middle + half).tolist()
-    axes.annotate("", xy=end, xytext=begin, arrowprops=arrow, zorder=2.3)
+    axes.plot(*obstacle.path.T, zorder=2.2, **_build_path_style(theme))
+    ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    points_per_meter = abs(float(ends[1, 0] - ends[0, 0]))
+    half_arrow = 0.5 * _ARROW_PT * obstacle.heading / points_per_meter
+    arrow = {
+        "arrowstyle": "-|>",
+        "linewidth": 1.4,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+        "color": tone(theme.ink),
+    }
+    axes.annotate(
+        "",
+        xy=(obstacle.middle + half_arrow).tolist(),
+        xytext=(obstacle.middle - half_arrow).tolist(),
+        arrowprops=arrow,
+        zorder=2.3,
+    )
 
 
 def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> None:
+    """Draw a whole run: map, trajectories, and the final positions, goals and cells of the robots.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes that show the map in meters.
+    record : Record
+    theme : Theme
+    colors : {"paper", "robots"}
+    """
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
-    last, n = record.positions[-1], record.positions.shape[1]
-    working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
     cells = record.cells()
-    outlines, owners = cells.outlines
-    hues = choose_robot_hues(n, working[cells.adjacency])
-    paper = colors == "paper"
-    tint = theme.paper_tint if paper else theme.tint
-    areas = [k for k, outline in enumerate(outlines) if len(outline) > 2]
-    style: Any = {"edgecolors": tone(theme.cell_edge), "linewidths": 0.8, "zorder": 1}
-    own = [theme.robots[hue] for hue in hues[working[owners[areas]]].tolist()]
-    style["facecolors"] = [tone(mix(theme.background, color, tint)) for color in own]
-    axes.add_collection(PolyCollection([outlines[k] for k in areas], **style), autolim=False)
-    ways = [record.positions[record.present[:, robot], robot] for robot in range(n)]
-    style = {"capstyle": "round", "joinstyle": "round", "zorder": 4, "linewidths": 1.6 * line_crowding(n)}
-    style["colors"] = [tone(color) for color in choose_trail_colors(theme, hues.tolist(), colors)]
-    axes.add_collection(LineCollection(ways, **style), autolim=False)
-    # of one that joins, where it does
-    begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
-    axes.plot(*begin.T, zorder=5, **_start_style(theme, mark_size(_in_points(axes, begin), 3.2, _START)))
-    own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
-    failed = record.present[-1] & ~record.working[-1]
-    robots = [theme.failed_robot if failed[robot] else own[robot] for robot in there.tolist()]
-    drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
+    working = np.flatnonzero(record.working[-1])
+    hues = choose_robot_hues(len(record.team), working[cells.adjacency])
+    cell_hues = hues[working]
+    _draw_cells(axes, cells.outlines, cell_hues, theme, colors)
+    _draw_trajectories(axes, record, choose_trail_colors(theme, hues.tolist(), colors))
+    _draw_starts(axes, record, theme)
+    radii = _draw_final_positions(axes, record, hues, theme, colors)
     if record.steering is not None:
-        # where robots face, triangles at their discs
-        radii, inches = dict(zip(there.tolist(), drawn, strict=True)), figure_of(axes).dpi_scale_trans
-        for robot in working[record.team.is_unicycle[working]].tolist():
-            heading, off = record.steering[-1, robot, 0], 1.25 * radii[robot] / 72.0
-            shift = ScaledTranslation(off * np.cos(heading), off * np.sin(heading), inches)
-            style = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False, "ls": ""}
-            style |= {"marker": (3, 0, float(np.degrees(heading)) - 90.0), "ms": 0.9 * radii[robot]}
-            axes.plot(*last[robot], mec="none", c=tone(theme.ink), **style)
+        _draw_headings(axes, record, record.steering[-1], radii, theme)
     if has_goals(record):
-        radius = np.array(drawn)[np.searchsorted(there, working)]
-        aims = record.goals[-1][working]
-        plus = are_centroids(aims, cells.centroid)
-        aims = cells.centroid if plus else aims
-        places = _in_points(axes, aims)
-        away = np.hypot(*(places - _in_points(axes, last[working])).T)
-        apart = mark_size(places[np.isfinite(away)], 3.2, _AIM)
-        # where a robot has arrived, only the ends of the cross would stick out from under its disc
-        axes.plot(*aims[away > radius].T, zorder=6, **_aim_style(plus, theme, apart))
+        _draw_goals(axes, record, cells.centroid, radii, theme)
+
+
+def _draw_cells(
+    axes: Axes,
+    outlines: tuple[list[Array], IntArray],
+    hues: IntArray,
+    theme: Theme,
+    colors: ColorScheme,
+) -> None:
+    """Draw the cells of working robots; `hues` has one entry for each of these."""
+    get_color = theme.get_paper_cell_color if colors == "paper" else theme.get_cell_color
+    polygons = []
+    faces = []
+    for outline, owner in zip(*outlines, strict=True):
+        if len(outline) > 2:
+            polygons.append(outline)
+            faces.append(tone(get_color(int(hues[int(owner)]))))
+    collection = PolyCollection(
+        polygons, facecolors=faces, edgecolors=tone(theme.cell_edge), linewidths=0.8, zorder=1
+    )
+    axes.add_collection(collection, autolim=False)
+
+
+def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> None:
+    """Draw the trajectory of each robot while it is present."""
+    robots = len(record.team)
+    trajectories = [record.positions[record.present[:, robot], robot] for robot in range(robots)]
+    collection = LineCollection(
+        trajectories,
+        colors=[tone(color) for color in colors],
+        linewidths=1.6 * line_crowding(robots),
+        capstyle="round",
+        joinstyle="round",
+        zorder=4,
+    )
+    axes.add_collection(collection, autolim=False)
+
+
+def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
+    """Draw a ring where each robot started; where it joined if it joined later."""
+    present = np.flatnonzero(record.present[-1])
+    first_rows = np.argmax(record.present, axis=0)[present]
+    starts = record.positions[first_rows, present]
+    size = mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
+    axes.plot(*starts.T, zorder=5, **_build_start_style(theme, size))
+
+
+def _draw_final_positions(
+    axes: Axes, record: Record, hues: IntArray, theme: Theme, colors: ColorScheme
+) -> dict[int, float]:
+    """Draw robots where they are at the end, and return the radius of each, points."""
+    present = np.flatnonzero(record.present[-1])
+    failed = record.present[-1] & ~record.working[-1]
+    fills = []
+    for robot in present.tolist():
+        if failed[robot]:
+            fills.append(theme.failed_robot)
+        elif colors == "paper":
+            fills.append(theme.final)
+        else:
+            fills.append(theme.robots[hues[robot]])
+    numbers = (present + 1).tolist()
+    positions = record.positions[-1][present]
+    radii = draw_robots(axes, positions, record.team.radius[present], fills, theme, numbers)
+    return dict(zip(present.tolist(), radii, strict=True))
+
+
+def _draw_headings(
+    axes: Axes, record: Record, steering: Array, radii: Mapping[int, float], theme: Theme
+) -> None:
+    """Draw a triangle at the disc of each unicycle in the direction it faces."""
+    dots_per_inch = figure_of(axes).dpi_scale_trans
+    is_turning = record.working[-1] & record.team.is_unicycle
+    for robot in np.flatnonzero(is_turning).tolist():
+        heading = steering[robot, 0]
+        distance_in = 1.25 * radii[robot] / POINTS_PER_INCH
+        offset = ScaledTranslation(
+            distance_in * np.cos(heading), distance_in * np.sin(heading), dots_per_inch
+        )
+        axes.plot(
+            *record.positions[-1, robot],
+            transform=axes.transData + offset,
+            marker=(3, 0, float(np.degrees(heading)) - 90.0),
+            ms=0.9 * radii[robot],
+            mec="none",
+            c=tone(theme.ink),
+            ls="",
+            zorder=6,
+            clip_on=False,
+        )
+
+
+def _draw_goals(
+    axes: Axes, record: Record, centroids: Array, radii: Mapping[int, float], theme: Theme
+) -> None:
+    """Draw the goals of working robots, as centroids if that is what they are."""
+    working = np.flatnonzero(record.working[-1])
+    goals = record.goals[-1][working]
+    is_centroid = are_centroids(goals, centroids)
+    if is_centroid:
+        goals = centroids
+    goal_points = _to_points(axes, goals)
+    distances = np.hypot(*(goal_points - _to_points(axes, record.positions[-1][working])).T)
+    size = mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
+    # At a goal that is reached, only the ends of the cross would stick out from under the disc.
+    is_away = distances > np.array([radii[robot] for robot in working.tolist()])
+    axes.plot(*goals[is_away].T, zorder=6, **_build_goal_style(is_centroid, theme, size))
 
 
 def draw_robots(
     axes: Axes,
-    places: Array,
+    positions: Array,
     radius: Array,
     fills: Sequence[Color],
     theme: Theme,
     numbers: Sequence[int] | None = None,
 ) -> list[float]:
-    """Draw robots at (n, 2) m as discs with numbers, 1, 2, 3 by default; return their radii in points."""
-    unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
-    true = radius * float(unit[1, 0] - unit[0, 0])
-    # readable where there is room, in a crowd down to true size
-    drawn: list[float] = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC).tolist()
-    style: Any = {"c": [tone(fill) for fill in fills], "edgecolors": tone(theme.robot_ring)}
-    style |= {"s": [(2 * r) ** 2 for r in drawn], "linewidths": [min(1.1, 0.25 * r) for r in drawn]}
-    axes.scatter(*places.T, zorder=7, clip_on=False, **style)
-    numbers = range(1, len(places) + 1) if numbers is None else numbers
-    style = {"fontweight": "bold", "ha": "center", "va": "center_baseline", "zorder": 8}
-    for robot, (x, y), r, fill in zip(numbers, places.tolist(), drawn, fills, strict=True):
-        size = r * (1.25, 1.1, 0.85, 0.65)[min(len(str(robot)), 4) - 1]
-        if size >= _SMALLEST_NUMBER:
-            axes.text(x, y, str(robot), fontsize=size, color=tone(choose_text_color(fill)), **style)
-    return drawn
+    """Draw robots as discs with numbers.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    positions : (n, 2) array, m
+    radius : (n,) array, m
+        True radii. Discs are larger if there is space, so that their numbers can be read.
+    fills : sequence of Color
+    theme : Theme
+    numbers : sequence of int, optional
+        By default 1, 2, 3, ...
+
+    Returns
+    -------
+    list of float
+        Radii of the discs, points.
+    """
+    ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    points_per_meter = float(ends[1, 0] - ends[0, 0])
+    true_radii = radius * points_per_meter
+    radii: list[float] = fitted_radii(
+        _to_points(axes, positions), true_radii, _MIN_DISC_PT, _DISC_PT
+    ).tolist()
+    axes.scatter(
+        positions[:, 0],
+        positions[:, 1],
+        s=[(2 * disc) ** 2 for disc in radii],
+        c=[tone(fill) for fill in fills],
+        edgecolors=tone(theme.robot_ring),
+        linewidths=[min(1.1, 0.25 * disc) for disc in radii],
+        zorder=7,
+        clip_on=False,
+    )
+    if numbers is None:
+        numbers = range(1, len(positions) + 1)
+    for number, (x, y), disc, fill in zip(numbers, positions.tolist(), radii, fills, strict=True):
+        digits = min(len(str(number)), len(_NUMBER_SIZES))
+        size = disc * _NUMBER_SIZES[digits - 1]
+        if size >= _MIN_NUMBER_PT:
+            axes.text(
+                x,
+                y,
+                str(number),
+                fontsize=size,
+                fontweight="bold",
+                color=tone(choose_text_color(fill)),
+                ha="center",
+                va="center_baseline",
+                zorder=8,
+            )
+    return radii
 
 
-def _in_points(axes: Axes, places: Array) -> Array:
-    """Return where (n, 2) m places are drawn, in points."""
+def _to_points(axes: Axes, positions: Array) -> Array:
+    """Return where (n, 2) positions, m, are drawn, in points of the page."""
     axes.apply_aspect()
-    return np.asarray(axes.transData.transform(places)) * (72 / axes.figure.dpi)
+    return np.asarray(axes.transData.transform(positions)) * (POINTS_PER_INCH / axes.figure.dpi)
 
 
 def has_goals(record: Record) -> bool:
+    """Return whether robots have goals at the end."""
     return bool(np.isfinite(record.goals[-1]).any())
 
 
-def _start_style(theme: Theme, size: float) -> dict[str, Any]:
-    style = {"linestyle": "none", "marker": "o", "markersize": size, "markerfacecolor": "none"}
-    return style | {"markeredgecolor": tone(theme.start), "markeredgewidth": min(1.5, 0.25 * size)}
+def _build_start_style(theme: Theme, size: float) -> dict[str, Any]:
+    """Return the look of starts, with a size in points."""
+    return {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": size,
+        "markerfacecolor": "none",
+        "markeredgecolor": tone(theme.start),
+        "markeredgewidth": min(1.5, 0.25 * size),
+    }
 
 
-def _aim_style(plus: bool, theme: Theme, size: float) -> dict[str, Any]:
-    if plus:
-        style = {"label": CENTROID, "marker": "+", "markersize": size, "markeredgecolor": tone(theme.ink)}
-        return style | {"linestyle": "none", "markeredgewidth": min(1.2, 0.2 * size)}
-    style = {"label": GOAL, "marker": "x", "markersize": 0.8 * size, "markeredgecolor": tone(theme.final)}
-    return style | {"linestyle": "none", "markeredgewidth": min(1.6, 0.2 * size)}
+def _build_goal_style(is_centroid: bool, theme: Theme, size: float) -> dict[str, Any]:
+    """Return the look of goals, with a size in points."""
+    if is_centroid:
+        return {
+            "label": legend.CELL_CENTROID,
+            "linestyle": "none",
+            "marker": "+",
+            "markersize": size,
+            "markeredgecolor": tone(theme.ink),
+            "markeredgewidth": min(1.2, 0.2 * size),
+        }
+    return {
+        "label": legend.GOAL,
+        "linestyle": "none",
+        "marker": "x",
+        "markersize": 0.8 * size,
+        "markeredgecolor": tone(theme.final),
+        "markeredgewidth": min(1.6, 0.2 * size),
+    }
 
 
-def label_of(handle: Artist) -> str:
+def get_label(handle: Artist) -> str:
+    """Return the text of an entry of a legend."""
     return str(handle.get_label())
 
 
-def map_handles(environment: Environment, theme: Theme, *, density: bool = True) -> list[Artist]:
-    handles: list[Artist] = [Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label="known region")]
+def build_map_handles(environment: Environment, theme: Theme, *, has_density: bool = True) -> list[Artist]:
+    """Build the entries of the legend of a map, see `draw_map`."""
+    handles: list[Artist] = [
+        Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label=legend.KNOWN_REGION)
+    ]
     if not environment.blocked.is_empty:
-        handles.append(Patch(label="obstacle (unknown to robots)", **_static_style(theme)))
+        handles.append(Patch(label=legend.UNKNOWN_OBSTACLE, **_build_obstacle_style(theme)))
     if environment.has_moving_obstacles:
-        mark: Any = {"marker": "s", "markersize": 7.0, "markerfacecolor": tone(theme.moving_obstacle)}
-        mark["markeredgecolor"] = tone(theme.obstacle_edge)
-        handles.append(Line2D([], [], label="moving obstacle and its path", **mark, **_path_style(theme)))
-    if density and (words := density_label(environment)):
+        square = Line2D(
+            [],
+            [],
+            label=legend.MOVING_OBSTACLE,
+            marker="s",
+            markersize=7.0,
+            markerfacecolor=tone(theme.moving_obstacle),
+            markeredgecolor=tone(theme.obstacle_edge),
+            **_build_path_style(theme),
+        )
+        handles.append(square)
+    density = density_label(environment) if has_density else ""
+    if density:
         color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
-        handles.append(Patch(facecolor=tone(color), linewidth=0.0, label=words))
+        handles.append(Patch(facecolor=tone(color), linewidth=0.0, label=density))
     return handles
 
 
-def robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
-    style: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
-    return Line2D([], [], label=label, linestyle="none", marker="o", markersize=8.0, **style)
+def build_robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
+    """Build the entry of the legend of robots."""
+    return Line2D(
+        [],
+        [],
+        label=label,
+        linestyle="none",
+        marker="o",
+        markersize=8.0,
+        markerfacecolor=tone(fill),
+        markeredgecolor=tone(theme.robot_ring),
+    )
 
 
-def run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list[Artist]:
-    paper, n = colors == "paper", record.positions.shape[1]
-    failed = record.present[-1] & ~record.working[-1]
-    line = choose_trail_colors(theme, list(range(n)), colors)[0]
-    aims: list[Artist] = []
-    if has_goals(record):
-        plus = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
-        aims = [Line2D([], [], **_aim_style(plus, theme, _AIM))]
-    return [
-        Line2D([], [], label="start", **_start_style(theme, _START)),
-        Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
-        robot_handle("final position", theme.final if paper else theme.robots[0], theme),
-        *([robot_handle("failed robot", theme.failed_robot, theme)] if failed.any() else []),
-        *aims,
-        Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
-        *map_handles(record.environment, theme)[1:],
+def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list[Artist]:
+    """Build the entries of the legend of a run, see `draw_run`."""
+    robots = len(record.team)
+    trail_color = choose_trail_colors(theme, list(range(robots)), colors)[0]
+    final_color = theme.final if colors == "paper" else theme.robots[0]
+    handles: list[Artist] = [
+        Line2D([], [], label=legend.START, **_build_start_style(theme, _START_PT)),
+        Line2D([], [], color=tone(trail_color), linewidth=1.6, label=legend.TRAJECTORY),
+        build_robot_handle(legend.FINAL_POSITION, final_color, theme),
     ]
+    if (record.present[-1] & ~record.working[-1]).any():
+        handles.append(build_robot_handle(legend.FAILED_ROBOT, theme.failed_robot, theme))
+    if has_goals(record):
+        is_centroid = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
+        handles.append(Line2D([], [], **_build_goal_style(is_centroid, theme, _GOAL_PT)))
+    cell_edge = tone(theme.cell_edge)
+    handles.append(Line2D([], [], color=cell_edge, linewidth=0.9, label=legend.FINAL_VORONOI_CELL))
+    return [*handles, *build_map_handles(record.environment, theme)[1:]]

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -10,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
 
-from robocov.arrays import IntArray
+from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov.team import Team
@@ -20,19 +20,47 @@ from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curv
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Box, Page, check_some, tone
 from robocov_app.figures.runs import plot_cost
-from robocov_app.look.legend import merge_legends
+from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
 
-_FINE = 2  # dots of a map's picture for each pixel of the page
-_LEAST = 720, 400  # smallest page for curves and maps
+DOTS_PER_PIXEL = 2
+"""Dots of the image of a map for each pixel of the page."""
+MIN_SIZE_PX = (720, 400)
+"""Smallest page that has space for curves and maps. A smaller one has the curves alone."""
+DEFAULT_WIDTH_PX = 1500
+MAX_HEIGHT_PX = 2600
+MAX_MAP_HEIGHT_PX = 760
+MAX_ASPECT_BESIDE = 1.9
+"""A map that is wider than this is below the curves, not to their right."""
+_DEFAULT_SCALE = 1.3
+_BORDER_WIDTH = 1.4
 _BAR_LABEL = "distance to the nearest robot"
+# Heights at scale 1, px.
+_HEAD = 46
+_CURVES_HEIGHT = 290
+_CAPTION_HEIGHT = 50
+_PANEL_GAP = 16
+_BAR_ROW = 26
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A team at one moment (s), with the distances around it and what stands above the map."""
+    """A team at one moment of a run.
+
+    Attributes
+    ----------
+    environment : Environment
+    team : Team
+    field : Field
+        Distances to the nearest robot.
+    title, facts : str
+        Lines above the map.
+    numbers : tuple of int or None
+        Numbers of the robots; by default 1, 2, 3, ...
+    time : float, s
+    """
 
     environment: Environment
     team: Team
@@ -51,14 +79,75 @@ class Moment:
         counted: IntArray | None = None,
         mean_time: float | None = None,
     ) -> "Moment":
-        """Return the last moment of a run, its mean distance, m, and time, s, of `counted` rows."""
+        """Build the final moment of a run.
+
+        Parameters
+        ----------
+        record : Record
+        field : Field
+            Distances at the end.
+        mean_distance : float, m
+        counted : int array, optional
+            Robots that the cost counts; by default all.
+        mean_time : float, s, optional
+
+        Returns
+        -------
+        Moment
+        """
         cost = cost_label(mean_label(record.environment), mean_distance, mean_time)
-        cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room
+        # Three maps side by side leave little space.
+        cost = cost.replace(", mean time", ", time")
         time = float(record.time[-1])
-        facts = f"{cost} after {time:.1f} s".lstrip()
         rows = np.arange(len(record.team)) if counted is None else counted
-        numbers = tuple((rows + 1).tolist())
-        return cls(record.environment, record.team[rows], field, record.label, facts, numbers, time)
+        return cls(
+            environment=record.environment,
+            team=record.team[rows],
+            field=field,
+            title=record.label,
+            facts=f"{cost} after {time:.1f} s".lstrip(),
+            numbers=tuple((rows + 1).tolist()),
+            time=time,
+        )
+
+
+@dataclass(frozen=True)
+class _Extent:
+    """Bounding box of several maps, m."""
+
+    low_x: float
+    low_y: float
+    high_x: float
+    high_y: float
+
+    @property
+    def aspect(self) -> float:
+        """Width by height."""
+        return (self.high_x - self.low_x) / (self.high_y - self.low_y)
+
+    @property
+    def width(self) -> float:
+        """Width, m."""
+        return self.high_x - self.low_x
+
+
+@dataclass(frozen=True)
+class _Arrangement:
+    """Where the parts of a page are, px.
+
+    Attributes
+    ----------
+    curves, maps : Box
+    bar_row : float
+        Middle of the scale of colors.
+    bar_min_left : float
+        Nothing of the scale of colors is to the left of this.
+    """
+
+    curves: Box
+    maps: Box
+    bar_row: float
+    bar_min_left: float
 
 
 @plain_style()
@@ -70,171 +159,326 @@ def plot_coverage(
     title: str = "Coverage cost",
     times: Sequence[Curve] = (),
 ) -> Figure:
-    """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colors.
+    """Plot cost curves, and maps of the distance to the nearest robot with the same scale of colors.
 
-    `curves` may be empty, `moments` not: that raises ParameterError. `size`: (width, height) of the page;
-    below 720 x 400 it has the curves alone. `times`: mean times, s, where robots are not equally fast.
+    Parameters
+    ----------
+    curves : sequence of Curve
+        Mean distances, m; may be empty.
+    moments : sequence of Moment
+    theme : Theme or str
+    size : (width, height), px, optional
+        Size of the page. If it is smaller than `MIN_SIZE_PX`, the page has the curves alone.
+    title : str
+    times : sequence of Curve
+        Mean times, s, if robots are not equally fast.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ParameterError
+        If there are no moments.
     """
     check_some("moments", moments)
-    if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
+    if curves and size is not None and (size[0] < MIN_SIZE_PX[0] or size[1] < MIN_SIZE_PX[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
     theme = get_theme(theme)
+    extent = _enclose(moments)
+    limit = _choose_limit(moments)
+    handles = _build_handles(moments, theme)
+    is_beside = bool(curves) and len(moments) == 1 and extent.aspect < MAX_ASPECT_BESIDE
+    is_below = bool(curves) and not is_beside
+    page = Page(size or (DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE if size is None else None)
+    maps_fraction = 0.5 if is_beside else 1.0
+    footer_start = (1.0 - maps_fraction) * page.size[0] + page.margin
+    footer_height = page.footer_height(handles, footer_start)
+    maps_width = maps_fraction * page.size[0] - 2 * page.margin
+    if size is None:
+        height = _choose_height(page, extent, len(moments), maps_width, footer_height, is_below=is_below)
+        page = Page((page.size[0], height), theme, _DEFAULT_SCALE)
+    if is_below:
+        arrangement = _arrange_below(page, maps_width, footer_height, has_fixed_size=size is not None)
+    else:
+        arrangement = _arrange_beside(page, maps_fraction, footer_height, has_curves=bool(curves))
+    bar_left = _draw_bar(page, limit, arrangement.maps, arrangement.bar_row, arrangement.bar_min_left)
+    title_end = page.size[0] if is_below else bar_left
+    page.title(title, 26, title_end - 2 * page.margin)
+    if curves:
+        has_density = any(density_label(moment.environment) for moment in moments)
+        _draw_curves(page, curves, times, arrangement.curves, WEIGHED if has_density else DISTANCE)
+    boxes = _draw_maps(page, moments, extent, limit, arrangement.maps)
+    page.footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
+    return page.figure
+
+
+def _enclose(moments: Sequence[Moment]) -> _Extent:
+    """Return the bounding box of all maps."""
     bounds = np.array([moment.environment.region.bounds for moment in moments])
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
     high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
-    aspect = (high_x - low_x) / (high_y - low_y)
-    limit, maps = _limit(moments), len(moments)
-    handles = _handles(moments, theme)
-    page = Page(size or (1500, 1000), theme, 1.3 if size is None else None)
-    s, margin = page.scale, page.margin
-    beside = bool(curves) and maps == 1 and aspect < 1.9
-    below = bool(curves) and not beside
-    part = 0.5 if beside else 1.0
-    footer = page.footer_height(handles, (1.0 - part) * page.size[0] + margin)
-    room, head, highest = part * page.size[0] - 2 * margin, 46 * s, 290 * s
-    if size is None:
-        columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / aspect)))) if maps > 3 else maps
-        slot = (room - (columns - 1) * 16 * s) / columns
-        tall = -(-maps // columns) * (min(slot / aspect, 760) + 66 * s) - 16 * s
-        above = 2 * head + highest if below else head
-        least = 480 * s if maps == 1 and aspect < 1.9 else 320
-        page = Page((page.size[0], int(np.clip(above + tall + footer, least, 2600))), theme, 1.3)
+    return _Extent(low_x, low_y, high_x, high_y)
+
+
+def _choose_height(
+    page: Page, extent: _Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
+) -> int:
+    """Return the height of a page of the default width, px."""
+    scale = page.scale
+    columns = maps
+    if maps > 3:
+        columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / extent.aspect))))
+    slot_width = (maps_width - (columns - 1) * _PANEL_GAP * scale) / columns
+    slot_height = min(slot_width / extent.aspect, MAX_MAP_HEIGHT_PX) + (_CAPTION_HEIGHT + _PANEL_GAP) * scale
+    rows = -(-maps // columns)
+    maps_height = rows * slot_height - _PANEL_GAP * scale
+    head_height = (2 * _HEAD + _CURVES_HEIGHT) * scale if is_below else _HEAD * scale
+    min_height = 480 * scale if maps == 1 and extent.aspect < MAX_ASPECT_BESIDE else 320
+    return int(np.clip(head_height + maps_height + footer_height, min_height, MAX_HEIGHT_PX))
+
+
+def _arrange_below(
+    page: Page, maps_width: float, footer_height: float, *, has_fixed_size: bool
+) -> _Arrangement:
+    """Arrange maps below curves, which are as wide as the page."""
     width, height = page.size
-    curves_room: Box = (margin, head, 0.5 * width - margin, height - head)
-    maps_room: Box = ((1.0 - part) * width + margin, head, room, height - head - footer)
-    bar_y = 26 * s  # of the scale of colors
-    if below:
-        high = highest if size is None else min(highest, 0.4 * (height - head - footer))
-        end = head + high
-        curves_room = margin, head, width - 2 * margin, high
-        maps_room, bar_y = (margin, end + head, room, height - footer - end - head), end + 24 * s
-    bar_left = _draw_bar(page, limit, maps_room, bar_y, maps_room[0] if below or not curves else 0.5 * width)
-    page.title(title, 26, (width if below else bar_left) - 2 * margin)
-    if curves:
-        weighed = any(density_label(moment.environment) for moment in moments)
-        _draw_both(page, curves, times, curves_room, WEIGHED if weighed else DISTANCE)
-    panels = _panels(maps_room, maps, aspect, 50 * s, 16 * s)
-    for moment, (box, slot) in zip(moments, panels, strict=True):
-        _draw_moment(page.map_axes(box, low_x, low_y, high_x, high_y), moment, limit, theme, box, s)
-        page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
-        page.text(moment.facts, box[0], box[1] - 14 * s, color=theme.faint, room=slot)
-    boxes = [box for box, _ in panels]
-    page.footer(handles, boxes, boxes[0][2] / (high_x - low_x), maps_room[0])
-    return page.figure
+    scale = page.scale
+    head = _HEAD * scale
+    curves_height = _CURVES_HEIGHT * scale
+    if has_fixed_size:
+        curves_height = min(curves_height, 0.4 * (height - head - footer_height))
+    curves_end = head + curves_height
+    return _Arrangement(
+        curves=(page.margin, head, width - 2 * page.margin, curves_height),
+        maps=(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
+        bar_row=curves_end + 24 * scale,
+        bar_min_left=page.margin,
+    )
+
+
+def _arrange_beside(
+    page: Page, maps_fraction: float, footer_height: float, *, has_curves: bool
+) -> _Arrangement:
+    """Arrange a map to the right of the curves, or maps alone."""
+    width, height = page.size
+    scale = page.scale
+    head = _HEAD * scale
+    maps_left = (1.0 - maps_fraction) * width + page.margin
+    maps_width = maps_fraction * width - 2 * page.margin
+    return _Arrangement(
+        curves=(page.margin, head, 0.5 * width - page.margin, height - head),
+        maps=(maps_left, head, maps_width, height - head - footer_height),
+        bar_row=_BAR_ROW * scale,
+        bar_min_left=0.5 * width if has_curves else maps_left,
+    )
 
 
 @plain_style()
 def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
-    """Plot distances on axes of somebody else, which get ticks in meters and a scale of colors."""
+    """Plot distances on axes of a notebook, which get ticks in meters and a scale of colors.
+
+    Parameters
+    ----------
+    moment : Moment
+    axes : matplotlib.axes.Axes
+    theme : Theme or str
+    """
     theme = get_theme(theme)
-    limit = _limit([moment])
-    arena.ticks_in_meters(axes, moment.environment, theme)
+    limit = _choose_limit([moment])
+    arena.set_meter_axes(axes, moment.environment, theme)
     axes.apply_aspect()
-    extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
-    # small axes may be saved large
-    fine = max(_LEAST[0] / extent.width, 1.0)
-    box = (0.0, 0.0, fine * extent.width, fine * extent.height)
-    _draw_moment(axes, moment, limit, theme, box, fine * scale)
+    extent = axes.get_window_extent()
+    scale = axes.figure.dpi / 100
+    # Small axes may be saved large.
+    enlargement = max(MIN_SIZE_PX[0] / extent.width, 1.0)
+    box = (0.0, 0.0, enlargement * extent.width, enlargement * extent.height)
+    _draw_moment(axes, moment, limit, theme, box, enlargement * scale)
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
-    bar.imshow(
-        theme.build_heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit)
-    )
+    heat = theme.build_heat_table(256)[:, None]
+    bar.imshow(heat, origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit))
     bar.set(xticks=[], yticks=ticks(limit), ylabel=f"{_BAR_LABEL} (m)")
     bar.yaxis.tick_right()
     bar.yaxis.set_label_position("right")
 
 
-def _limit(moments: Sequence[Moment]) -> float:
-    largest = [moment.field.largest for moment in moments if np.isfinite(moment.field.largest)]
-    return round_limit(max(largest, default=1.0))
+def _choose_limit(moments: Sequence[Moment]) -> float:
+    """Return the end of the scale of colors, m."""
+    finite = [moment.field.largest for moment in moments if np.isfinite(moment.field.largest)]
+    return round_limit(max(finite, default=1.0))
 
 
-def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
-    line = Line2D([], [], color=tone(theme.geodesic_border), linewidth=1.6, label="geodesic cell border")
-    handles: list[Artist] = [arena.robot_handle("robot", theme.final, theme), line]
-    every = [arena.map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
-    for handle in merge_legends(every, arena.label_of):
-        handle.set_label(arena.label_of(handle).removesuffix(" (unknown to robots)"))
+def _build_handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
+    """Build the entries of the legend."""
+    border = Line2D([], [], color=tone(theme.geodesic_border), linewidth=1.6, label=legend.GEODESIC_BORDER)
+    handles: list[Artist] = [arena.build_robot_handle(legend.ROBOT, theme.final, theme), border]
+    legends = [
+        arena.build_map_handles(moment.environment, theme, has_density=False)[1:] for moment in moments
+    ]
+    for handle in legend.merge_legends(legends, arena.get_label):
+        if arena.get_label(handle) == legend.UNKNOWN_OBSTACLE:
+            handle.set_label(legend.OBSTACLE)
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
-        color, edge = tone(theme.unreached), tone(theme.obstacle_edge)
-        closed: Any = {"hatch": "////", "linewidth": 0.0, "label": "no robot can come"}
-        handles.append(Patch(facecolor=color, edgecolor=edge, **closed))
+        unreached = Patch(
+            facecolor=tone(theme.unreached),
+            edgecolor=tone(theme.obstacle_edge),
+            hatch="////",
+            linewidth=0.0,
+            label=legend.UNREACHED,
+        )
+        handles.append(unreached)
     return handles
 
 
-def _draw_both(page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str) -> None:
-    """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
-    s, (left, top, width, height) = page.scale, room
-    drawn = [(curves, label, "m"), *[(times, TIME, "s")] * bool(times)]
-    for k, (some, words, unit) in enumerate(drawn):
-        x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
-        if times and width > 2.4 * height:
-            x, y, wide, high = left + k * width / 2, top, width / 2, height
-        longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in some)
-        right = min(26 * s + longest, 0.45 * wide)
-        axes = page.axes((x + 34 * s, y + 34 * s, wide - 34 * s - right, high - 34 * s - 50 * s))
-        draw_curves(axes, some, page.theme, label=words, unit=unit)
+def _draw_curves(
+    page: Page, curves: Sequence[Curve], times: Sequence[Curve], box: Box, distance_label: str
+) -> None:
+    """Draw the mean distances, and mean times if there are any: below, or to the right in a wide box."""
+    left, top, width, height = box
+    if not times:
+        _draw_curve_panel(page, curves, box, distance_label, "m")
+    elif width > 2.4 * height:
+        _draw_curve_panel(page, curves, (left, top, width / 2, height), distance_label, "m")
+        _draw_curve_panel(page, times, (left + width / 2, top, width / 2, height), TIME, "s")
+    else:
+        _draw_curve_panel(page, curves, (left, top, width, height / 2), distance_label, "m")
+        _draw_curve_panel(page, times, (left, top + height / 2, width, height / 2), TIME, "s")
 
 
-def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> list[tuple[Box, float]]:
-    """Return the largest equal boxes in a room, with captions above them, and how wide these may be."""
+def _draw_curve_panel(page: Page, curves: Sequence[Curve], box: Box, label: str, unit: str) -> None:
+    """Draw curves in a box with space for their labels."""
+    scale = page.scale
+    left, top, width, height = box
+    label_width = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    right = min(26 * scale + label_width, 0.45 * width)
+    axes_box = (
+        left + 34 * scale,
+        top + 34 * scale,
+        width - 34 * scale - right,
+        height - 34 * scale - 50 * scale,
+    )
+    draw_curves(page.axes(axes_box), curves, page.theme, label=label, unit=unit)
+
+
+def _draw_maps(page: Page, moments: Sequence[Moment], extent: _Extent, limit: float, room: Box) -> list[Box]:
+    """Draw the map of each moment below its title, and return their boxes, px."""
+    scale = page.scale
+    panels = _arrange_panels(room, len(moments), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
+    for moment, (box, caption_width) in zip(moments, panels, strict=True):
+        axes = page.map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
+        _draw_moment(axes, moment, limit, page.theme, box, scale)
+        left, top, _, _ = box
+        title_row = top - 35 * scale
+        facts_row = top - 14 * scale
+        page.text(moment.title, left, title_row, points=TEXT + 1.5, bold=True, room=caption_width)
+        page.text(moment.facts, left, facts_row, color=page.theme.faint, room=caption_width)
+    return [box for box, _ in panels]
+
+
+def _arrange_panels(
+    room: Box, count: int, aspect: float, caption_height: float, gap: float
+) -> list[tuple[Box, float]]:
+    """Return the largest equal boxes in a room, with the width of the captions above them, px."""
     left, top, width, height = room
-    best: tuple[float, int] = (0.0, 1)
-    for columns in range(1, count + 1):
-        rows = -(-count // columns)
-        wide = (width - (columns - 1) * gap) / columns
-        high = (height - (rows - 1) * gap) / rows - above
-        best = max(best, (min(wide, max(high, 1.0) * aspect), columns))
-    wide, columns = best
-    slot, high = (width - (columns - 1) * gap) / columns, wide / aspect
-    aside = 0.0 if count > 1 else (slot - wide) / 2
-    boxes = []
-    for row, column in (divmod(number, columns) for number in range(count)):
-        x, y = left + column * (slot + gap) + aside, top + row * (high + above + gap) + above
-        boxes.append(((x, y, wide, high), slot - aside))
-    return boxes
+    panel_width = 0.0
+    columns = 1
+    for candidate in range(1, count + 1):
+        rows = -(-count // candidate)
+        max_width = (width - (candidate - 1) * gap) / candidate
+        max_height = (height - (rows - 1) * gap) / rows - caption_height
+        candidate_width = min(max_width, max(max_height, 1.0) * aspect)
+        if candidate_width >= panel_width:
+            panel_width = candidate_width
+            columns = candidate
+    slot = (width - (columns - 1) * gap) / columns
+    panel_height = panel_width / aspect
+    indent = 0.0 if count > 1 else (slot - panel_width) / 2
+    panels = []
+    for number in range(count):
+        row, column = divmod(number, columns)
+        x = left + column * (slot + gap) + indent
+        y = top + row * (panel_height + caption_height + gap) + caption_height
+        panels.append(((x, y, panel_width, panel_height), slot - indent))
+    return panels
 
 
 def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
-    (low_x, high_x), (low_y, high_y) = axes.get_xlim(), axes.get_ylim()
-    zoom = _FINE * box[2] / (high_x - low_x)
-    columns, rows = max(round(_FINE * box[2]), 2), max(round(_FINE * box[3]), 2)
+    """Draw distances, the borders of geodesic cells, the map and the robots in axes of a box, px."""
+    low_x, high_x = axes.get_xlim()
+    low_y, high_y = axes.get_ylim()
+    columns = max(round(DOTS_PER_PIXEL * box[2]), 2)
+    rows = max(round(DOTS_PER_PIXEL * box[3]), 2)
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
-    picture = palette(theme)[levels(moment.field, x, y, limit, _FINE * 9)]
-    width = _FINE * 1.4 * scale
-    borders = moment.field.borders(x, y, width / zoom)
-    part = strength(borders, zoom, width)[:, None]
-    place = borders.row, borders.column
-    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(theme.geodesic_border))
-    extent = low_x, high_x, low_y, high_y
-    image = axes.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased", zorder=0)
+    zoom = DOTS_PER_PIXEL * box[2] / (high_x - low_x)
+    pixels = _paint_distances(moment.field, x, y, limit, theme, zoom, scale)
+    image = axes.imshow(
+        pixels,
+        extent=(low_x, high_x, low_y, high_y),
+        aspect="auto",
+        interpolation="antialiased",
+        zorder=0,
+    )
     image.set_clip_path(Polygon(moment.environment.region.vertices, transform=axes.transData))
-    arena.draw_map(axes, moment.environment, theme, density=False, time=moment.time)
-    places = moment.field.result.positions
-    arena.draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
+    arena.draw_map(axes, moment.environment, theme, has_density=False, time=moment.time)
+    positions = moment.field.result.positions
+    fills = [theme.final] * len(positions)
+    arena.draw_robots(axes, positions, moment.team.radius, fills, theme, moment.numbers)
 
 
-def _draw_bar(page: Page, limit: float, maps: Box, middle: float, least: float) -> float:
-    """Draw the scale of colors above the right edge of the maps; return where it, or its words, begin.
+def _paint_distances(
+    field: Field, x: Array, y: Array, limit: float, theme: Theme, zoom: float, scale: float
+) -> NDArray[np.uint8]:
+    """Return the colors of distances and of borders at (w,) x and (h,) y, m, as (h, w, 3)."""
+    pixels = palette(theme)[levels(field, x, y, limit, DOTS_PER_PIXEL * 9)]
+    width = DOTS_PER_PIXEL * _BORDER_WIDTH * scale
+    borders = field.borders(x, y, width / zoom)
+    opacity = strength(borders, zoom, width)[:, None]
+    border_pixels = (borders.row, borders.column)
+    border_color = np.array(theme.geodesic_border)
+    pixels[border_pixels] = np.rint((1.0 - opacity) * pixels[border_pixels] + opacity * border_color)
+    return pixels
 
-    Words that would reach to the left of `least` px are left out.
+
+def _draw_bar(page: Page, limit: float, maps: Box, middle: float, min_left: float) -> float:
+    """Draw the scale of colors above the right edge of the maps.
+
+    Parameters
+    ----------
+    page : Page
+    limit : float, m
+        End of the scale.
+    maps : Box
+    middle : float, px
+        Its row.
+    min_left : float, px
+        The label is left out if it would be to the left of this.
+
+    Returns
+    -------
+    float
+        Where the scale, or its label, starts, px.
     """
-    theme, s = page.theme, page.scale
-    right, width = maps[0] + maps[2] - 14 * s, 190 * s
-    axes = page.axes((right - width, middle - 9 * s, width, 10 * s))
+    theme = page.theme
+    scale = page.scale
+    right = maps[0] + maps[2] - 14 * scale
+    width = 190 * scale
+    axes = page.axes((right - width, middle - 9 * scale, width, 10 * scale))
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
-    for side in axes.spines.values():
-        side.set(edgecolor=tone(theme.faint), linewidth=0.6)
+    for spine in axes.spines.values():
+        spine.set(edgecolor=tone(theme.faint), linewidth=0.6)
     marks = ticks(limit)
-    axes.set_xticks(marks, [*(f"{mark:g}" for mark in marks[:-1]), f"{marks[-1]:g} m"], fontsize=SMALL)
+    labels = [f"{mark:g}" for mark in marks]
+    labels[-1] += " m"
+    axes.set_xticks(marks, labels, fontsize=SMALL)
     axes.set_yticks([])
     axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), length=2.5, pad=1.5)
-    left = right - width - 12 * s
-    wide = page.text_width(_BAR_LABEL)
-    if left - wide > least:
-        page.text(_BAR_LABEL, left, middle - 4 * s, align="right")
-        left -= wide
-    return left
+    left = right - width - 12 * scale
+    label_width = page.text_width(_BAR_LABEL)
+    if left - label_width <= min_left:
+        return left
+    page.text(_BAR_LABEL, left, middle - 4 * scale, align="right")
+    return left - label_width

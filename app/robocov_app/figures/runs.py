@@ -1,8 +1,7 @@
-"""Publication plots of maps and runs: trajectories, cost curves, comparisons, metrics; never pyplot's."""
+"""Figures of maps and runs: trajectories, cost curves, comparisons and metrics, without pyplot."""
 
 from collections.abc import Callable, Sequence
-from itertools import compress
-from operator import not_
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,19 +14,31 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
-from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_meters
+from robocov_app.figures import arena
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, TEXT, TITLE, Page, check_some, figure_of
+from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, check_some, figure_of
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.layout import columns_for
 
-_SCALE = 1.3  # of texts and lines on a page of the usual width: its legend stands beside the scale bar
-MOST_MAPS = 60  # maps on a sheet: more would be too small to be seen
-_WIDTH, _HIGHEST = 1600, 1600  # pixels of a sheet, across and at most down
+MAX_MAPS = 60
+"""Maximum number of maps on a sheet. More would be too small to be seen."""
+_MAP_SCALE = 1.3
+"""Scale of texts and lines on a page of the usual width: its legend is next to the scale bar."""
+_SHEET_WIDTH_PX = 1600
+_MAX_SHEET_HEIGHT_PX = 1600
+_SHEET_SCALE = 1.5
+_MAX_COMPARISON_HEIGHT_PX = 1800
+_MIN_HEIGHT_PX = 320
+_PANEL_GAP = 14
+"""Space below each panel at scale 1."""
+# Space above the panels of a comparison at scale 1, px.
+_ONE_LINE_CAPTION = 30
+_TWO_LINE_CAPTION = 54
+_CAPTION_GAP = 16
 
 
 @plain_style()
@@ -37,14 +48,29 @@ def plot_environment(
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
 ) -> Figure:
-    """Plot a map on `axes`, or on a page of `size` px: free space, obstacles, the region that robots know."""
+    """Plot a map: the free space, obstacles, and the region that robots know.
+
+    Parameters
+    ----------
+    environment : Environment
+    axes : matplotlib.axes.Axes, optional
+        By default, a page of its own.
+    theme : Theme or str
+    size : (width, height), px, optional
+        Size of the page.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     theme = get_theme(theme)
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
-        axes = _map_page(environment, theme, size, environment.name, facts, map_handles(environment, theme))
+        handles = arena.build_map_handles(environment, theme)
+        axes = _create_map_page(environment, theme, size, environment.name, facts, handles)
     else:
-        ticks_in_meters(axes, environment, theme)
-    draw_map(axes, environment, theme)
+        arena.set_meter_axes(axes, environment, theme)
+    arena.draw_map(axes, environment, theme)
     return figure_of(axes)
 
 
@@ -58,22 +84,74 @@ def plot_trajectories(
     mean_distance: float | None = None,
     mean_time: float | None = None,
 ) -> Figure:
-    """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
+    """Plot a whole run: map, starts, trajectories, final positions and final Voronoi cells.
 
-    `axes`: None makes a page of `size` px. `colors`: those of the paper, or a hue for each robot.
-    `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
+    Parameters
+    ----------
+    record : Record
+    axes : matplotlib.axes.Axes, optional
+        By default, a page of its own.
+    theme : Theme or str
+    colors : {"paper", "robots"}
+        Colors of the paper, or a hue for each robot.
+    size : (width, height), px, optional
+        Size of the page.
+    mean_distance, mean_time : float, optional
+        Of the final positions, m and s, for the title.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
     """
     if colors not in ("paper", "robots"):
         raise ParameterError(f"colors: expected 'paper' or 'robots', got {quote(colors)}")
     theme = get_theme(theme)
     if axes is None:
-        facts = _line(*_facts(record, mean_distance, mean_time))
-        title, handles = _line(record.label, record.environment.name), run_handles(record, theme, colors)
-        axes = _map_page(record.environment, theme, size, title, facts, handles)
+        title = _join_facts([record.label, record.environment.name])
+        facts = _join_facts(
+            [_format_cost(record, mean_distance, mean_time), _format_time(record), _format_robots(record)]
+        )
+        handles = arena.build_run_handles(record, theme, colors)
+        axes = _create_map_page(record.environment, theme, size, title, facts, handles)
     else:
-        ticks_in_meters(axes, record.environment, theme)
-    draw_run(axes, record, theme, colors)
+        arena.set_meter_axes(axes, record.environment, theme)
+    arena.draw_run(axes, record, theme, colors)
     return figure_of(axes)
+
+
+@dataclass(frozen=True)
+class _Captions:
+    """Lines above the panels of a comparison.
+
+    Attributes
+    ----------
+    shared : str
+        What all runs have in common, for the title of the page.
+    names, facts : list of str
+        Name of each run, and what is true of it alone.
+    name_widths, facts_widths : list of float, px
+        Widths of these.
+    gap : float, px
+        Minimum space between a name and the facts in one line.
+    """
+
+    shared: str
+    names: list[str]
+    facts: list[str]
+    name_widths: list[float]
+    facts_widths: list[float]
+    gap: float
+
+    @property
+    def max_width(self) -> float:
+        """Width of the longest line if names and facts are below each other, px."""
+        return max(*self.name_widths, *self.facts_widths)
+
+    @property
+    def max_joined_width(self) -> float:
+        """Width of the longest line if a name and its facts are in one, px."""
+        widths = zip(self.name_widths, self.facts_widths, strict=True)
+        return max(name_width + facts_width + self.gap for name_width, facts_width in widths)
 
 
 @plain_style()
@@ -85,50 +163,115 @@ def plot_comparison(
     mean_distances: Sequence[float | None] | None = None,
     mean_times: Sequence[float | None] | None = None,
 ) -> Figure:
-    """Plot runs side by side at one scale, with final mean distances, m, and times, s, in the titles."""
-    costs, times = (known or [None] * len(records) for known in (mean_distances, mean_times))
+    """Plot runs side by side at the same scale.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    theme : Theme or str
+    colors : {"paper", "robots"}
+    size : (width, height), px, optional
+    mean_distances, mean_times : sequence of float or None, optional
+        Of the final positions, m and s, for the titles.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     theme = get_theme(theme)
     bounds = np.array([record.environment.region.bounds for record in records])
-    limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
-    aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
-    shared, captions = _captions(records, costs, times)
-    entries = merge_legends((run_handles(record, theme, colors) for record in records), label_of)
-    scale = 1.5 if size is None else None
-    page = Page(size or (1600, 1000), theme, scale)
-    s = page.scale
-    above, top = 54 * s, 50 * s if shared else 8 * s
-    words = [
-        (page.text_width(record.label, points=TITLE, bold=True), page.text_width(text))
-        for record, text in zip(records, captions, strict=True)
-    ]
-    columns = columns_for(len(records), aspect, (page.size[0], page.size[1] - 2 * top), above)
-    fitting = (page.size[0] - page.margin) / (max(max(both) for both in words) + page.margin)
-    columns = max(min(columns, int(fitting)), 1)
+    low_x, low_y = bounds[:, :2].min(axis=0).tolist()
+    high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
+    aspect = (high_x - low_x) / (high_y - low_y)
+    legends = [arena.build_run_handles(record, theme, colors) for record in records]
+    handles = merge_legends(legends, arena.get_label)
+    page = Page(size or (_SHEET_WIDTH_PX, 1000), theme, _SHEET_SCALE if size is None else None)
+    scale = page.scale
+    captions = _build_captions(page, records, mean_distances, mean_times)
+    top = (50 if captions.shared else 8) * scale
+    columns = _choose_columns(page, captions, aspect, top)
     slot = (page.size[0] - page.margin) / columns - page.margin
-    one_line = all(name + text + 16 * s <= slot for name, text in words)
-    above = (30 if one_line else 54) * s
+    is_one_line = captions.max_joined_width <= slot
+    above = (_ONE_LINE_CAPTION if is_one_line else _TWO_LINE_CAPTION) * scale
     if size is None:
         rows = -(-len(records) // columns)
-        tall = top + rows * (above + slot / aspect + 14 * s) + page.footer_height(entries)
-        page = Page((page.size[0], int(np.clip(tall, 320, 1800))), theme, scale)
-    wide = max((name + text + 16 * s if one_line else max(name, text)) for name, text in words)
-    panels = page.panels(len(records), columns, aspect, wide, above, top, page.footer_height(entries))
-    first, room = panels[0]
-    for record, text, (box, _) in zip(records, captions, panels, strict=True):
-        draw_run(page.map_axes(box, *limits), record, theme, colors)
-        left, edge, up = box[0], box[1], 16 * s
-        if one_line:
-            page.text(record.label, left, edge - up, points=TITLE, bold=True)
-            right = left + max(box[2], min(room, wide))
-            page.text(text, right, edge - up, color=theme.faint, align="right")
+        panels_height = rows * (above + slot / aspect + _PANEL_GAP * scale)
+        height = top + panels_height + page.footer_height(handles)
+        height = np.clip(height, _MIN_HEIGHT_PX, _MAX_COMPARISON_HEIGHT_PX)
+        page = Page((page.size[0], int(height)), theme, _SHEET_SCALE)
+    caption_width = captions.max_joined_width if is_one_line else captions.max_width
+    footer_height = page.footer_height(handles)
+    panels = page.panels(len(records), columns, aspect, caption_width, above, top, footer_height)
+    for number, (box, room) in enumerate(panels):
+        axes = page.map_axes(box, low_x, low_y, high_x, high_y)
+        arena.draw_run(axes, records[number], theme, colors)
+        if is_one_line:
+            right = box[0] + max(box[2], min(room, caption_width))
+            _write_one_line(page, captions, number, box, right)
         else:
-            page.text(record.label, left, edge - 38 * s, points=TITLE, bold=True, room=room)
-            page.text(text, left, edge - up, color=theme.faint, room=room)
-    if shared:
-        page.text(shared, first[0], first[1] - above - 20 * s, points=HEADING, bold=True, room=page.room)
-    taken = [(x, y, max(width, room if one_line else 0.0), height) for (x, y, width, height), _ in panels]
-    page.footer(entries, taken, first[2] / (limits[2] - limits[0]))
+            _write_two_lines(page, captions, number, box, room)
+    first_box, room = panels[0]
+    if captions.shared:
+        row = first_box[1] - above - 20 * scale
+        page.text(captions.shared, first_box[0], row, points=HEADING, bold=True, room=page.room)
+    min_width = room if is_one_line else 0.0
+    footer_boxes = [(x, y, max(width, min_width), height) for (x, y, width, height), _ in panels]
+    page.footer(handles, footer_boxes, first_box[2] / (high_x - low_x))
     return page.figure
+
+
+def _build_captions(
+    page: Page,
+    records: Sequence[Record],
+    mean_distances: Sequence[float | None] | None,
+    mean_times: Sequence[float | None] | None,
+) -> _Captions:
+    """Build the lines above the panels: what all runs have in common is not repeated."""
+    unknown = [None] * len(records)
+    costs = [
+        _format_cost(record, distance, time)
+        for record, distance, time in zip(
+            records, mean_distances or unknown, mean_times or unknown, strict=True
+        )
+    ]
+    facts = [(record.environment.name, _format_robots(record), _format_time(record)) for record in records]
+    is_shared = [len(set(column)) == 1 for column in zip(*facts, strict=True)]
+    shared = [fact for fact, is_same in zip(facts[0], is_shared, strict=True) if is_same]
+    own_facts = []
+    for cost, row in zip(costs, facts, strict=True):
+        different = [fact for fact, is_same in zip(row, is_shared, strict=True) if not is_same]
+        own_facts.append(_join_facts([cost, *different]))
+    return _Captions(
+        shared=_join_facts(shared),
+        names=[record.label for record in records],
+        facts=own_facts,
+        name_widths=[page.text_width(record.label, points=TITLE, bold=True) for record in records],
+        facts_widths=[page.text_width(text) for text in own_facts],
+        gap=_CAPTION_GAP * page.scale,
+    )
+
+
+def _choose_columns(page: Page, captions: _Captions, aspect: float, top: float) -> int:
+    """Return how many panels are side by side: as large as possible, with space for their captions."""
+    space = (page.size[0], page.size[1] - 2 * top)
+    best = columns_for(len(captions.names), aspect, space, _TWO_LINE_CAPTION * page.scale)
+    fitting = (page.size[0] - page.margin) / (captions.max_width + page.margin)
+    return max(min(best, int(fitting)), 1)
+
+
+def _write_one_line(page: Page, captions: _Captions, number: int, box: Box, right: float) -> None:
+    """Write the name of a run at the left above its panel, and its facts at the right."""
+    row = box[1] - 16 * page.scale
+    page.text(captions.names[number], box[0], row, points=TITLE, bold=True)
+    page.text(captions.facts[number], right, row, color=page.theme.faint, align="right")
+
+
+def _write_two_lines(page: Page, captions: _Captions, number: int, box: Box, room: float) -> None:
+    """Write the name of a run above its panel, and its facts below the name."""
+    name_row = box[1] - 38 * page.scale
+    facts_row = box[1] - 16 * page.scale
+    page.text(captions.names[number], box[0], name_row, points=TITLE, bold=True, room=room)
+    page.text(captions.facts[number], box[0], facts_row, color=page.theme.faint, room=room)
 
 
 @plain_style()
@@ -139,33 +282,63 @@ def plot_cost(
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost over time",
 ) -> Figure:
-    """Plot mean distance against time, each curve named with its final value at its end.
+    """Plot mean distances against time, each curve named with its final value at its end.
 
-    `axes`: None makes a page of `size` px with a `title`. Raises ParameterError when there are no
-    curves, or one has no finite value.
+    Parameters
+    ----------
+    curves : sequence of Curve
+    axes : matplotlib.axes.Axes, optional
+        By default, a page of its own.
+    theme : Theme or str
+    size : (width, height), px, optional
+        Size of the page.
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ParameterError
+        If there are no curves, or one has no finite value.
     """
     check_some("curves", curves)
-    for label, _, time, values in curves:
-        if len(time) != len(values) or not np.isfinite(values).any():
-            raise ParameterError(
-                f"curve {quote(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
-                f"expected a value for each time and a finite one"
-            )
+    for curve in curves:
+        _check_curve(curve)
     theme = get_theme(theme)
     if axes is None:
-        wide, high = size or (1000, 560)
-        # few things are on it: they may be large
-        page = Page((wide, high), theme, float(np.clip(min(wide / 800, high / 450), 0.8, 6.0)))
-        s = page.scale
-        longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
-        right = min(40 * s + longest, 0.45 * wide)
-        page.text(title, 52 * s, 30 * s, points=TITLE, bold=True, room=wide - 52 * s - page.margin)
-        axes = page.axes((52 * s, 86 * s, wide - 52 * s - right, high - 86 * s - 56 * s))
+        axes = _create_cost_page(curves, theme, size or (1000, 560), title)
     draw_curves(axes, curves, theme)
     return figure_of(axes)
 
 
-def _map_page(
+def _check_curve(curve: Curve) -> None:
+    """Check that a curve has a value for each time and a finite one."""
+    label, _, times, values = curve
+    if len(times) != len(values) or not np.isfinite(values).any():
+        finite = int(np.isfinite(values).sum())
+        raise ParameterError(
+            f"curve {quote(label)}: {len(times)} times, {finite} finite values, "
+            f"expected a value for each time and a finite one"
+        )
+
+
+def _create_cost_page(curves: Sequence[Curve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
+    """Create a page for curves alone, whose texts can be large."""
+    width, height = size
+    page = Page(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
+    scale = page.scale
+    left = 52 * scale
+    top = 86 * scale
+    label_width = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+    right = min(40 * scale + label_width, 0.45 * width)
+    page.text(title, left, 30 * scale, points=TITLE, bold=True, room=width - left - page.margin)
+    return page.axes((left, top, width - left - right, height - top - 56 * scale))
+
+
+def _create_map_page(
     environment: Environment,
     theme: Theme,
     size: tuple[int, int] | None,
@@ -173,116 +346,202 @@ def _map_page(
     facts: str,
     handles: Sequence[Artist],
 ) -> Axes:
+    """Create a page with one map, a title and facts above it, and the legend below."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
-    page = Page(size or (1400, 1000), theme, None if size else _SCALE)
+    page = Page(size or (1400, 1000), theme, None if size else _MAP_SCALE)
     if size is None:
-        around = 58 * page.scale + page.footer_height(handles)
-        wide = float(np.clip((1300 - around) * aspect + 2 * page.margin, 840, 1400))
-        high = float(np.clip((wide - 2 * page.margin) / aspect + around, 300, 1300))
-        page = Page((int(wide), int(high)), theme, _SCALE)
+        surroundings = 58 * page.scale + page.footer_height(handles)
+        page_width = float(np.clip((1300 - surroundings) * aspect + 2 * page.margin, 840, 1400))
+        page_height = float(np.clip((page_width - 2 * page.margin) / aspect + surroundings, 300, 1300))
+        page = Page((int(page_width), int(page_height)), theme, _MAP_SCALE)
     above = 58 * page.scale
-    room_y = page.size[1] - above - page.footer_height(handles)
-    width = min(page.room, room_y * aspect)
+    free_height = page.size[1] - above - page.footer_height(handles)
+    width = min(page.room, free_height * aspect)
     height = width / aspect
-    box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
-    lines = (title, 38, TITLE, True, theme.ink), (facts, 16, TEXT, False, theme.faint)
-    for text, up, points, bold, color in lines:
-        # above a narrow map lines may be wider than it
-        wide = min(page.text_width(text, points=points, bold=bold), page.room)
-        start = box[0] if wide <= width else max(box[0] + (width - wide) / 2, page.margin)
-        y = box[1] - up * page.scale
-        page.text(text, start, y, points=points, bold=bold, color=color, room=page.room)
+    box = ((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
+    _write_above_map(page, title, box, up=38, points=TITLE, is_title=True)
+    _write_above_map(page, facts, box, up=16, points=TEXT, is_title=False)
     page.footer(handles, [box], width / (high_x - low_x))
     return page.map_axes(box, low_x, low_y, high_x, high_y)
 
 
-def _captions(
-    records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
-) -> tuple[str, list[str]]:
-    """Return what is true of all runs, for the page's title, and of each, what is not."""
-    known = [_facts(*each) for each in zip(records, costs, times, strict=True)]
-    both = zip(records, known, strict=True)
-    every = [(record.environment.name, robots, time) for record, (_, time, robots) in both]
-    shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
-    unlike = [tuple(compress(facts, map(not_, shared))) for facts in every]
-    own = [_line(cost, *facts) for (cost, _, _), facts in zip(known, unlike, strict=True)]
-    return _line(*compress(every[0], shared)), own
+def _write_above_map(page: Page, text: str, box: Box, *, up: float, points: float, is_title: bool) -> None:
+    """Write a line above a map, centered if it is wider than the map."""
+    left, top, width, _ = box
+    text_width = min(page.text_width(text, points=points, bold=is_title), page.room)
+    if text_width > width:
+        left = max(left + (width - text_width) / 2, page.margin)
+    color = page.theme.ink if is_title else page.theme.faint
+    row = top - up * page.scale
+    page.text(text, left, row, points=points, bold=is_title, color=color, room=page.room)
 
 
-def _line(*facts: str) -> str:
+def _join_facts(facts: Sequence[str]) -> str:
+    """Join facts in one line, without empty ones."""
     return "  ·  ".join(fact for fact in facts if fact)
 
 
-def _facts(record: Record, mean_distance: float | None, mean_time: float | None) -> tuple[str, str, str]:
-    """Return the cost (empty where it is not known), the time, and the number of robots in words."""
-    mean = mean_label(record.environment)
-    cost = "" if mean_distance is None else cost_label(mean, mean_distance, mean_time)
-    return cost, f"t = {record.time[-1]:.1f} s", format_count(len(record.team), "robot")
+def _format_cost(record: Record, mean_distance: float | None, mean_time: float | None) -> str:
+    """Return the cost of the final positions as text; empty if it is not known."""
+    if mean_distance is None:
+        return ""
+    return cost_label(mean_label(record.environment), mean_distance, mean_time)
+
+
+def _format_time(record: Record) -> str:
+    """Return the time at the end of a run as text."""
+    return f"t = {record.time[-1]:.1f} s"
+
+
+def _format_robots(record: Record) -> str:
+    """Return the number of robots of a run as text."""
+    return format_count(len(record.team), "robot")
 
 
 @plain_style()
 def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -> Figure:
-    """Plot the first `MOST_MAPS` maps side by side at one scale, each under its name."""
+    """Plot the first `MAX_MAPS` maps side by side at the same scale, each below its name.
+
+    Parameters
+    ----------
+    environments : sequence of Environment
+    theme : Theme or str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     theme = get_theme(theme)
-    drawn = environments[:MOST_MAPS]
+    drawn = environments[:MAX_MAPS]
     title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
     bounds = np.array([environment.region.bounds for environment in drawn])
-    wide, high = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
-    entries = [*{label_of(each): each for one in drawn for each in map_handles(one, theme)}.values()]
-    page = Page((_WIDTH, _HIGHEST), theme, 1.5)
-    above, top = 26 * page.scale, (46 if title else 8) * page.scale
-    columns = columns_for(len(drawn), wide / high, (1600, 1200), above)
-    slot = (_WIDTH - page.margin) / columns - page.margin
+    map_width, map_height = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
+    aspect = map_width / map_height
+    handles = _list_different_handles(drawn, theme)
+    page = Page((_SHEET_WIDTH_PX, _MAX_SHEET_HEIGHT_PX), theme, _SHEET_SCALE)
+    scale = page.scale
+    above = 26 * scale
+    top = (46 if title else 8) * scale
+    columns = columns_for(len(drawn), aspect, (1600, 1200), above)
+    slot = (_SHEET_WIDTH_PX - page.margin) / columns - page.margin
     rows = -(-len(drawn) // columns)
-    tall = top + rows * (above + slot * high / wide + 14 * page.scale) + page.footer_height(entries)
-    page = Page((_WIDTH, int(np.clip(tall, 320, _HIGHEST))), theme, 1.5)
-    panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, page.footer_height(entries))
-    for environment, (low_x, low_y, *_), (box, room) in zip(drawn, bounds.tolist(), panels, strict=True):
-        draw_map(page.map_axes(box, low_x, low_y, low_x + wide, low_y + high), environment, theme)
-        page.text(environment.name, box[0], box[1] - 12 * page.scale, bold=True, room=room)
-    first, _ = panels[0]
+    panels_height = rows * (above + slot * map_height / map_width + _PANEL_GAP * scale)
+    height = int(
+        np.clip(top + panels_height + page.footer_height(handles), _MIN_HEIGHT_PX, _MAX_SHEET_HEIGHT_PX)
+    )
+    page = Page((_SHEET_WIDTH_PX, height), theme, _SHEET_SCALE)
+    panels = page.panels(len(drawn), columns, aspect, 0.0, above, top, page.footer_height(handles))
+    for environment, (box, room) in zip(drawn, panels, strict=True):
+        low_x, low_y, _, _ = environment.region.bounds
+        axes = page.map_axes(box, low_x, low_y, low_x + map_width, low_y + map_height)
+        arena.draw_map(axes, environment, theme)
+        page.text(environment.name, box[0], box[1] - 12 * scale, bold=True, room=room)
+    first_box, _ = panels[0]
     if title:
-        y = first[1] - above - 18 * page.scale
-        page.text(title, first[0], y, points=HEADING, bold=True, room=page.room)
-    page.footer(entries, [box for box, _ in panels], first[2] / wide)
+        row = first_box[1] - above - 18 * scale
+        page.text(title, first_box[0], row, points=HEADING, bold=True, room=page.room)
+    page.footer(handles, [box for box, _ in panels], first_box[2] / map_width)
     return page.figure
 
 
-class Measured(NamedTuple):
-    """A run and what was measured of it."""
+def _list_different_handles(environments: Sequence[Environment], theme: Theme) -> list[Artist]:
+    """Return the entries of the legends of maps, each once."""
+    handles: dict[str, Artist] = {}
+    for environment in environments:
+        for handle in arena.build_map_handles(environment, theme):
+            handles[arena.get_label(handle)] = handle
+    return list(handles.values())
+
+
+class MeasuredRun(NamedTuple):
+    """A run with its metrics.
+
+    Attributes
+    ----------
+    label : str
+    controller : str
+        Name of the controller, for the color.
+    metrics : RunMetrics
+    """
 
     label: str
     controller: str
     metrics: RunMetrics
 
 
-def share(area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
-    return lambda metrics: np.asarray(100.0 * area(metrics) / metrics.free_area)
+class MetricPanel(NamedTuple):
+    """A panel of `plot_metrics`.
+
+    Attributes
+    ----------
+    label, unit : str
+        Of the axis.
+    get_values : callable
+        Returns the values of a run.
+    """
+
+    label: str
+    unit: str
+    get_values: Callable[[RunMetrics], Array]
 
 
-# label, unit and values of each panel
-PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
-    ("sensed, in line of sight (% of the free area)", "%", share(lambda each: each.sensed_area)),
-    ("in line of sight (% of the free area)", "%", share(lambda each: each.visible_area)),
-    ("work |F v| (J)", "J", lambda each: each.work),
-    ("way of a robot (m)", "m", lambda each: each.path_length),
+def to_free_area_percent(get_area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
+    """Turn a function that returns areas into one that returns percentages of the free area."""
+    return lambda metrics: np.asarray(100.0 * get_area(metrics) / metrics.free_area)
+
+
+METRIC_PANELS = (
+    MetricPanel(
+        "sensed, in line of sight (% of the free area)",
+        "%",
+        to_free_area_percent(lambda metrics: metrics.sensed_area),
+    ),
+    MetricPanel(
+        "in line of sight (% of the free area)",
+        "%",
+        to_free_area_percent(lambda metrics: metrics.visible_area),
+    ),
+    MetricPanel("work |F v| (J)", "J", lambda metrics: metrics.work),
+    MetricPanel("way of a robot (m)", "m", lambda metrics: metrics.path_length),
 )
 
 
 @plain_style()
-def plot_metrics(runs: Sequence[Measured], theme: Theme | str, title: str) -> Figure:
+def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) -> Figure:
+    """Plot the metrics of runs against time in the panels of `METRIC_PANELS`.
+
+    Parameters
+    ----------
+    runs : sequence of MeasuredRun
+    theme : Theme or str
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     theme = get_theme(theme)
     page = Page((1200, 800), theme)
-    s = page.scale
     page.title(title, 26)
-    width, height = 600.0, 400.0 - 20 * s
-    for k, (label, unit, of) in enumerate(PANELS):
-        curves = [(each.label, each.controller, each.metrics.time, of(each.metrics)) for each in runs]
-        longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-        row, column = divmod(k, 2)
-        left, top = column * width + 44 * s, 40 * s + row * height + 36 * s
-        right = min(24 * s + longest, 0.5 * width)
-        axes = page.axes((left, top, width - 44 * s - right, height - 84 * s))
-        draw_curves(axes, curves, theme, label=label, unit=unit, weight=0.8)
+    for number, panel in enumerate(METRIC_PANELS):
+        curves = [
+            (run.label, run.controller, run.metrics.time, panel.get_values(run.metrics)) for run in runs
+        ]
+        axes = _create_metric_axes(page, number, curves, panel.unit)
+        draw_curves(axes, curves, theme, label=panel.label, unit=panel.unit, weight=0.8)
     return page.figure
+
+
+def _create_metric_axes(page: Page, number: int, curves: Sequence[Curve], unit: str) -> Axes:
+    """Create the axes of one of four panels, with space for the labels of its curves."""
+    scale = page.scale
+    width = 600.0
+    height = 400.0 - 20 * scale
+    row, column = divmod(number, 2)
+    label_width = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    right = min(24 * scale + label_width, 0.5 * width)
+    left = column * width + 44 * scale
+    top = 40 * scale + row * height + 36 * scale
+    return page.axes((left, top, width - 44 * scale - right, height - 84 * scale))

@@ -18,7 +18,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import Environment, Gap
-from robocov_app.figures.arena import draw_map, map_handles
+from robocov_app.figures.arena import build_map_handles, draw_map
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
 from robocov_app.formats.foreign_map import ForeignMap
@@ -156,7 +156,7 @@ def _number(value: float) -> str:
 
 
 def _handles(environment: Environment, theme: Theme, compared: ImportComparison) -> list[Artist]:
-    handles = map_handles(environment, theme)
+    handles = build_map_handles(environment, theme)
     for area, words, color in (
         (compared.lost, "left out: {} m² were free", theme.trajectory),
         (compared.opened, "opened: {} m² were solid", theme.start),

@@ -199,10 +199,10 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     edge_color = tone(theme.cell_edge)
     dot_style: Any = {"linestyle": "none", "marker": "o", "markersize": 4.0, "color": tone(theme.ink)}
     handles: list[Artist] = [
-        arena.robot_handle("robot", theme.final, theme),
+        arena.build_robot_handle("robot", theme.final, theme),
         Line2D([], [], label="centre of mass of its cell", **dot_style),
         Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
-        *arena.map_handles(environment, theme)[1:],
+        *arena.build_map_handles(environment, theme)[1:],
     ]
     page, (axes,) = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
     arena.draw_map(axes, environment, theme)
@@ -242,8 +242,10 @@ def draw_side_by_side(
     -------
     Figure
     """
-    handles = merge_legends((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
-    handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
+    handles = merge_legends(
+        (arena.build_run_handles(record, theme, "paper") for record in records), arena.get_label
+    )
+    handles = [handle for handle in handles if arena.get_label(handle) not in unnamed]
     page, panels = build_panels(records[0].environment, len(records), WIDE_PX, handles, theme, above=30.0)
     for letter, record, (title, cost), axes in zip("abcdef", records, headings, panels, strict=False):
         arena.draw_run(axes, record, theme, "paper")

@@ -15,7 +15,7 @@ from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
 from robocov_app.figures import results as drawing
 from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
-from robocov_app.figures.runs import share
+from robocov_app.figures.runs import to_free_area_percent
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.report import groups as grouped
 from robocov_app.report.embedding import ReplayRun
@@ -263,8 +263,13 @@ def _in_contact(gaps: Array) -> Array:
 
 # title, label, unit and values of each plot of a metric
 _PANELS: tuple[tuple[str, str, str, Callable[[RunMetrics], Array]], ...] = (
-    ("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
-    ("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
+    (
+        "Sensed",
+        "in range and in sight (% of the free area)",
+        "%",
+        to_free_area_percent(lambda m: m.sensed_area),
+    ),
+    ("Seen", "in line of sight (% of the free area)", "%", to_free_area_percent(lambda m: m.visible_area)),
     ("Energy", "work |F v| so far (J)", "J", lambda m: m.work),
     ("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
     ("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from robocov.environment import Environment
-from robocov_app.figures.runs import MOST_MAPS, plot_maps
+from robocov_app.figures.runs import MAX_MAPS, plot_maps
 
 
 def words(figure) -> list[str]:  # type: ignore[no-untyped-def]
@@ -36,6 +36,6 @@ def test_all_is_on_the_page_and_the_dark_is_dark(empty: Environment) -> None:
 
 @pytest.mark.slow
 def test_of_very_many_the_first_are_drawn_and_the_title_says_so(empty: Environment) -> None:
-    figure = plot_maps([empty] * (MOST_MAPS + 5))
-    assert len(figure.axes) == MOST_MAPS
-    assert f"{MOST_MAPS} of {MOST_MAPS + 5}" in words(figure)
+    figure = plot_maps([empty] * (MAX_MAPS + 5))
+    assert len(figure.axes) == MAX_MAPS
+    assert f"{MAX_MAPS} of {MAX_MAPS + 5}" in words(figure)

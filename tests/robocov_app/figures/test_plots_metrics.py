@@ -2,27 +2,27 @@ import numpy as np
 import pytest
 
 from robocov.metrics.run_metrics import RunMetrics
-from robocov_app.figures.runs import PANELS, Measured, plot_metrics
+from robocov_app.figures.runs import METRIC_PANELS, MeasuredRun, plot_metrics
 
 
-def measured(controller: str, seed: int) -> Measured:
+def measured(controller: str, seed: int) -> MeasuredRun:
     rng = np.random.default_rng(seed)
     rising = np.cumsum(rng.uniform(0, 1, (8, 11)), axis=1)
     metrics = RunMetrics(
         np.linspace(0.0, 5.0, 11), *rising[:6], np.ones(11, dtype=np.intp), *rising[[6, 7, 0]], 20.0
     )
-    return Measured(controller.upper(), controller, metrics)
+    return MeasuredRun(controller.upper(), controller, metrics)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_every_panel_has_a_curve_of_each_run(theme: str) -> None:
     runs = [measured("rapf", 1), measured("rpf", 2)]
     figure = plot_metrics(runs, theme, "Two runs")
-    assert len(figure.axes) == len(PANELS)
-    for axes, (label, _, of) in zip(figure.axes, PANELS, strict=True):
+    assert len(figure.axes) == len(METRIC_PANELS)
+    for axes, (label, _, of) in zip(figure.axes, METRIC_PANELS, strict=True):
         assert axes.get_ylabel() == label
         drawn = [np.asarray(line.get_ydata()) for line in axes.lines if len(line.get_xdata()) == 11]
         for run in runs:
             assert any(np.array_equal(line, of(run.metrics)) for line in drawn)
     # shares are of the free area
-    assert PANELS[0][2](runs[0].metrics)[-1] == pytest.approx(5.0 * runs[0].metrics.sensed_area[-1])
+    assert METRIC_PANELS[0][2](runs[0].metrics)[-1] == pytest.approx(5.0 * runs[0].metrics.sensed_area[-1])

@@ -12,7 +12,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
-from robocov_app.figures.arena import draw_map, map_handles, ticks_in_meters
+from robocov_app.figures.arena import build_map_handles, draw_map, set_meter_axes
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.render.picture import Painter
@@ -92,7 +92,7 @@ def test_zoomed_in_it_stays_in_the_view():
 
 def test_on_a_page():
     axes = Figure().subplots()
-    ticks_in_meters(axes, HEAVY, LIGHT)
+    set_meter_axes(axes, HEAVY, LIGHT)
     draw_map(axes, HEAVY, LIGHT)
     (image,) = axes.images
     assert axes.get_xlim() == (0.0, 8.0) and axes.get_ylim() == (0.0, 8.0)
@@ -100,9 +100,9 @@ def test_on_a_page():
     row, column = np.unravel_index(alpha.argmax(), alpha.shape)
     assert (column + 0.5) / alpha.shape[1] * 8.0 == pytest.approx(3.0, abs=0.15)
     assert (row + 0.5) / alpha.shape[0] * 8.0 == pytest.approx(3.0, abs=0.15)
-    assert map_handles(HEAVY, LIGHT)[-1].get_label() == "density φ, 0.1 to 2.1"
+    assert build_map_handles(HEAVY, LIGHT)[-1].get_label() == "density φ, 0.1 to 2.1"
     bare = Figure().subplots()
     draw_map(bare, PLAIN, LIGHT)
-    draw_map(bare, HEAVY, LIGHT, density=False)
+    draw_map(bare, HEAVY, LIGHT, has_density=False)
     assert not bare.images
-    assert len(map_handles(HEAVY, LIGHT, density=False)) == len(map_handles(PLAIN, LIGHT))
+    assert len(build_map_handles(HEAVY, LIGHT, has_density=False)) == len(build_map_handles(PLAIN, LIGHT))
