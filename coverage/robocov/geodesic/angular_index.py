@@ -14,9 +14,24 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.box_tree import LEAF_SIZE, compute_squared_box_distance, skip_subtree
+from robocov.geodesic.box_tree import (
+    HIGH_X,
+    HIGH_Y,
+    LEAF_SIZE,
+    LOW_X,
+    LOW_Y,
+    compute_squared_box_distance,
+    skip_subtree,
+)
 from robocov.geodesic.grid import cross
-from robocov.geodesic.walls import Walls, contains_direction, find_vertex, get_relative_ends
+from robocov.geodesic.walls import (
+    END_X,
+    END_Y,
+    Walls,
+    contains_direction,
+    find_vertex,
+    get_relative_ends,
+)
 
 _PADDING = 1e-9
 """Margin added to the angles that a wall spans and subtracted from its distance, far larger than rounding."""
@@ -30,6 +45,15 @@ _MAX_SIDE_ERROR = 2.0**55
 _MAX_TREE_DEPTH = 64
 """Size of the stack of a tree search, which contains at most one node for each level of the tree."""
 
+_FULL_TURN = 4.0
+"""Pseudo-angle of a full turn; see `compute_pseudo_angle`."""
+
+_MIN_LENGTH = 1e-300
+"""Lower limit of lengths in divisions, which only that of a zero vector is below."""
+
+_MUST_CHECK_SECTORS = -1.0
+"""Squared clear distance in all bins of a source at a vertex; less than the square of any distance."""
+
 
 class AngularWallIndex(NamedTuple):
     """The walls that face each of n sources, in angular bins, in grid steps."""
@@ -39,8 +63,8 @@ class AngularWallIndex(NamedTuple):
     squared_reach: Array
     """(n,) Squared distances up to which walls are in the index."""
     squared_clear_distance: Array
-    """(n, bins) Squared distances up to which nothing is hidden; -1 if the source is a vertex, whose sectors
-    must be checked first."""
+    """(n, bins) Squared distances up to which nothing is hidden; `_MUST_CHECK_SECTORS` if the source is at a
+    vertex."""
     squared_horizon: Array
     """(n, bins) Squared distances beyond which everything is hidden."""
     head: IntArray
@@ -53,16 +77,15 @@ class AngularWallIndex(NamedTuple):
     """Nodes of the box tree that are still to be visited."""
 
     @classmethod
-    def allocate(cls, sources: int, bins: int, entries: int) -> AngularWallIndex:
+    def allocate(cls, source_count: int, bin_count: int, max_entries: int) -> AngularWallIndex:
         """Allocate an index, to be filled by `add_walls`.
 
         Parameters
         ----------
-        sources : int
-            Number of sources.
-        bins : int
+        source_count : int
+        bin_count : int
             Number of angular bins of each source, a power of 2.
-        entries : int
+        max_entries : int
             Maximum number of entries, for all sources together.
 
         Returns
@@ -70,13 +93,13 @@ class AngularWallIndex(NamedTuple):
         AngularWallIndex
         """
         return cls(
-            positions=np.empty((sources, 2)),
-            squared_reach=np.empty(sources),
-            squared_clear_distance=np.empty((sources, bins)),
-            squared_horizon=np.empty((sources, bins)),
-            head=np.empty((sources, bins), np.int64),
-            entry_wall=np.empty(entries, np.int64),
-            entry_before=np.empty(entries, np.int64),
+            positions=np.empty((source_count, 2)),
+            squared_reach=np.empty(source_count),
+            squared_clear_distance=np.empty((source_count, bin_count)),
+            squared_horizon=np.empty((source_count, bin_count)),
+            head=np.empty((source_count, bin_count), np.int64),
+            entry_wall=np.empty(max_entries, np.int64),
+            entry_before=np.empty(max_entries, np.int64),
             stack=np.empty(_MAX_TREE_DEPTH, np.int64),
         )
 
@@ -99,7 +122,7 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
     >>> [compute_pseudo_angle(dx, dy) for dx, dy in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))]
     [0.0, 1.0, 2.0, 3.0]
     """
-    slope = dy / max(abs(dx) + abs(dy), 1e-300)
+    slope = dy / max(abs(dx) + abs(dy), _MIN_LENGTH)
     return 1.0 + slope if dx >= 0.0 else 3.0 - slope
 
 
@@ -126,21 +149,21 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     squared_distance = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PADDING)
     if squared_distance == 0.0:
         return False
-    bins = index.squared_horizon.shape[1]
-    half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
-    half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
-    dx = boxes[node, 0] + half_width - x
-    dy = boxes[node, 1] + half_height - y
+    bin_count = index.squared_horizon.shape[1]
+    half_width = 0.5 * (boxes[node, HIGH_X] - boxes[node, LOW_X])
+    half_height = 0.5 * (boxes[node, HIGH_Y] - boxes[node, LOW_Y])
+    dx = boxes[node, LOW_X] + half_width - x
+    dy = boxes[node, LOW_Y] + half_height - y
     # The angle that half the box spans is at most pi/2 times its sine, and its sine is the half diagonal
     # divided by the distance to the center. A pseudo-angle grows at most as fast as the angle.
     squared_sine = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
     half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _PADDING
     angle = compute_pseudo_angle(dx, dy)
-    scale = bins * 0.25
-    first = int(np.floor((angle - half_angle) * scale))
-    last = int(np.floor((angle + half_angle) * scale))
-    for k in range(first, min(last, first + bins - 1) + 1):
-        if index.squared_horizon[source, k & (bins - 1)] >= squared_distance:
+    bins_per_unit = bin_count / _FULL_TURN
+    first = int(np.floor((angle - half_angle) * bins_per_unit))
+    last = int(np.floor((angle + half_angle) * bins_per_unit))
+    for k in range(first, min(last, first + bin_count - 1) + 1):
+        if index.squared_horizon[source, k & (bin_count - 1)] >= squared_distance:
             return False
     return True
 
@@ -172,36 +195,37 @@ def add_walls(
     """
     boxes = walls.boxes
     stack = index.stack
-    leaves = len(boxes) // 2
-    bins = index.head.shape[1]
+    first_leaf = len(boxes) // 2
+    bin_count = index.head.shape[1]
     _reset_source(index, source, x, y, squared_reach)
     stack[0] = 1
-    height = 1
-    while height:
-        height -= 1
-        node = stack[height]
+    stack_size = 1
+    while stack_size:
+        stack_size -= 1
+        node = stack[stack_size]
         if compute_squared_box_distance(boxes, node, x, y) >= squared_reach:
             continue
         if is_box_hidden(boxes, node, index, source):
             continue
-        if node < leaves:
-            # Visit the nearer half first: boxes that it hides need not be visited.
+        if node < first_leaf:
+            # Visit the nearer child first: boxes that its walls hide need not be visited.
             left_distance = compute_squared_box_distance(boxes, 2 * node, x, y)
             right_distance = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
             nearer = 2 * node + int(right_distance < left_distance)
-            stack[height] = nearer ^ 1
-            stack[height + 1] = nearer
-            height += 2
+            farther = nearer ^ 1
+            stack[stack_size] = farther
+            stack[stack_size + 1] = nearer
+            stack_size += 2
             continue
-        first = (node - leaves) * LEAF_SIZE
+        first = (node - first_leaf) * LEAF_SIZE
         for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
-            if used + bins > len(index.entry_wall):
+            if used + bin_count > len(index.entry_wall):
                 return -1
-            if walls.hides[wall]:
+            if walls.can_hide[wall]:
                 used = _add_wall(walls, wall, index, source, used)
     if find_vertex(walls.vertices, x, y) >= 0:
-        for k in range(bins):
-            index.squared_clear_distance[source, k] = -1.0
+        for k in range(bin_count):
+            index.squared_clear_distance[source, k] = _MUST_CHECK_SECTORS
     return used
 
 
@@ -237,19 +261,19 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
         return used
     squared_far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
     # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
-    bins = index.head.shape[1]
-    scale = bins * 0.25
+    bin_count = index.head.shape[1]
+    bins_per_unit = bin_count / _FULL_TURN
     start = compute_pseudo_angle(ax, ay)
     stop = compute_pseudo_angle(bx, by)
     if stop < start:
-        stop += 4.0
-    first_bin = int(np.floor((start - _PADDING) * scale))
-    last_bin = int(np.floor((stop + _PADDING) * scale))
+        stop += _FULL_TURN
+    first_bin = int(np.floor((start - _PADDING) * bins_per_unit))
+    last_bin = int(np.floor((stop + _PADDING) * bins_per_unit))
     # The wall covers the bins from `covered_first` up to `covered_end` completely.
-    covered_first = int(np.ceil((start + _PADDING) * scale))
-    covered_end = int(np.floor((stop - _PADDING) * scale))
-    for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bins - 1) + 1):
-        k = unwrapped_bin & (bins - 1)
+    covered_first = int(np.ceil((start + _PADDING) * bins_per_unit))
+    covered_end = int(np.floor((stop - _PADDING) * bins_per_unit))
+    for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bin_count - 1) + 1):
+        k = unwrapped_bin & (bin_count - 1)
         if squared_near > index.squared_horizon[source, k]:
             continue
         index.squared_clear_distance[source, k] = min(index.squared_clear_distance[source, k], squared_near)
@@ -260,10 +284,11 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
         if covered_first <= unwrapped_bin < covered_end:
             index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_far)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
-    k = covered_end & (bins - 1)
-    if covered_first <= covered_end < first_bin + bins and squared_far < index.squared_horizon[source, k]:
+    k = covered_end & (bin_count - 1)
+    has_partial_bin = covered_first <= covered_end < first_bin + bin_count
+    if has_partial_bin and squared_far < index.squared_horizon[source, k]:
         squared_chain_far = _compute_max_squared_distance(
-            walls, wall, x, y, stop, (covered_end + 1) / scale, squared_far
+            walls, wall, x, y, stop, (covered_end + 1) / bins_per_unit, squared_far
         )
         index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_chain_far)
     return used
@@ -280,18 +305,18 @@ def _compute_max_squared_distance(
     reach the last angle.
     """
     for _ in range(_MAX_CHAIN):
-        ax = walls.ends[wall, 2] - x
-        ay = walls.ends[wall, 3] - y
+        ax = walls.ends[wall, END_X] - x
+        ay = walls.ends[wall, END_Y] - y
         wall = walls.following[wall]
         if wall < 0:
             break
-        bx = walls.ends[wall, 2] - x
-        by = walls.ends[wall, 3] - y
+        bx = walls.ends[wall, END_X] - x
+        by = walls.ends[wall, END_Y] - y
         if cross(ax, ay, bx - ax, by - ay) <= 0.0:
             break
         stop = compute_pseudo_angle(bx, by)
         while stop < angle - _PADDING:
-            stop += 4.0
+            stop += _FULL_TURN
         angle = stop
         squared_far = max(squared_far, (bx * bx + by * by) * (1.0 + _PADDING))
         if angle - _PADDING >= last_angle:
@@ -300,12 +325,12 @@ def _compute_max_squared_distance(
 
 
 @kernel
-def find_bin(bins: int, dx: float, dy: float) -> int:
+def find_bin(bin_count: int, dx: float, dy: float) -> int:
     """Return the angular bin of a direction.
 
     Parameters
     ----------
-    bins : int
+    bin_count : int
         Number of bins in a full turn.
     dx, dy : float
         The direction, of any length.
@@ -314,7 +339,7 @@ def find_bin(bins: int, dx: float, dy: float) -> int:
     -------
     int
     """
-    return min(int(compute_pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
+    return min(int(compute_pseudo_angle(dx, dy) * (bin_count / _FULL_TURN)), bin_count - 1)
 
 
 @kernel
@@ -380,7 +405,7 @@ def _is_visible_past_walls(
     """Return whether a source sees the point at offset (dx, dy), by testing every wall in bin k."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    if index.squared_clear_distance[source, k] < 0.0:
+    if index.squared_clear_distance[source, k] == _MUST_CHECK_SECTORS:
         vertex = find_vertex(walls.vertices, x, y)
         if not contains_direction(walls, vertex, dx, dy):
             return False
@@ -417,18 +442,18 @@ def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
 def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether no wall hides the point at offset (dx, dy) from (x, y), searching along the segment."""
     boxes = walls.boxes
-    leaves = len(boxes) // 2
+    first_leaf = len(boxes) // 2
     node = 1
     while node:
         if _is_box_off_segment(boxes, node, x, y, dx, dy):
             node = skip_subtree(node)
-        elif node < leaves:
+        elif node < first_leaf:
             node *= 2
         else:
-            first = (node - leaves) * LEAF_SIZE
+            first = (node - first_leaf) * LEAF_SIZE
             for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
                 if (
-                    walls.hides[wall]
+                    walls.can_hide[wall]
                     and _faces(walls.ends, wall, x, y)
                     and _hides(walls.ends, wall, x, y, dx, dy)
                 ):
@@ -440,15 +465,15 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 @kernel
 def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether a box certainly does not meet the segment from (x, y) to (x + dx, y + dy)."""
-    if boxes[node, 0] > x + max(dx, 0.0) or boxes[node, 2] < x + min(dx, 0.0):
+    if boxes[node, LOW_X] > x + max(dx, 0.0) or boxes[node, HIGH_X] < x + min(dx, 0.0):
         return True
-    if boxes[node, 1] > y + max(dy, 0.0) or boxes[node, 3] < y + min(dy, 0.0):
+    if boxes[node, LOW_Y] > y + max(dy, 0.0) or boxes[node, HIGH_Y] < y + min(dy, 0.0):
         return True
-    half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
-    half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
+    half_width = 0.5 * (boxes[node, HIGH_X] - boxes[node, LOW_X])
+    half_height = 0.5 * (boxes[node, HIGH_Y] - boxes[node, LOW_Y])
     # Compare the distance from the line to the center with the extent of the box across the line, both
     # multiplied by the length of the segment.
-    side = dx * (boxes[node, 1] + half_height - y) - dy * (boxes[node, 0] + half_width - x)
+    side = dx * (boxes[node, LOW_Y] + half_height - y) - dy * (boxes[node, LOW_X] + half_width - x)
     half_extent: float = abs(dx) * half_height + abs(dy) * half_width
     distance: float = abs(side) * (1.0 - _PADDING)
     return distance > half_extent * (1.0 + _PADDING) + _MAX_SIDE_ERROR

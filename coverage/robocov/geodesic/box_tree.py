@@ -1,8 +1,8 @@
 """Trees of bounding boxes, which let searches skip everything that is far away.
 
-A tree is a (2 k, 4) array with rows of low x, low y, high x and high y. Node 1 is the root, and node k
-contains nodes 2 k and 2 k + 1. The second half of the rows are leaves of `LEAF_SIZE` consecutive items
-each; the boxes of empty leaves start at infinity. Row 0 is not used.
+A tree is a (nodes, 4) array. Row i is the box of node i, with the columns `LOW_X`, `LOW_Y`, `HIGH_X` and
+`HIGH_Y`. Node 1 is the root, and node i contains nodes 2 i and 2 i + 1. The second half of the nodes are
+leaves of `LEAF_SIZE` consecutive items each; the boxes of empty leaves start at infinity. Row 0 is not used.
 """
 
 import numpy as np
@@ -12,8 +12,15 @@ from robocov.compiled import kernel
 
 LEAF_SIZE = 8
 """Number of items per leaf."""
-
-_Z_ORDER_BITS = 16
+LOW_X = 0
+"""Column of a box: minimum x."""
+LOW_Y = 1
+"""Column of a box: minimum y."""
+HIGH_X = 2
+"""Column of a box: maximum x."""
+HIGH_Y = 3
+"""Column of a box: maximum y."""
+Z_ORDER_BITS = 16
 """Number of bits of each coordinate in `compute_z_order`."""
 
 
@@ -27,14 +34,14 @@ def build_box_tree(low: Array, high: Array) -> Array:
 
     Returns
     -------
-    (2 k, 4) array
-        The tree, as described at the top of this module; k is a power of two.
+    (nodes, 4) array
+        The tree, as described at the top of this module.
     """
-    leaves = 1
-    while leaves * LEAF_SIZE < len(low):
-        leaves *= 2
+    leaf_count = 1
+    while leaf_count * LEAF_SIZE < len(low):
+        leaf_count *= 2
     # With the upper bounds negated, all four bounds are minima.
-    items = np.full((leaves * LEAF_SIZE, 4), np.inf)
+    items = np.full((leaf_count * LEAF_SIZE, 4), np.inf)
     items[: len(low)] = np.hstack([low, -high])
     level = items.reshape(-1, LEAF_SIZE, 4).min(axis=1)
     levels = [level]
@@ -51,7 +58,7 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
     Parameters
     ----------
     column, row : (n,) int array
-        Coordinates from 0 to 65535.
+        Coordinates from 0 up to ``2**Z_ORDER_BITS``.
 
     Returns
     -------
@@ -63,7 +70,7 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
     array([0, 1, 2, 3])
     """
     key = np.zeros(len(column), dtype=np.int64)
-    for bit in range(_Z_ORDER_BITS):
+    for bit in range(Z_ORDER_BITS):
         key |= ((column >> bit) & 1) << (2 * bit)
         key |= ((row >> bit) & 1) << (2 * bit + 1)
     return key
@@ -104,6 +111,6 @@ def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) ->
     float, grid steps²
         0 inside the box.
     """
-    dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)
-    dy: float = max(boxes[node, 1] - y, y - boxes[node, 3], 0.0)
+    dx: float = max(boxes[node, LOW_X] - x, x - boxes[node, HIGH_X], 0.0)
+    dy: float = max(boxes[node, LOW_Y] - y, y - boxes[node, HIGH_Y], 0.0)
     return dx * dx + dy * dy

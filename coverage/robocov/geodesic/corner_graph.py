@@ -9,7 +9,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
-from robocov.geodesic.box_tree import LEAF_SIZE, skip_subtree
+from robocov.geodesic.box_tree import LEAF_SIZE, LOW_X, skip_subtree
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 
@@ -37,22 +37,22 @@ class CornerPaths(NamedTuple):
     """(k,) The last corner at which the path bends before its end, or -1 if it is straight."""
 
     @classmethod
-    def allocate(cls, corners: int) -> CornerPaths:
+    def allocate(cls, corner_count: int) -> CornerPaths:
         """Allocate paths to a given number of corners.
 
         Parameters
         ----------
-        corners : int
+        corner_count : int
 
         Returns
         -------
         CornerPaths
         """
         return cls(
-            length=np.empty(corners),
-            source=np.empty(corners, np.int64),
-            first_corner=np.empty(corners, np.int64),
-            previous_corner=np.empty(corners, np.int64),
+            length=np.empty(corner_count),
+            source=np.empty(corner_count, np.int64),
+            first_corner=np.empty(corner_count, np.int64),
+            previous_corner=np.empty(corner_count, np.int64),
         )
 
 
@@ -65,27 +65,26 @@ class CornerQueue(NamedTuple):
     """(k,) Whether each corner is in the queue."""
 
     @classmethod
-    def allocate(cls, corners: int) -> CornerQueue:
+    def allocate(cls, corner_count: int) -> CornerQueue:
         """Allocate a queue with space for all corners.
 
         Parameters
         ----------
-        corners : int
+        corner_count : int
 
         Returns
         -------
         CornerQueue
         """
-        return cls(corners=np.empty(corners + 1, np.int64), is_waiting=np.empty(corners, np.bool_))
+        return cls(corners=np.empty(corner_count + 1, np.int64), is_waiting=np.empty(corner_count, np.bool_))
 
 
-def build_corner_graph(corners: int, pairs: IntArray, lengths: Array) -> CornerGraph:
+def build_corner_graph(corner_count: int, pairs: IntArray, lengths: Array) -> CornerGraph:
     """Build the graph of corners from its links.
 
     Parameters
     ----------
-    corners : int
-        Number of corners.
+    corner_count : int
     pairs : (l, 2) int array
         The two corners of each link, each pair once.
     lengths : (l,) array, grid steps
@@ -99,7 +98,7 @@ def build_corner_graph(corners: int, pairs: IntArray, lengths: Array) -> CornerG
     end = np.concatenate([pairs[:, 1], pairs[:, 0]])
     order = np.lexsort((end, start))
     return CornerGraph(
-        first_link=np.searchsorted(start[order], np.arange(corners + 1)),
+        first_link=np.searchsorted(start[order], np.arange(corner_count + 1)),
         neighbor=end[order],
         length=np.tile(lengths, 2)[order],
     )
@@ -132,17 +131,18 @@ def find_visible_corners(
     boxes = walls.corner_boxes
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    leaves = len(boxes) // 2
+    first_leaf = len(boxes) // 2
     count = 0
     node = 1
     while node:
-        if boxes[node, 0] == np.inf or is_box_hidden(boxes, node, index, source):
+        if boxes[node, LOW_X] == np.inf or is_box_hidden(boxes, node, index, source):
             node = skip_subtree(node)
-        elif node < leaves:
+        elif node < first_leaf:
             node *= 2
         else:
-            leaf = (node - leaves) * LEAF_SIZE
-            for corner in range(max(leaf, first), min(leaf + LEAF_SIZE, len(corners))):
+            first_in_leaf = (node - first_leaf) * LEAF_SIZE
+            end_of_leaf = min(first_in_leaf + LEAF_SIZE, len(corners))
+            for corner in range(max(first_in_leaf, first), end_of_leaf):
                 if can_bend_at_corner(corners, walls.corner_walls, corner, x, y) and is_visible(
                     walls, index, source, corners[corner, 0], corners[corner, 1]
                 ):
@@ -208,7 +208,7 @@ def find_links(
 
 
 @kernel
-def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, waiting: int) -> None:
+def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, waiting_count: int) -> None:
     """Shorten the paths to corners via other corners until none can be shortened further.
 
     If paths are equally short, the one from the first source is taken.
@@ -220,12 +220,12 @@ def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, wait
         On entry, the straight paths from the sources; their length is infinite where there is none.
     queue : CornerQueue
         On entry, the corners to which there are straight paths, at the beginning of the queue.
-    waiting : int
+    waiting_count : int
         Number of corners in the queue.
     """
     size = len(queue.corners)
     head = 0
-    tail = waiting
+    tail = waiting_count
     while head != tail:
         corner = queue.corners[head]
         head = head + 1 if head + 1 < size else 0

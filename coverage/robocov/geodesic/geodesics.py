@@ -149,15 +149,15 @@ class Geodesics:
         return np.concatenate(all_indices), np.concatenate(all_lengths)
 
     def run_with_index(
-        self, sources: int, bins: int, compute: IndexComputation
+        self, source_count: int, bin_count: int, compute: IndexComputation
     ) -> tuple[AngularWallIndex, IntArray, Array]:
         """Run a computation with a new index; repeat it with a larger one until there is enough space.
 
         Parameters
         ----------
-        sources : int
+        source_count : int
             Number of sources of the index.
-        bins : int
+        bin_count : int
             Number of bins of each source.
         compute : callable
             Called as ``compute(index, indices, lengths)``. It returns the number of rows that it has written
@@ -170,14 +170,14 @@ class Geodesics:
         lengths : (r, 2) array
         """
         while True:
-            entries = self._entries_per_source[bins] * sources + 2 * bins
-            index = AngularWallIndex.allocate(sources, bins, entries)
-            indices = np.empty((entries, 3), np.int64)
-            lengths = np.empty((entries, 2))
+            max_entries = self._entries_per_source[bin_count] * source_count + 2 * bin_count
+            index = AngularWallIndex.allocate(source_count, bin_count, max_entries)
+            indices = np.empty((max_entries, 3), np.int64)
+            lengths = np.empty((max_entries, 2))
             used = compute(index, indices, lengths)
             if used >= 0:
                 return index, indices[:used].copy(), lengths[:used].copy()
-            self._entries_per_source[bins] *= 2
+            self._entries_per_source[bin_count] *= 2
 
     def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
         """Convert points of the free space to grid coordinates.
@@ -307,9 +307,9 @@ class Geodesics:
         self, grid_positions: Array, *, must_be_straight: bool
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
         """Return the index of n grid points, their distances to corners, (n, k), and the last one's paths."""
-        corners = len(self.corners)
-        distances = np.empty((len(grid_positions), corners))
-        paths = CornerPaths.allocate(corners)
+        corner_count = len(self.corners)
+        distances = np.empty((len(grid_positions), corner_count))
+        paths = CornerPaths.allocate(corner_count)
 
         def fill(index: AngularWallIndex, _indices: IntArray, _lengths: Array) -> int:
             used: int = _find_corner_distances(
@@ -371,8 +371,8 @@ def _find_corner_distances(
     `paths` is overwritten for each point, and finally contains the paths from the last one. Return the
     number of index entries used, or -1 if there are too few.
     """
-    corners = len(walls.corners)
-    queue = CornerQueue(np.empty(corners + 1, np.int64), np.empty(corners, np.bool_))
+    corner_count = len(walls.corners)
+    queue = CornerQueue(np.empty(corner_count + 1, np.int64), np.empty(corner_count, np.bool_))
     used = 0
     for i in range(len(points)):
         x = points[i, 0]
@@ -380,7 +380,7 @@ def _find_corner_distances(
         used = add_walls(walls, index, i, x, y, np.inf, used)
         if used < 0:
             return -1
-        for corner in range(corners):
+        for corner in range(corner_count):
             paths.length[corner] = np.inf
             paths.source[corner] = 0
             paths.first_corner[corner] = corner

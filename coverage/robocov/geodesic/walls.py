@@ -11,8 +11,34 @@ from shapely import MultiPolygon
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.box_tree import LEAF_SIZE, build_box_tree, compute_z_order, skip_subtree
+from robocov.geodesic.box_tree import (
+    HIGH_X,
+    HIGH_Y,
+    LEAF_SIZE,
+    LOW_Y,
+    Z_ORDER_BITS,
+    build_box_tree,
+    compute_z_order,
+    skip_subtree,
+)
 from robocov.geodesic.grid import GRID_BITS, compute_crosses, cross
+
+START_X = 0
+"""Column of `Walls.ends`: x of the start of a wall."""
+START_Y = 1
+"""Column of `Walls.ends`: y of the start."""
+END_X = 2
+"""Column of `Walls.ends`: x of the end."""
+END_Y = 3
+"""Column of `Walls.ends`: y of the end."""
+INCOMING_X = 0
+"""Column of `Walls.sector_walls` and `Walls.corner_walls`: x of the direction of the incoming wall."""
+INCOMING_Y = 1
+"""Column of the same arrays: y of the direction of the incoming wall."""
+OUTGOING_X = 2
+"""Column of the same arrays: x of the direction of the outgoing wall."""
+OUTGOING_Y = 3
+"""Column of the same arrays: y of the direction of the outgoing wall."""
 
 _ON_BOUNDARY = 1000
 """Contribution of a wall through a point to the point's winding number: more than any number of turns."""
@@ -28,14 +54,14 @@ class Walls(NamedTuple):
     """
 
     ends: Array
-    """(e, 4) Start x, start y, end x and end y of the walls, with the free space on their left. They are
-    sorted so that nearby walls have nearby indices."""
+    """(w, 4) Start and end of each wall, with the free space on its left; for the columns, see `START_X`. The
+    walls are sorted so that nearby ones have nearby indices."""
     following: IntArray
-    """(e,) The wall that starts where this one ends, or -1 if several do."""
+    """(w,) The wall that starts where this one ends, or -1 if several do."""
     component: IntArray
-    """(e,) Component of the free space that the wall bounds."""
-    hides: BoolArray
-    """(e,) Whether free space can be behind the wall; false for walls on the convex hull of the map."""
+    """(w,) Component of the free space that the wall bounds."""
+    can_hide: BoolArray
+    """(w,) Whether free space can be behind the wall; false for walls on the convex hull of the map."""
     boxes: Array
     """The box tree of the walls."""
     vertices: Array
@@ -43,13 +69,14 @@ class Walls(NamedTuple):
     first_sector: IntArray
     """(v + 1,) The sectors of vertex k are those from ``first_sector[k]`` up to ``first_sector[k + 1]``."""
     sector_walls: Array
-    """(s, 4) Directions (x, y) of the incoming and the outgoing wall; free space is to the left of both."""
+    """(s, 4) Directions of the incoming and the outgoing wall, with free space to their left; for the
+    columns, see `INCOMING_X`."""
     sector_is_corner: BoolArray
     """(s,) Whether the sector is a corner."""
     corners: Array
     """(k, 2) Positions of the corners, sorted so that nearby ones have nearby indices."""
     corner_walls: Array
-    """(k, 4) Directions (x, y) of the incoming and the outgoing wall of each corner."""
+    """(k, 4) Directions of the incoming and the outgoing wall of each corner, like `sector_walls`."""
     corner_boxes: Array
     """The box tree of the corners."""
 
@@ -60,11 +87,11 @@ class _Segments(NamedTuple):
     vertices: Array
     """(v, 2) grid steps, sorted by x, then by y."""
     start: IntArray
-    """(e,) Vertices where the walls start."""
+    """(w,) The vertex where each wall starts."""
     end: IntArray
-    """(e,) Vertices where the walls end."""
+    """(w,) The vertex where each wall ends."""
     component: IntArray
-    """(e,) Component of the free space."""
+    """(w,) Component of the free space that the wall bounds."""
 
 
 class _Sectors(NamedTuple):
@@ -102,15 +129,14 @@ def build_walls(free: MultiPolygon) -> Walls:
     corners = corners[order]
 
     segments = _sort_spatially(segments)
-    ends = np.hstack([vertices[segments.start], vertices[segments.end]])
-    low = np.minimum(ends[:, :2], ends[:, 2:])
-    high = np.maximum(ends[:, :2], ends[:, 2:])
+    starts = vertices[segments.start]
+    ends = vertices[segments.end]
     return Walls(
-        ends=ends,
+        ends=np.hstack([starts, ends]),
         following=_find_following(segments),
         component=segments.component,
-        hides=~_find_hull_walls(segments),
-        boxes=build_box_tree(low, high),
+        can_hide=~_find_hull_walls(segments),
+        boxes=build_box_tree(np.minimum(starts, ends), np.maximum(starts, ends)),
         vertices=vertices,
         first_sector=np.searchsorted(sectors.vertex, np.arange(len(vertices) + 1)),
         sector_walls=sector_walls,
@@ -151,7 +177,7 @@ def _sort_spatially(segments: _Segments) -> _Segments:
 
 def _compute_spatial_order(points: Array) -> IntArray:
     """Return the indices that sort (n, 2) points along a Z-curve."""
-    cells = (points * 2.0 ** (16 - GRID_BITS)).clip(0, 65535).astype(np.int64)
+    cells = (points * 2.0 ** (Z_ORDER_BITS - GRID_BITS)).clip(0, 2**Z_ORDER_BITS - 1).astype(np.int64)
     return np.argsort(compute_z_order(cells[:, 0], cells[:, 1]), kind="stable")
 
 
@@ -226,7 +252,7 @@ def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float
     -------
     start_x, start_y, end_x, end_y : float, grid steps
     """
-    return ends[wall, 0] - x, ends[wall, 1] - y, ends[wall, 2] - x, ends[wall, 3] - y
+    return ends[wall, START_X] - x, ends[wall, START_Y] - y, ends[wall, END_X] - x, ends[wall, END_Y] - y
 
 
 @kernel
@@ -251,8 +277,8 @@ def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: floa
     """
     dx = x - corners[corner, 0]
     dy = y - corners[corner, 1]
-    incoming_side = cross(corner_walls[corner, 0], corner_walls[corner, 1], dx, dy)
-    outgoing_side = cross(corner_walls[corner, 2], corner_walls[corner, 3], dx, dy)
+    incoming_side = cross(corner_walls[corner, INCOMING_X], corner_walls[corner, INCOMING_Y], dx, dy)
+    outgoing_side = cross(corner_walls[corner, OUTGOING_X], corner_walls[corner, OUTGOING_Y], dx, dy)
     is_in_sector = incoming_side >= 0.0 or outgoing_side >= 0.0
     is_behind_a_wall = incoming_side <= 0.0 or outgoing_side <= 0.0
     return is_in_sector and is_behind_a_wall
@@ -304,8 +330,10 @@ def contains_direction(walls: Walls, vertex: int, dx: float, dy: float) -> bool:
     """
     sectors = walls.sector_walls
     for sector in range(walls.first_sector[vertex], walls.first_sector[vertex + 1]):
-        is_left_of_incoming = cross(sectors[sector, 0], sectors[sector, 1], dx, dy) >= 0.0
-        is_left_of_outgoing = cross(sectors[sector, 2], sectors[sector, 3], dx, dy) >= 0.0
+        incoming_side = cross(sectors[sector, INCOMING_X], sectors[sector, INCOMING_Y], dx, dy)
+        outgoing_side = cross(sectors[sector, OUTGOING_X], sectors[sector, OUTGOING_Y], dx, dy)
+        is_left_of_incoming = incoming_side >= 0.0
+        is_left_of_outgoing = outgoing_side >= 0.0
         if is_left_of_incoming and is_left_of_outgoing:
             return True
         if walls.sector_is_corner[sector] and (is_left_of_incoming or is_left_of_outgoing):
@@ -327,7 +355,7 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
         Result: 1 inside the component, more than 1 on its boundary, 0 outside.
     """
     boxes = walls.boxes
-    leaves = len(boxes) // 2
+    first_leaf = len(boxes) // 2
     for i in range(len(points)):
         x = points[i, 0]
         y = points[i, 1]
@@ -335,12 +363,12 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
             windings[i, component] = 0
         node = 1
         while node:
-            if boxes[node, 1] > y or boxes[node, 3] < y or boxes[node, 2] < x:
+            if boxes[node, LOW_Y] > y or boxes[node, HIGH_Y] < y or boxes[node, HIGH_X] < x:
                 node = skip_subtree(node)
-            elif node < leaves:
+            elif node < first_leaf:
                 node *= 2
             else:
-                first = (node - leaves) * LEAF_SIZE
+                first = (node - first_leaf) * LEAF_SIZE
                 for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
                     windings[i, walls.component[wall]] += _count_winding(walls.ends, wall, x, y)
                 node = skip_subtree(node)
@@ -349,7 +377,10 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
 @kernel
 def _count_winding(ends: Array, wall: int, x: float, y: float) -> int:
     """Return the contribution of a wall to the winding number of a point."""
-    ax, ay, bx, by = ends[wall, 0], ends[wall, 1], ends[wall, 2], ends[wall, 3]
+    ax = ends[wall, START_X]
+    ay = ends[wall, START_Y]
+    bx = ends[wall, END_X]
+    by = ends[wall, END_Y]
     if min(ay, by) > y or max(ay, by) < y or max(ax, bx) < x:
         return 0
     side = cross(bx - ax, by - ay, x - ax, y - ay)

@@ -130,7 +130,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
     components = shapely.orient_polygons(shapely.get_parts(free))
     walls = build_walls(shapely.transform(shapely.multipolygons(components), grid.snap))
     # The map's outer hull hides no free space, but it bounds the view.
-    walls.hides[:] = True
+    walls.can_hide[:] = True
     index = AngularWallIndex.allocate(1, _BINS, 64 * _BINS)
     for position in grid.snap(positions):
         while True:
