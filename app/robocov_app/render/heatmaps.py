@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 from robocov.density import Density
+from robocov_app.look import legend
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import format_scale_length
@@ -140,7 +141,7 @@ def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Arra
 
 
 unreached_legend = says(
-    "no robot can come",
+    legend.UNREACHED,
     lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge),
     lambda scene: scene.field is not None and bool((scene.field.result.owner < 0).any()),
 )
@@ -177,7 +178,7 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
 
 
 geodesic_legend = says(
-    "geodesic cell border",
+    legend.GEODESIC_BORDER,
     lambda canvas, x, y: canvas.line(
         *canvas.level(x, y, 8), canvas.theme.geodesic_border, canvas.width(_BORDER)
     ),

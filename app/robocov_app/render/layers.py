@@ -10,6 +10,7 @@ import pygame
 import shapely
 
 from robocov_app.look.colors import Color
+from robocov_app.look.legend import MOVING_OBSTACLE, UNKNOWN_OBSTACLE
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.moving_obstacles import MovingObstacle
@@ -156,11 +157,11 @@ def _moving_glyph(canvas: Canvas, x: float, y: float) -> None:
 
 
 obstacles_legend = says(
-    "obstacle (unknown to robots)",
+    UNKNOWN_OBSTACLE,
     lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge),
     lambda scene: not scene.environment.blocked.is_empty,
 )
-moving_legend = says("moving obstacle and its path", _moving_glyph, lambda scene: bool(scene.moving))
+moving_legend = says(MOVING_OBSTACLE, _moving_glyph, lambda scene: bool(scene.moving))
 
 
 def draw_boundary(canvas: Canvas, scene: Scene) -> None:

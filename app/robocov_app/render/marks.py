@@ -8,13 +8,14 @@ import pygame
 
 from robocov.arrays import Array
 from robocov.voronoi import VoronoiPartition
+from robocov_app.look import legend
 from robocov_app.look.colors import mix
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, Placed, Sprite
 from robocov_app.render.layers import says
 from robocov_app.render.layout import fitted_radii, mark_size
-from robocov_app.render.scene import CENTROID, GOAL, Scene, are_centroids
+from robocov_app.render.scene import Scene, are_centroids
 from robocov_app.render.surface_cache import Latest
 
 READABLE = 9.0  # radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it
@@ -62,7 +63,9 @@ def _ring(canvas: Canvas, radius: float) -> Sprite:
     return partial(sprites.ring, radius, canvas.theme.start, min(1.6 * canvas.scale, 0.4 * radius))
 
 
-starts_legend = says("start", lambda canvas, x, y: canvas.stamp(_ring(canvas, 4.5 * canvas.scale), (x, y)))
+starts_legend = says(
+    legend.START, lambda canvas, x, y: canvas.stamp(_ring(canvas, 4.5 * canvas.scale), (x, y))
+)
 
 
 def draw_robots(canvas: Canvas, scene: Scene) -> None:
@@ -124,7 +127,7 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
     there = np.isfinite(goals).all(axis=1)
     for center, goal in zip(centers[there].tolist(), goals[there].tolist(), strict=True):
         canvas.dashes(center, goal, canvas.theme.faint)
-    canvas.stamps([_cross(canvas, GOAL)], goals)
+    canvas.stamps([_cross(canvas, legend.GOAL)], goals)
 
 
 def _aims(scene: Scene) -> tuple[str, Array]:
@@ -137,22 +140,22 @@ def _aims(scene: Scene) -> tuple[str, Array]:
     # change with each message that gets lost
     believed = scene.centroids if cells is None else cells.centroid
     if believed.shape == goals.shape and are_centroids(goals, believed):
-        return CENTROID, scene.centroids
-    return GOAL, goals
+        return legend.CELL_CENTROID, scene.centroids
+    return legend.GOAL, goals
 
 
 def _cross(canvas: Canvas, kind: str, arm: float | None = None) -> Sprite:
     arm, theme = 5.5 * canvas.scale if arm is None else arm, canvas.theme
-    color, width, part = (theme.final, 1.8, 0.4) if kind == GOAL else (theme.ink, 1.3, 0.3)
+    color, width, part = (theme.final, 1.8, 0.4) if kind == legend.GOAL else (theme.ink, 1.3, 0.3)
     width = min(width * canvas.scale, part * arm)
-    return partial(sprites.cross, arm, color, theme.background, width, kind == GOAL)
+    return partial(sprites.cross, arm, color, theme.background, width, kind == legend.GOAL)
 
 
 def _aim_glyph(kind: str) -> Glyph:
     return lambda canvas, x, y: canvas.stamp(_cross(canvas, kind), (x, y))
 
 
-goals_legend = says(GOAL, _aim_glyph(GOAL), lambda scene: scene.now.decision.goals is not None)
+goals_legend = says(legend.GOAL, _aim_glyph(legend.GOAL), lambda scene: scene.now.decision.goals is not None)
 
 
 def draw_failed(canvas: Canvas, scene: Scene) -> None:
@@ -192,7 +195,7 @@ def _draw_wreck(canvas: Canvas, x: float, y: float, radius: float) -> None:
     canvas.stamp(partial(sprites.cross, arm, theme.ink, theme.background, width, True), (x, y))
 
 
-failed_legend = says("failed robot", lambda canvas, x, y: _draw_wreck(canvas, x, y, 6.0 * canvas.scale))
+failed_legend = says(legend.FAILED_ROBOT, lambda canvas, x, y: _draw_wreck(canvas, x, y, 6.0 * canvas.scale))
 
 
 def draw_selection(canvas: Canvas, scene: Scene) -> None:

@@ -20,10 +20,6 @@ from robocov_app.render.sensed_points import SensedPoints
 
 CENTROID_TOLERANCE_M = 0.05
 """Distance within which a goal counts as the centroid: in a record, goals are a moment older than cells."""
-CENTROID = "cell centroid"
-"""Name of the centroid in legends."""
-GOAL = "goal"
-"""Name of goals in legends."""
 
 
 def are_centroids(goals: Array, centroids: Array) -> bool:

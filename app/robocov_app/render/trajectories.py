@@ -7,6 +7,7 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array, IntArray
+from robocov_app.look import legend
 from robocov_app.look.colors import Color
 from robocov_app.look.robot_colors import ColorScheme, choose_trail_colors
 from robocov_app.render.canvas import Canvas, LegendEntry, bounded, premultiplied
@@ -149,7 +150,7 @@ class Trajectories:
                 sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
                 sketch.onto(canvas.surface)
 
-        return [LegendEntry("trajectory", glyph, self.colors)]
+        return [LegendEntry(legend.TRAJECTORY, glyph, self.colors)]
 
 
 def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fade: float, pen: Pen) -> None:

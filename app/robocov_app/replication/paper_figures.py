@@ -23,9 +23,8 @@ from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, Page, tone
 from robocov_app.look.colors import mix
-from robocov_app.look.legend import merge_legends
+from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
-from robocov_app.render.scene import CENTROID, GOAL
 from robocov_app.replication.contenders import ASSETS
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.outcome_tables import FIRST_MINUTE_S
@@ -84,7 +83,7 @@ def draw_figure(
     records = [run.record for run in pair]
     with_goals = [record for record in records if arena.has_goals(record)]
     are_goals_hidden = all(_are_goals_hidden(record) for record in with_goals)
-    unnamed = (CENTROID, GOAL) if are_goals_hidden else ()
+    unnamed = (CELL_CENTROID, GOAL) if are_goals_hidden else ()
     titles = [run.record.label for run in pair]
     costs = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in pair]
     return draw_side_by_side(records, list(zip(titles, costs, strict=True)), theme, unnamed)

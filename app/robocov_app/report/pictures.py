@@ -1,4 +1,9 @@
-"""Small pictures of maps and runs as SVG in a page, with the colors of the page: light, dark or paper."""
+"""Small pictures of maps and runs as SVG in a page, with the colors of the page: light, dark or paper.
+
+They are not drawn by matplotlib, as plots are. Its SVG of a run is four to five times as large (11 to 18 kB,
+and a page may have 60 of them) and takes 50 to 240 ms instead of 2 to 9. It also has nothing but color codes:
+the rings of robots and the background are both white in light, but only one of them is in dark.
+"""
 
 import base64
 import io
