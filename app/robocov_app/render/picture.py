@@ -71,7 +71,7 @@ def standard_layers(trails: ColorScheme = "robots") -> list[Layer]:
         _extra("scan", "Ray scan", knowledge.draw_scans, ("scans",), knowledge.scans_legend),
         forces.range_layer("sensing", "Sensing range"),
         forces.range_layer("communication", "Comm. range"),
-        _extra("links", "Neighbours", forces.draw_links, snapshot, forces.links_legend),
+        _extra("links", "Neighbors", forces.draw_links, snapshot, forces.links_legend),
         Layer("trajectories", "Trajectories", trajectories.draw, ("trail",), trajectories.legend),
         Layer("starts", "Starts", marks.Starts().draw, ("starts",), marks.starts_legend),
         _extra("obstacle_points", "Nearest obstacle", forces.draw_points, snapshot, forces.points_legend),

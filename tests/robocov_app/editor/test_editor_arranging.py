@@ -28,7 +28,7 @@ def boxes(sketch, owners):
 
 LEVELS = {
     "left": lambda b: b[..., 0],
-    "centre": lambda b: (b[..., 0] + b[..., 2]) / 2,
+    "center": lambda b: (b[..., 0] + b[..., 2]) / 2,
     "right": lambda b: b[..., 2],
     "top": lambda b: b[..., 3],
     "middle": lambda b: (b[..., 1] + b[..., 3]) / 2,
@@ -84,7 +84,7 @@ def test_single_vertices_are_aligned(sketch):
     assert [find_position(change.sketch, vertex)[1] for vertex in chosen.vertices] == [0.0] * 3
     assert find_position(change.sketch, Vertex(0, 0, 0)) == (1.0, 0.0)
     assert change.description == "3 vertices aligned at the bottom"
-    middle = align(sketch, chosen, "centre")
+    middle = align(sketch, chosen, "center")
     assert {find_position(middle.sketch, vertex)[0] for vertex in chosen.vertices} == {6.5}
 
 

@@ -94,7 +94,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
     [
         ((1.05, 0.96), ("vertex", "edge", "grid"), (1.0, 1.0), "vertex"),
         ((2.51, 1.03), ("middle", "edge", "grid"), (2.5, 1.0), "middle of an edge"),
-        ((7.0, 5.0), ("centre", "grid"), (7.03, 5.04), "centre"),
+        ((7.0, 5.0), ("center", "grid"), (7.03, 5.04), "center"),
         ((2.2, 1.07), ("edge",), (2.2, 1.0), "edge"),
         ((2.21, 1.07), ("edge", "grid"), (2.2, 1.0), "edge"),
         ((9.23, 6.58), ("grid",), (9.2, 6.6), "grid"),
@@ -173,15 +173,15 @@ def test_what_is_dragged_is_no_target():
     assert snap_point((2.2, 2.98), one, to("edge")).point == pytest.approx((2.2, 3.0))
     # of a start's places, too
     assert (
-        snap_point((6.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("centre")).guides == ()
+        snap_point((6.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("center")).guides == ()
     )
     assert snap_point(
-        (8.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("centre")
+        (8.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("center")
     ).point == (
         8.0,
         1.0,
     )
-    assert snap_point((6.02, 1.0), SnapTargets(sketch, without=["two"]), to("centre")).guides == ()
+    assert snap_point((6.02, 1.0), SnapTargets(sketch, without=["two"]), to("center")).guides == ()
     # what has been drawn so far is one
     assert snap_point((9.02, 5.0), SnapTargets(sketch, more=[(9.0, 5.0)]), to("vertex")).point == (9.0, 5.0)
 

@@ -159,7 +159,7 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
         draw_dashes(canvas, line, color)
         if line:
             end = (line[-1][0], line[-1][1])
-            if guide.kind in ("vertex", "middle", "centre", "crossing", "edge"):
+            if guide.kind in ("vertex", "middle", "center", "crossing", "edge"):
                 draw_ring(canvas, end, 5.0, color, 1.6)
         if guide.kind != "grid" and guide.label not in labels:
             labels.append(guide.label)

@@ -21,9 +21,9 @@ from robocov_app.editor.model.geometry import Box, compute_center, enclose_boxes
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
+Side: TypeAlias = Literal["left", "center", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]
-SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
+SIDES: Final = ("left", "center", "right", "top", "middle", "bottom")
 """Left, center and right move along x; top, middle and bottom along y."""
 
 ALONG_X = SIDES[:3]
@@ -291,7 +291,7 @@ def _align_vertices(sketch: Sketch, selection: Selection, side: Side) -> Change:
 
 
 def _describe_side(side: Side) -> str:
-    return {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")
+    return {"center": "by their centers", "middle": "by their middles"}.get(side, f"at the {side}")
 
 
 def distribute(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
@@ -388,7 +388,7 @@ def _list_boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
 def _compute_level(box: Box, side: Side) -> float:
     """Return the coordinate of a side of a box, or of its center, m."""
     axis = 0 if side in ALONG_X else 1
-    if side in ("centre", "middle"):
+    if side in ("center", "middle"):
         return compute_center(box)[axis]
     return box[axis] if side in ("left", "bottom") else box[axis + 2]
 

@@ -17,7 +17,7 @@ from robocov_app.editor.model.sketch import Owner, Sketch, build_geometry
 from robocov_app.render.surface_cache import Latest
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
-PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
+PointKind: TypeAlias = Literal["vertex", "center", "middle"]
 MANY_VERTICES = 1500  # vertices of a map from which on the window does not wait for its targets
 MAX_EDGES = 8  # edges near a point: where there are more, nothing can be told apart
 
@@ -89,7 +89,7 @@ class SnapTargets:
         wall_corners, _ = _list_outline_edges(collector.walls)
         marks = np.concatenate([to_array([*collector.vertices, *collector.rim_points]), wall_corners])
         centers = to_array(collector.centers)
-        points_by_kind = {"vertex": marks, "centre": centers, "middle": (starts + ends) / 2}
+        points_by_kind = {"vertex": marks, "center": centers, "middle": (starts + ends) / 2}
         self._trees = {
             kind: (cKDTree(points), points) for kind, points in points_by_kind.items() if len(points)
         }

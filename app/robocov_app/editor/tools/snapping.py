@@ -29,7 +29,7 @@ __all__ = [
     "snap_point",
 ]
 
-SnapKind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
+SnapKind: TypeAlias = Literal["vertex", "middle", "center", "crossing", "edge", "angle", "aligned", "grid"]
 KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
 
@@ -50,7 +50,7 @@ class SnapMode(NamedTuple):
 
 SNAPS: dict[str, SnapMode] = {
     "grid": SnapMode("Grid", frozenset({"grid"})),
-    "vertices": SnapMode("Vertices", frozenset({"vertex", "middle", "centre", "crossing"})),
+    "vertices": SnapMode("Vertices", frozenset({"vertex", "middle", "center", "crossing"})),
     "edges": SnapMode("Edges", frozenset({"edge"})),
     "angles": SnapMode("Angles", frozenset({"angle"})),
     "alignment": SnapMode("Alignment", frozenset({"aligned"})),
@@ -312,7 +312,7 @@ class _SnapSearch:
 
     def list_marks_and_crossings(self) -> Iterator[Snap]:
         """Yield the snaps to centers, middles of edges and crossings of edges."""
-        yield from self.list_marks("centre", "middle")
+        yield from self.list_marks("center", "middle")
         if "crossing" in self.settings.kinds:
             for edge, other in combinations(self.list_edges(), 2):
                 crossing = other.find_crossing(edge)

@@ -216,7 +216,7 @@ def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
     group.add("align:right", "Align right sides", partial(actions.align, editor, "right"), "alt+right")
     group.add("align:top", "Align tops", partial(actions.align, editor, "top"), "alt+up")
     group.add("align:bottom", "Align bottoms", partial(actions.align, editor, "bottom"), "alt+down")
-    group.add("align:centre", "Align middles across", partial(actions.align, editor, "centre"), "alt+c")
+    group.add("align:center", "Align middles across", partial(actions.align, editor, "center"), "alt+c")
     group.add("align:middle", "Align middles in height", partial(actions.align, editor, "middle"), "alt+m")
     group.add_edit("distribute:x", "Equal gaps across", transform.distribute, "alt+x", value="x")
     group.add_edit("distribute:y", "Equal gaps in height", transform.distribute, "alt+y", value="y")

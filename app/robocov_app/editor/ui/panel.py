@@ -147,7 +147,7 @@ OBJECT_BUTTONS: dict[str, tuple[tuple[Button, ...], ...]] = {
         ),
         (
             Button("Left", "align:left"),
-            Button("Centre", "align:centre"),
+            Button("Center", "align:center"),
             Button("Right", "align:right"),
             Button("Gaps ↔", "distribute:x"),
         ),
