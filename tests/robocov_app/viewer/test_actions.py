@@ -158,7 +158,7 @@ def state_of(driver: Driver) -> list[object]:
     told += [
         viewer.tool.build_preview(session),
         session.displayed.get_setup(session.timeline.panes[0]),
-        its.help,
+        its.is_help_open,
         its.dialogs.is_open,
         its.tour,
         its.panel.tab,
@@ -199,9 +199,9 @@ def shared(tmp_path_factory: pytest.TempPathFactory):
 def prepared(driver: Driver) -> Driver:
     """Bring a window into a state in which every action has something to do."""
     its, viewer, session = driver.window, driver.viewer, driver.session
-    its.help = False
+    its.is_help_open = False
     its.dialogs.close()
-    its._end_tour()
+    its.lesson.end()
     viewer.attempt(lambda: viewer.files.open_map("square"))
     while len(session.timeline.panes) > 1:
         session.remove_pane(session.timeline.panes[-1])

@@ -91,7 +91,7 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
         play(driver)
         last = state(driver.session)
         workspace = driver.viewer.files.workspace
-        workspace._when = -1e9
+        workspace._draft_time = -1e9
         workspace.save_draft({})
         assert workspace._autosaver.flush()
         workspace._autosaver._lock.close()  # kill -9

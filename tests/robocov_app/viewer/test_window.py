@@ -121,7 +121,7 @@ def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> N
     driver.frames(15)
     driver.key("f9")
     path = tmp_path / "robocov-1.mp4"
-    assert driver.viewer.message.startswith(f"film saved: {path}") and not driver.viewer.view.is_recording
+    assert driver.viewer.message.startswith(f"video saved: {path}") and not driver.viewer.view.is_recording
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert seconds == pytest.approx(75 * FRAME, abs=0.15) and count == pytest.approx(45, abs=4)
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)

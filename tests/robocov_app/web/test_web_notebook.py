@@ -66,7 +66,7 @@ def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
 
 def test_a_simulation_goes_on_in_the_window(monkeypatch):
     def opened(call, height):
-        return Session.open(load_session(Path(call[1]))).panes[0].simulation
+        return Session.open(load_session(Path(call[1]))).timeline.panes[0].simulation
 
     monkeypatch.setattr("robocov_app.notebook.LiveWindow", opened)
     rooms = robocov.load_map("rooms")

@@ -355,10 +355,12 @@ class Session:
         edit = compare_obstacles(self.displayed.environment, environment)
         before = {pane.number: self.displayed.get_positions(pane) for pane in self.timeline.panes}
         self.apply(edit, "obstacle", description)
-        counts = []
+        counts = [0]
         for pane in self.timeline.panes:
-            displacements = pane.simulation.positions - before[pane.number]
-            counts.append(int((np.hypot(*displacements.T) > MIN_PUSH_M).sum()))
+            # An edit in the past may bring back a pane that was removed later.
+            if pane.number in before:
+                displacements = pane.simulation.positions - before[pane.number]
+                counts.append(int((np.hypot(*displacements.T) > MIN_PUSH_M).sum()))
         return max(counts)
 
     def paint(self, dabs: tuple[Point, ...], radius: float, *, lowers: bool, stroke: object) -> None:
