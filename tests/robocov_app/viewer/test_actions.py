@@ -160,7 +160,7 @@ def state_of(driver: Driver) -> list[object]:
         session.displayed.get_setup(session.timeline.panes[0]),
         its.is_help_open,
         its.dialogs.is_open,
-        its.tour,
+        its.lesson.player,
         its.panel.tab,
     ]
     return told
