@@ -237,3 +237,12 @@ def test_the_other_unicycles_keep_their_headings_when_one_fails():
     steering = pane.simulation.steering
     session.fail_robot(1)
     assert (pane.simulation.steering == steering[1:]).all()
+
+
+def test_an_edit_before_a_pane_was_removed_brings_it_back():
+    session = advance_session(start_session(RAPF, LLOYD), 5)
+    session.remove_pane(session.timeline.panes[0])
+    session.show_time(0.0)
+    session.edit_map(add_pillar(session.displayed.environment), "pillar added")
+    assert len(session.timeline.panes) == 2
+    assert [len(pane.simulation.environment.obstacles) for pane in session.timeline.panes] == [3, 3]
