@@ -75,10 +75,10 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     total = 0
     for i in range(n):
         if total + n > len(second):
-            room = 2 * (total + n)
-            first = _enlarge(first, total, room)
-            second = _enlarge(second, total, room)
-            distance = _enlarge(distance, total, room)
+            capacity = 2 * (total + n)
+            first = _enlarge(first, total, capacity)
+            second = _enlarge(second, total, capacity)
+            distance = _enlarge(distance, total, capacity)
         begin = total
         row = find_bin(points[i, 1] - bins.bottom, bins.scale)
         column = find_bin(points[i, 0] - bins.left, bins.scale)
@@ -100,9 +100,9 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
 
 
 @kernel
-def _enlarge(values: NDArray[Any], used: int, room: int) -> NDArray[Any]:
-    """Return an array of length `room` that begins with the used values."""
-    larger = np.empty(room, values.dtype)
+def _enlarge(values: NDArray[Any], used: int, capacity: int) -> NDArray[Any]:
+    """Return an array of length `capacity` that begins with the used values."""
+    larger = np.empty(capacity, values.dtype)
     larger[:used] = values[:used]
     return larger
 

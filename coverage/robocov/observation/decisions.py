@@ -65,20 +65,20 @@ def check_decision(returned: Any, count: int, controller: str, time: float, sour
         If it is not a `Decision`, or its forces are not finite numbers of shape (count, 2).
     """
     where = f"controller {controller!r}: decide(seen, memory)"
-    when = f" at {time:.3f} s{source}"
+    suffix = f" at {time:.3f} s{source}"
     if not isinstance(returned, Decision):
         hint = " (is a return statement missing?)" if returned is None else ""
-        raise ParameterError(f"{where} returned {quote(returned)}{hint}{when}, expected a Decision")
+        raise ParameterError(f"{where} returned {quote(returned)}{hint}{suffix}, expected a Decision")
     decision: Decision = returned
-    forces = _to_rows(decision.forces, count, f"{where} returned forces", when)
+    forces = _to_rows(decision.forces, count, f"{where} returned forces", suffix)
     goals = decision.goals
     if goals is not None:
-        goals = _to_rows(goals, count, f"{where} returned goals", when)
+        goals = _to_rows(goals, count, f"{where} returned goals", suffix)
     if forces is not decision.forces or goals is not decision.goals:
         decision = replace(decision, forces=forces, goals=goals)
     if not _is_finite(forces):
         robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
-        got = f"the force {forces[robot].tolist()} for robot {robot + 1}{when}"
+        got = f"the force {forces[robot].tolist()} for robot {robot + 1}{suffix}"
         raise ParameterError(f"{where} returned {got}, expected two finite numbers in newtons")
     return decision
 
@@ -170,11 +170,14 @@ def _is_finite(forces: Array) -> bool:
     return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
 
 
-def _to_rows(values: Any, count: int, name: str, when: str = "") -> Array:
-    """Convert two numbers for each robot to a (count, 2) array; an array of floats is not copied."""
+def _to_rows(values: Any, count: int, name: str, suffix: str = "") -> Array:
+    """Convert two numbers for each robot to a (count, 2) array; an array of floats is not copied.
+
+    In messages, `suffix` follows the values.
+    """
     array = to_numbers(values)
     if array is None:
-        raise ParameterError(f"{name} {quote(values)}{when}, expected numbers of shape {(count, 2)}")
+        raise ParameterError(f"{name} {quote(values)}{suffix}, expected numbers of shape {(count, 2)}")
     if array.shape != (count, 2):
-        raise ParameterError(f"{name} of shape {array.shape}{when}, expected {(count, 2)}")
+        raise ParameterError(f"{name} of shape {array.shape}{suffix}, expected {(count, 2)}")
     return array

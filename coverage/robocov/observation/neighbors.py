@@ -195,16 +195,15 @@ class NeighborPositions(NamedTuple):
         return cls(neighbors.indptr, neighbors.indices, positions)
 
     @classmethod
-    def build_empty(cls, robots: int) -> NeighborPositions:
+    def build_empty(cls, robot_count: int) -> NeighborPositions:
         """Build the positions for robots that have no neighbors.
 
         Parameters
         ----------
-        robots : int
-            Number of robots n.
+        robot_count : int
 
         Returns
         -------
         NeighborPositions
         """
-        return cls(np.zeros(robots + 1, dtype=np.intp), _NO_INDICES, _NO_POSITIONS)
+        return cls(np.zeros(robot_count + 1, dtype=np.intp), _NO_INDICES, _NO_POSITIONS)

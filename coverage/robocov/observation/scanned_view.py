@@ -46,7 +46,7 @@ class Windows(NamedTuple):
     """(w,) Index of the first ray that passes the corner."""
     across: Array
     """(w, 2) t, the direction in which the robot has to move to see more."""
-    corner: Array
+    corner_distance: Array
     """(w,) m, ρ."""
 
 
@@ -100,7 +100,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
     robots = []
     rays = []
     across = []
-    corners = []
+    corner_distances = []
     # Compare each ray with the one before it, counter-clockwise and clockwise.
     for side in (1, -1):
         previous_depth = np.roll(view.distances, side, axis=1)
@@ -111,14 +111,14 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
         rays.append(ray)
         # The direction of the ray, turned by a right angle.
         across.append(side * directions[ray][:, ::-1] * [-1.0, 1.0])
-        corners.append(previous_depth[robot, ray])
+        corner_distances.append(previous_depth[robot, ray])
     robot = np.concatenate(robots)
     order = np.argsort(robot, kind="stable")
     return Windows(
         robot=robot[order],
         ray=np.concatenate(rays)[order],
         across=np.concatenate(across)[order],
-        corner=np.concatenate(corners)[order],
+        corner_distance=np.concatenate(corner_distances)[order],
     )
 
 
@@ -141,9 +141,9 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
         `Windows`): the growth per meter of the robot's motion.
     """
     edge_depths = depths[windows.robot, windows.ray]
-    beyond_corner = np.maximum(edge_depths - windows.corner[:, None], 0.0)
+    beyond_corner = np.maximum(edge_depths - windows.corner_distance[:, None], 0.0)
     integral = (weight[windows.robot, windows.ray] * beyond_corner).sum(axis=1)
-    integral /= np.maximum(windows.corner, _MIN_CORNER_DISTANCE_M)
+    integral /= np.maximum(windows.corner_distance, _MIN_CORNER_DISTANCE_M)
     integral *= view.distances[windows.robot, windows.ray] / depths.shape[2]
     return np.asarray(integral[:, None] * windows.across)
 
@@ -206,26 +206,26 @@ def compute_step_fractions(gradient: Array, previous: Array | None, fraction: Ar
 
 
 @kernel
-def is_behind_wall(x: float, y: float, walls: Array) -> bool:
+def is_behind_wall(x: float, y: float, wall_distances: Array) -> bool:
     """Return whether a point, relative to the robot, is farther away than the wall in its direction.
 
     Parameters
     ----------
     x, y : float, m
-    walls : (rays,) array, m
+    wall_distances : (rays,) array, m
         Distances of the walls along the robot's rays; infinite where there is none.
 
     Returns
     -------
     bool
     """
-    rays = len(walls)
+    rays = len(wall_distances)
     ray = math.floor(math.atan2(y, x) * (rays / (2.0 * math.pi)) + 0.5) % rays
-    return bool(x * x + y * y > walls[ray] ** 2)
+    return bool(x * x + y * y > wall_distances[ray] ** 2)
 
 
 @kernel
-def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> bool:
+def is_path_clear(x: float, y: float, dx: float, dy: float, wall_distances: Array) -> bool:
     """Return whether a straight path stays in front of the walls that the robot sees.
 
     Parameters
@@ -234,7 +234,7 @@ def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> boo
         Start of the path, in view of the robot and relative to it.
     dx, dy : float, m
         Displacement from the start to the end of the path.
-    walls : (rays,) array, m
+    wall_distances : (rays,) array, m
         As for `is_behind_wall`.
 
     Returns
@@ -242,6 +242,6 @@ def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> boo
     bool
     """
     for k in range(1, _PATH_PARTS):
-        if is_behind_wall(x + dx * k / _PATH_PARTS, y + dy * k / _PATH_PARTS, walls):
+        if is_behind_wall(x + dx * k / _PATH_PARTS, y + dy * k / _PATH_PARTS, wall_distances):
             return False
     return True

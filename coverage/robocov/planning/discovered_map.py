@@ -266,7 +266,7 @@ def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, 
     """Mark unknown cells between the ends of neighboring rays as presumed walls; confirm walls there."""
     rows, columns = state.shape
     half_cell = 0.5 * grid.cell_size
-    steps = math.ceil(MAX_BRIDGED_GAP_M / half_cell)
+    step_count = math.ceil(MAX_BRIDGED_GAP_M / half_cell)
     for ray in range(len(ends)):
         next_ray = (ray + 1) % len(ends)
         dx = ends[next_ray, 0] - ends[ray, 0]
@@ -274,9 +274,9 @@ def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, 
         gap = math.sqrt(dx * dx + dy * dy)
         if not (is_hit[ray] and is_hit[next_ray] and half_cell < gap < MAX_BRIDGED_GAP_M):
             continue
-        for step in range(1, steps):
-            row = find_row(ends[ray, 1] + dy * step / steps, grid, rows)
-            column = find_column(ends[ray, 0] + dx * step / steps, grid, columns)
+        for step in range(1, step_count):
+            row = find_row(ends[ray, 1] + dy * step / step_count, grid, rows)
+            column = find_column(ends[ray, 0] + dx * step / step_count, grid, columns)
             if state[row, column] == UNKNOWN:
                 state[row, column] = PRESUMED_WALL
             elif state[row, column] >= WALL:

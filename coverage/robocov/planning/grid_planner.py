@@ -31,8 +31,9 @@ from robocov.planning.window import Window
 _MAX_ROUTE_ENDS = 12
 """Number of nodes that are tried as the first node of a route, and as the last."""
 _MAX_SOURCES = 180
-"""A plan chooses among at most this many nodes, or one in `_NODES_PER_SOURCE` nodes if that is more."""
+"""Maximum number of candidate goals of a team, unless one in `_NODES_PER_SOURCE` nodes is more."""
 _NODES_PER_SOURCE = 9
+"""Number of nodes per candidate goal in a large window."""
 _MAX_CACHED_POSITIONS = 1000
 """Maximum number of positions whose visible nodes are cached."""
 
@@ -41,7 +42,8 @@ _MAX_CACHED_POSITIONS = 1000
 class GridPlanner(MapWindow):
     """Distances and routes in a window of a discovered map, around its walls.
 
-    A planner computes each result only once, and robots that share a map share the planner.
+    A planner computes each result only once, and robots that share a map share the planner. The m nodes are
+    given by their indices. For *roomy* nodes and *tight* cells, see `MapWindow`.
 
     Parameters
     ----------
@@ -180,12 +182,13 @@ class GridPlanner(MapWindow):
         -------
         list of (m,) arrays, m
         """
-        return [
-            self._distances_of_node[node]
-            if node in self._distances_of_node
-            else self._search([node], [0.0], limit)
-            for node in nodes
-        ]
+        tables = []
+        for node in nodes:
+            distances = self._distances_of_node.get(node)
+            if distances is None:
+                distances = self._search([node], [0.0], limit)
+            tables.append(distances)
+        return tables
 
     def compute_distance_table(self, nodes: IntArray) -> Array:
         """Compute the distances from each of the given nodes to all nodes.
@@ -212,15 +215,16 @@ class GridPlanner(MapWindow):
         -------
         (m,) array, m
         """
-        visible = [self._find_visible_nodes(position) for position in positions]
-        lengths = [
-            compute_point_distances(self.nodes[nodes], position)
-            for nodes, position in zip(visible, positions, strict=True)
-        ]
-        return self._search(np.concatenate([[], *visible]), np.concatenate([[], *lengths]))
+        first_nodes = [np.empty(0, dtype=np.intp)]
+        lengths = [np.empty(0)]
+        for position in positions:
+            visible = self._find_visible_nodes(position)
+            first_nodes.append(visible)
+            lengths.append(compute_point_distances(self.nodes[visible], position))
+        return self._search(np.concatenate(first_nodes), np.concatenate(lengths))
 
     def _search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
-        """Compute the distance from each node to the nearest of `nodes`, plus the offset of that one."""
+        """Compute the distance from each node to the nearest of `nodes`, which start with offsets."""
         return compute_distances(
             self._edges,
             self.spacing,
@@ -289,8 +293,8 @@ class GridPlanner(MapWindow):
         is_obstructing : (h, w) bool array
             For example `is_blocked` or `is_tight`.
         ignored_length : float, m
-            Cells closer to the position do not count: a robot may stand too close to a wall, where a route
-            can start but not pass.
+            Cells closer to the position do not count: a robot may be too close to a wall, where a route can
+            start but not pass.
 
         Returns
         -------

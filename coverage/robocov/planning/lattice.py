@@ -18,6 +18,8 @@ from robocov.compiled import kernel
 
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half of the moves; the others are their opposites."""
+_MAX_MOVE = 2
+"""Maximum number of rows or columns in one move."""
 _UNKNOWN_DETOUR = 0.4
 """Fraction by which routes through unknown cells are assumed to be longer, since walls may turn up there."""
 _SIGHT_STEP_CELLS = 0.5
@@ -30,7 +32,7 @@ class LatticeCells(NamedTuple):
     is_tight: BoolArray
     """(h, w) Whether each cell is too close to a wall."""
     is_blocked: BoolArray
-    """(h, w) Whether each cell is a wall."""
+    """(h, w) Whether each cell is a wall or a presumed wall."""
     is_unknown: BoolArray
     """(h, w) Whether each cell has not been seen."""
     is_roomy: BoolArray
@@ -76,8 +78,10 @@ class _Moves(NamedTuple):
     """(k,) Number of columns of nodes to the right."""
     lengths: Array
     """(k,) m"""
-    crossed: IntArray
-    """(c, 2) Rows and columns of the cells that the moves cross, relative to the cell of the node."""
+    crossed_rows: IntArray
+    """(c,) Row of each cell that the moves cross, relative to the cell of the node."""
+    crossed_columns: IntArray
+    """(c,) Column of each of these cells."""
     first_crossed: IntArray
     """(k + 1,) The cells of move k are those from ``first_crossed[k]`` up to ``first_crossed[k + 1]``."""
 
@@ -110,19 +114,21 @@ def _build_moves(stride: int, spacing: float) -> _Moves:
     """Build the moves and find the cells that they cross."""
     crossed = [_list_crossed_cells(up, right, stride) for up, right in _MOVES]
     counts = np.array([len(cells) for cells in crossed])
-    steps = np.array(_MOVES)
+    rows, columns = np.array(_MOVES).T.copy()
+    crossed_rows, crossed_columns = np.concatenate(crossed).T.copy()
     return _Moves(
-        rows=steps[:, 0].copy(),
-        columns=steps[:, 1].copy(),
+        rows=rows,
+        columns=columns,
         lengths=np.array([math.hypot(*move) for move in _MOVES]) * spacing,
-        crossed=np.concatenate(crossed),
+        crossed_rows=crossed_rows,
+        crossed_columns=crossed_columns,
         first_crossed=np.concatenate([[0], np.cumsum(counts)]),
     )
 
 
 @lru_cache(maxsize=512)
 def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, int], ...]:
-    """Return the row and column, relative to a node, of each cell that the line to a neighbor crosses."""
+    """List the row and column, relative to a node, of each cell that the line to a neighbor crosses."""
     along = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
     row = np.rint(along * up * stride).astype(int)
     column = np.rint(along * right * stride).astype(int)
@@ -133,9 +139,9 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
     """Compute the lengths of all moves from all nodes, (m, 5, 5) m, infinite where there is no edge.
 
-    The entry [node, 2 + up, 2 + right] belongs to the move by that many rows and columns.
+    The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] belongs to the move by that many rows and columns.
     """
-    lengths = np.full((rows * columns, 5, 5), np.inf)
+    lengths = np.full((rows * columns, 2 * _MAX_MOVE + 1, 2 * _MAX_MOVE + 1), np.inf)
     for move in range(len(moves.lengths)):
         up = moves.rows[move]
         right = moves.columns[move]
@@ -147,23 +153,23 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node_column = stride // 2 + column * stride
                 is_passable = True
                 is_without_wall = True
-                unknown_cells = 0
+                unknown_count = 0
                 for k in range(first, stop):
-                    i = node_row + moves.crossed[k, 0]
-                    j = node_column + moves.crossed[k, 1]
+                    i = node_row + moves.crossed_rows[k]
+                    j = node_column + moves.crossed_columns[k]
                     is_passable = is_passable and not cells.is_tight[i, j]
                     is_without_wall = is_without_wall and not cells.is_blocked[i, j]
-                    unknown_cells += cells.is_unknown[i, j]
+                    unknown_count += cells.is_unknown[i, j]
                 node = row * columns + column
                 other = (row + up) * columns + column + right
-                length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_cells)
-                # A node without room can be reached from one with room, but not the other way around.
+                length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_count)
+                # A node that is not roomy can be reached from one that is, but not the other way around.
                 is_roomy = cells.is_roomy[node]
                 is_other_roomy = cells.is_roomy[other]
                 if is_passable or (is_without_wall and is_roomy and not is_other_roomy):
-                    lengths[node, 2 + up, 2 + right] = length
+                    lengths[node, _MAX_MOVE + up, _MAX_MOVE + right] = length
                 if is_passable or (is_without_wall and is_other_roomy and not is_roomy):
-                    lengths[other, 2 - up, 2 - right] = length
+                    lengths[other, _MAX_MOVE - up, _MAX_MOVE - right] = length
     return lengths
 
 
@@ -175,11 +181,12 @@ def _compress_edges(lengths: Array, columns: int) -> Edges:
     ends = np.empty(lengths.size, dtype=np.intp)
     first_edge = np.zeros(len(lengths) + 1, dtype=np.intp)
     for node in range(len(lengths)):
-        for up in range(5):
-            for right in range(5):
-                if lengths[node, up, right] < np.inf:
-                    edge_lengths[count] = lengths[node, up, right]
-                    ends[count] = node + (up - 2) * columns + right - 2
+        for up in range(-_MAX_MOVE, _MAX_MOVE + 1):
+            for right in range(-_MAX_MOVE, _MAX_MOVE + 1):
+                length = lengths[node, _MAX_MOVE + up, _MAX_MOVE + right]
+                if length < np.inf:
+                    edge_lengths[count] = length
+                    ends[count] = node + up * columns + right
                     count += 1
         first_edge[node + 1] = count
     return Edges(edge_lengths[:count].copy(), ends[:count].copy(), first_edge)
@@ -213,10 +220,10 @@ def compute_distances(
     that are farther away by less than the shortest edge. No path via one of them can shorten the path to
     another.
     """
-    nodes = len(edges.first_edge) - 1
-    distance = np.full(nodes, np.inf)
-    front = np.empty(nodes, dtype=np.intp)
-    is_in_front = np.zeros(nodes, dtype=np.bool_)
+    node_count = len(edges.first_edge) - 1
+    distance = np.full(node_count, np.inf)
+    front = np.empty(node_count, dtype=np.intp)
+    is_in_front = np.zeros(node_count, dtype=np.bool_)
     front_size = 0
     for k in range(len(sources)):
         node = sources[k]
@@ -225,7 +232,7 @@ def compute_distances(
             front[front_size] = node
             is_in_front[node] = True
             front_size += 1
-    settled = np.empty(nodes, dtype=np.intp)
+    settled = np.empty(node_count, dtype=np.intp)
     while front_size:
         nearest = np.inf
         for k in range(front_size):
@@ -319,12 +326,12 @@ def find_clear_lines(
     longest = 0.0
     for k in range(len(ends)):
         longest = max(longest, lengths[k])
-    steps = math.ceil(longest / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
+    step_count = math.ceil(longest / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
     cells_per_meter = 1.0 / frame.cell_size
     is_clear = np.ones(len(ends), dtype=np.bool_)
     for k in range(len(ends)):
-        for step in range(steps + 1):
-            fraction = step * (1.0 / steps) if step < steps else 1.0
+        for step in range(step_count + 1):
+            fraction = step * (1.0 / step_count) if step < step_count else 1.0
             x = position[0] + (ends[k, 0] - position[0]) * fraction
             y = position[1] + (ends[k, 1] - position[1]) * fraction
             row = math.floor((y - frame.low_y) * cells_per_meter)

@@ -14,6 +14,9 @@ from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap, dilate
 from robocov.planning.openness import MAX_BLOCKS, compute_openness
 from robocov.planning.window import Window
 
+SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
+"""Rows and columns from a cell to those that share a side with it: to the right, above, left and below."""
+
 
 class Frontier(NamedTuple):
     """The unknown cells next to free cells with room for a robot."""
@@ -25,7 +28,7 @@ class Frontier(NamedTuple):
     patches: IntArray
     """(b,) Label of the unknown patch that each cell belongs to, from 1."""
     is_side_free: BoolArray
-    """(b, 4) Whether there is such a free cell to the right, above, to the left and below."""
+    """(b, 4) Whether there is such a free cell in each of the directions of `SIDES`."""
 
 
 class UnknownArea(NamedTuple):
@@ -35,13 +38,16 @@ class UnknownArea(NamedTuple):
     """(p,) Label of the patch, from 1."""
     nodes: IntArray
     """(p,) The node that represents the cells."""
-    expected_cells: Array
+    expected_free_counts: Array
     """(p,) Expected number of free cells."""
 
 
 @dataclass(eq=False)
 class MapWindow:
     """The cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
+
+    A cell is *tight* if its distance from a wall is less than the clearance. A node is *roomy* if the cell in
+    which it lies is not tight.
 
     Parameters
     ----------
@@ -57,7 +63,7 @@ class MapWindow:
 
     @cached_property
     def is_blocked(self) -> BoolArray:
-        """Whether each cell is a wall, (h, w)."""
+        """Whether each cell is a wall, a presumed wall, or outside the region, (h, w)."""
         return self.window.crop(self.known_map.is_blocked, True)
 
     @cached_property
@@ -77,7 +83,7 @@ class MapWindow:
 
     @cached_property
     def is_tight(self) -> BoolArray:
-        """Whether each cell is too close to walls, (h, w)."""
+        """Whether each cell is closer to a wall than the clearance, (h, w)."""
         return dilate(self.is_blocked, self.clearance / self.known_map.raster.cell_size)
 
     @cached_property
@@ -105,18 +111,18 @@ class MapWindow:
 
     @cached_property
     def is_roomy(self) -> BoolArray:
-        """Whether each node has the required clearance, (m,)."""
+        """Whether each node has the clearance, (m,)."""
         stride = self.window.stride
         return np.asarray(~self.is_tight[stride // 2 :: stride, stride // 2 :: stride].ravel())
 
     @cached_property
-    def free_cells(self) -> Array:
+    def free_counts(self) -> Array:
         """Number of free cells that each node represents, (m,)."""
         return self.sum_by_node(self.is_free)
 
     @cached_property
-    def expected_free_cells(self) -> Array:
-        """Number of free cells that each node represents, (m,); unknown cells are weighted by openness."""
+    def expected_free_counts(self) -> Array:
+        """Expected number of free cells that each node represents, (m,): unknown ones count by openness."""
         return self.sum_by_node(self.is_free + self.openness)
 
     @cached_property
@@ -140,10 +146,12 @@ class MapWindow:
         rows, columns = self.patches.nonzero()
         stride = self.window.stride
         nodes = rows // stride * self.window.columns + columns // stride
-        count = len(self.nodes)
-        pairs, index = np.unique(self.patches[rows, columns] * count + nodes, return_inverse=True)
-        expected_cells = np.bincount(index, self.openness[rows, columns]).astype(np.float64)
-        return UnknownArea(patches=pairs // count, nodes=pairs % count, expected_cells=expected_cells)
+        node_count = len(self.nodes)
+        pairs, index = np.unique(self.patches[rows, columns] * node_count + nodes, return_inverse=True)
+        expected_free_counts = np.bincount(index, self.openness[rows, columns]).astype(np.float64)
+        return UnknownArea(
+            patches=pairs // node_count, nodes=pairs % node_count, expected_free_counts=expected_free_counts
+        )
 
     def sum_by_node(self, values: Array | BoolArray) -> Array:
         """Sum the values of the cells that each node represents.

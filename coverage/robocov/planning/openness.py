@@ -28,16 +28,16 @@ _OUTSIDE = 255
 class _BlockGrid(NamedTuple):
     """Square blocks of cells, with counts of the cell sides at which unknown cells border on other cells."""
 
-    unknown_cells: Array
+    unknown_counts: Array
     """(rows, columns) Number of unknown cells in each block."""
-    free_sides: Array
+    free_side_counts: Array
     """(rows, columns) Number of sides between unknown cells of each block and free cells."""
-    wall_sides: Array
+    wall_side_counts: Array
     """(rows, columns) Number of sides between unknown cells of each block and walls."""
-    links_up: Array
-    """(rows + 1, columns + 1) Number of sides between unknown cells of each block and of the one above."""
-    links_right: Array
-    """(rows + 1, columns + 1) Number of sides between unknown cells of each block and of its right one."""
+    link_counts_up: Array
+    """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of the one above."""
+    link_counts_right: Array
+    """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of the next one."""
 
 
 def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks: int = MAX_BLOCKS) -> Array:
@@ -77,7 +77,7 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
     """
     rows, columns = state.shape
     block_side = 1
-    while -(-rows // block_side) * -(-columns // block_side) > max_blocks:
+    while _count_blocks(rows, block_side) * _count_blocks(columns, block_side) > max_blocks:
         block_side += 1
     cells = np.where(is_outside, _OUTSIDE, state).astype(np.uint8)
     blocks = _build_blocks(cells, block_side)
@@ -86,11 +86,17 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
 
 
 @kernel
+def _count_blocks(cell_count: int, block_side: int) -> int:
+    """Return the number of blocks that a row or column of cells extends over, rounded up."""
+    return (cell_count + block_side - 1) // block_side
+
+
+@kernel
 def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
     """Build the blocks of a grid, in which `_OUTSIDE` marks the cells to ignore."""
     rows, columns = cells.shape
-    block_rows = -(-rows // block_side)
-    block_columns = -(-columns // block_side)
+    block_rows = _count_blocks(rows, block_side)
+    block_columns = _count_blocks(columns, block_side)
     blocks = _BlockGrid(
         np.zeros((block_rows, block_columns)),
         np.zeros((block_rows, block_columns)),
@@ -104,17 +110,17 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
             j = column // block_side
             state = cells[row, column]
             if state == UNKNOWN:
-                blocks.unknown_cells[i, j] += 1.0
+                blocks.unknown_counts[i, j] += 1.0
             if row + 1 < rows:
                 i_above = (row + 1) // block_side
                 if state == UNKNOWN and cells[row + 1, column] == UNKNOWN and i_above > i:
-                    blocks.links_up[i, j] += 1.0
+                    blocks.link_counts_up[i, j] += 1.0
                 _count_side(state, cells[row + 1, column], i, j, blocks)
                 _count_side(cells[row + 1, column], state, i_above, j, blocks)
             if column + 1 < columns:
                 j_right = (column + 1) // block_side
                 if state == UNKNOWN and cells[row, column + 1] == UNKNOWN and j_right > j:
-                    blocks.links_right[i, j] += 1.0
+                    blocks.link_counts_right[i, j] += 1.0
                 _count_side(state, cells[row, column + 1], i, j, blocks)
                 _count_side(cells[row, column + 1], state, i, j_right, blocks)
     return blocks
@@ -125,32 +131,32 @@ def _count_side(state: int, neighbor_state: int, i: int, j: int, blocks: _BlockG
     """Count the side between a cell in block (i, j) and its neighbor if only the cell itself is unknown."""
     if state == UNKNOWN and neighbor_state != UNKNOWN and neighbor_state != _OUTSIDE:
         if neighbor_state == FREE:
-            blocks.free_sides[i, j] += 1.0
+            blocks.free_side_counts[i, j] += 1.0
         else:
-            blocks.wall_sides[i, j] += 1.0
+            blocks.wall_side_counts[i, j] += 1.0
 
 
 @kernel
 def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
-    """Compute the openness of blocks, (rows + 1, columns + 1), by successive over-relaxation.
+    """Compute the openness of blocks, (rows + 1, columns + 1), by successive overrelaxation.
 
     The last row and the last column are padding without links; the index -1 also refers to them.
     """
-    block_rows, block_columns = blocks.unknown_cells.shape
-    up = blocks.links_up
-    right = blocks.links_right
+    block_rows, block_columns = blocks.unknown_counts.shape
+    up = blocks.link_counts_up
+    right = blocks.link_counts_right
     u = np.full((block_rows + 1, block_columns + 1), PRIOR_OPENNESS)
     for _ in range(_MAX_ITERATIONS):
         max_step = 0.0
         for i in range(block_rows):
             for j in range(block_columns):
-                if blocks.unknown_cells[i, j] == 0.0:
+                if blocks.unknown_counts[i, j] == 0.0:
                     continue
                 # The centers of two blocks are one side apart, but the border of a block is only half a side
                 # from its center, so that the flow across it is twice as large.
-                leak = blocks.unknown_cells[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
-                flow = 2.0 * blocks.free_sides[i, j] + leak * PRIOR_OPENNESS
-                links = 2.0 * (blocks.free_sides[i, j] + blocks.wall_sides[i, j]) + leak
+                leak = blocks.unknown_counts[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
+                flow = 2.0 * blocks.free_side_counts[i, j] + leak * PRIOR_OPENNESS
+                links = 2.0 * (blocks.free_side_counts[i, j] + blocks.wall_side_counts[i, j]) + leak
                 flow += up[i, j] * u[i + 1, j] + up[i - 1, j] * u[i - 1, j]
                 flow += right[i, j] * u[i, j + 1] + right[i, j - 1] * u[i, j - 1]
                 links += up[i, j] + up[i - 1, j] + right[i, j] + right[i, j - 1]

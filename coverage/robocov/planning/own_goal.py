@@ -10,10 +10,15 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.map_window import SIDES
 from robocov.planning.team_placement import UNREACHABLE_M
 
 _MAX_STEPS = 6
 """Maximum number of steps of a search, each to a neighboring node."""
+_LIMIT_PER_CELL_RADIUS = 1.5
+"""Limit of the distances of a search, divided by the radius of the robot's cell."""
+_LIMIT_MARGIN_STEPS = 4.0
+"""Number of spacings of nodes that are added to this limit."""
 
 
 class OwnGoal(NamedTuple):
@@ -93,8 +98,8 @@ class _NodeSearch:
         self._other_distances: Array = np.minimum(other_distances, UNREACHABLE_M)
         own_distances = distances[self.targets]
         cell_radius = float(own_distances[own_distances < self._other_distances].max(initial=0.0))
-        # Nodes farther away cannot become part of the robot's cell within the few steps of the search.
-        self._limit = 1.5 * cell_radius + 4.0 * planner.spacing
+        # Nodes beyond the limit cannot become part of the robot's cell within the few steps of the search.
+        self._limit = _LIMIT_PER_CELL_RADIUS * cell_radius + _LIMIT_MARGIN_STEPS * planner.spacing
         self._node_count = len(weights)
         self._distances: dict[int, Array] = {}
         self.costs: dict[int, float] = {}
@@ -121,16 +126,16 @@ class _NodeSearch:
 
 
 def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
-    """Return the nodes to the right, above, to the left and below; -1 where there is no roomy node."""
+    """Return the four nodes next to a node, in the order of `SIDES`; -1 where there is no roomy node."""
     rows = planner.window.rows
     columns = planner.window.columns
     row, column = divmod(node, columns)
-    is_inside = (column + 1 < columns, row + 1 < rows, column > 0, row > 0)
-    neighbors = (node + 1, node + columns, node - 1, node - columns)
-    return [
-        neighbor if inside and planner.is_roomy[neighbor] else -1
-        for neighbor, inside in zip(neighbors, is_inside, strict=True)
-    ]
+    neighbors = []
+    for up, right in SIDES:
+        is_inside = 0 <= row + up < rows and 0 <= column + right < columns
+        neighbor = node + up * columns + right
+        neighbors.append(neighbor if is_inside and planner.is_roomy[neighbor] else -1)
+    return neighbors
 
 
 def _refine_goal(

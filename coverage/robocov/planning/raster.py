@@ -13,6 +13,9 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.observation.region import Region
 
+_ROUNDING_CELLS = 1e-9
+"""Length, in cells, that is attributed to rounding: it does not add another row or column."""
+
 
 class CellGrid(NamedTuple):
     """Lower left corner and cell size of a raster, for kernels."""
@@ -66,9 +69,8 @@ class Raster:
     def shape(self) -> tuple[int, int]:
         """Number of rows and of columns."""
         low_x, low_y, high_x, high_y = self.region.bounds
-        # Rounding errors at a border between cells must not add a row or column.
-        rows = max(1, math.ceil((high_y - low_y) / self.cell_size - 1e-9))
-        columns = max(1, math.ceil((high_x - low_x) / self.cell_size - 1e-9))
+        rows = max(1, math.ceil((high_y - low_y) / self.cell_size - _ROUNDING_CELLS))
+        columns = max(1, math.ceil((high_x - low_x) / self.cell_size - _ROUNDING_CELLS))
         return rows, columns
 
     @cached_property

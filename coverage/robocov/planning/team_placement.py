@@ -20,6 +20,8 @@ from robocov.planning.grid_planner import GridPlanner
 
 UNREACHABLE_M = 1e9
 """Finite stand-in for the distance to a node that no robot can reach."""
+_MAX_SQUARED_LENGTH_M2 = 1e9
+"""Finite stand-in for the squared length of a path that does not exist."""
 _MAX_ROBOTS_FOR_THOROUGH_SEARCH = 8
 """Up to this team size, the search also tries to remove two or three goals at once."""
 
@@ -66,7 +68,7 @@ def compute_node_weights(
     (m,) array
         Number of free cells that each node represents, times the density.
     """
-    weights = planner.free_cells if only_known else planner.expected_free_cells
+    weights = planner.free_counts if only_known else planner.expected_free_counts
     if density is not None and not density.is_uniform:
         weights = weights * density.evaluate(planner.nodes)
     return weights
@@ -124,11 +126,11 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     )
 
 
-def _choose_former_sources(nodes: Array, team: TeamSituation) -> IntArray:
+def _choose_former_sources(source_positions: Array, team: TeamSituation) -> IntArray:
     """Return the source nearest to each former goal, all different; fixed robots choose first."""
     chosen = np.full(len(team.positions), -1, dtype=np.intp)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
-        squared_distances = ((nodes - team.former_goals[robot]) ** 2).sum(axis=1)
+        squared_distances = ((source_positions - team.former_goals[robot]) ** 2).sum(axis=1)
         squared_distances[chosen[chosen >= 0]] = np.inf
         chosen[robot] = squared_distances.argmin()
     return chosen
@@ -152,15 +154,29 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
 
 
 def _assign_goals(
-    nodes: Array, distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
+    source_positions: Array, distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
 ) -> Array:
-    """Assign goals to robots with the smallest sum of squared path lengths; return them by robot, (k, 2) m.
+    """Assign the chosen sources to robots as goals, so that the sum of squared path lengths is minimal.
 
-    `distances`, (c, k) m, are those from all sources, which are at `nodes`, to the chosen ones.
+    Parameters
+    ----------
+    source_positions : (c, 2) array, m
+    distances : (c, k) array, m
+        Distances from all sources to the chosen ones.
+    chosen : (k,) int array
+        The chosen sources. Those of fixed robots stay theirs.
+    team : TeamSituation
+    min_saving : float
+        Fraction of the sum that an exchange of goals must save.
+
+    Returns
+    -------
+    (k, 2) array, m
+        The goal of each robot.
     """
     mobile = np.flatnonzero(~team.is_fixed)
-    starts = [int(((nodes - team.positions[robot]) ** 2).sum(axis=1).argmin()) for robot in mobile]
-    squared_lengths = np.minimum(distances[starts][:, mobile] ** 2, UNREACHABLE_M)
+    starts = [_find_nearest(source_positions, team.positions[robot]) for robot in mobile]
+    squared_lengths = np.minimum(distances[starts][:, mobile] ** 2, _MAX_SQUARED_LENGTH_M2)
     _, assignment = scipy.optimize.linear_sum_assignment(squared_lengths)
     unchanged = np.arange(len(mobile))
     if min_saving:
@@ -169,5 +185,10 @@ def _assign_goals(
         if assigned_sum > (1.0 - min_saving) * unchanged_sum:
             assignment = unchanged
     goals = team.former_goals.copy()
-    goals[mobile] = nodes[chosen[mobile[assignment]]]
+    goals[mobile] = source_positions[chosen[mobile[assignment]]]
     return goals
+
+
+def _find_nearest(points: Array, position: Array) -> int:
+    """Return the index of the point nearest to a position."""
+    return int(((points - position) ** 2).sum(axis=1).argmin())

@@ -6,6 +6,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.map_window import SIDES
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
@@ -48,16 +49,17 @@ def find_viewpoint(
     unknown = planner.unknown_area
     stakes = np.bincount(
         unknown.patches,
-        cell_distances[unknown.nodes] * unknown.expected_cells,
+        cell_distances[unknown.nodes] * unknown.expected_free_counts,
         minlength=1 + unknown.patches.max(initial=0),
     )
     frontier_stakes = stakes[frontier.patches]
     is_worth_visiting = frontier_stakes > min_stake
     if not is_worth_visiting.any():
         return None
-    # The free cells to the right of, above, to the left of and below each unknown one.
-    row = frontier.rows[is_worth_visiting, None] + [0, 1, 0, -1]
-    column = frontier.columns[is_worth_visiting, None] + [1, 0, -1, 0]
+    # The cells on the four sides of each unknown one; `frontier.is_side_free` tells which of them are free.
+    rows_up, columns_right = np.array(SIDES).T
+    row = frontier.rows[is_worth_visiting, None] + rows_up
+    column = frontier.columns[is_worth_visiting, None] + columns_right
     node = row // window.stride * window.columns + column // window.stride
     node = np.clip(node, 0, len(path_lengths) - 1)
     stake_per_length = frontier_stakes[is_worth_visiting, None] / (1.0 + path_lengths[node])

@@ -19,8 +19,15 @@ from robocov.compiled import kernel
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
 """Two walls face each other at a point if the directions to them differ by at least this angle."""
-_NEIGHBORS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
-"""The eight neighbors of a cell, in circular order. The even ones share a side with it."""
+_NEIGHBOR_STEPS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
+"""Rows and columns from a cell to its eight neighbors, in circular order.
+
+Neighbors with an even index share a side with the cell.
+"""
+_UP = 0
+"""Column of `_NEIGHBOR_STEPS`: number of rows up."""
+_RIGHT = 1
+"""Column of `_NEIGHBOR_STEPS`: number of columns to the right."""
 
 
 class VoronoiRoadmap(NamedTuple):
@@ -56,12 +63,12 @@ class VoronoiRoadmap(NamedTuple):
         """
         is_graph = find_voronoi_cells(is_roomy)
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_graph) / max_vertices)))
-        first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBORS)
+        first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBOR_STEPS)
         vertices = np.column_stack(np.divmod(first_cells, is_roomy.shape[1]))
         starts, ends = _list_adjacent_groups(vertex_of_cell)
         lengths = compute_point_distances(vertices[starts], vertices[ends])
         graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
-        _spread_groups(vertex_of_cell, is_free, _NEIGHBORS[::2])
+        _spread_groups(vertex_of_cell, is_free, _NEIGHBOR_STEPS[::2])
         return cls(
             vertices=vertices,
             distances=dijkstra(graph, directed=False),
@@ -102,12 +109,12 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
         is_between_walls[after] |= is_facing
     order = np.flatnonzero(is_graph)
     order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
-    _thin(is_graph, is_between_walls & is_graph, order, _NEIGHBORS)
+    _thin(is_graph, is_between_walls & is_graph, order, _NEIGHBOR_STEPS)
     return is_graph[1:-1, 1:-1]
 
 
 @kernel
-def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbors: IntArray) -> None:
+def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbor_steps: IntArray) -> None:
     """Remove cells that no connection depends on, in the given order, until no more can be removed."""
     columns = is_graph.shape[1]
     has_changed = True
@@ -118,28 +125,32 @@ def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbors:
             column = cell % columns
             if not is_graph[row, column] or must_stay[row, column]:
                 continue
-            if _count_crossings(is_graph, row, column, neighbors) == 1:
+            if _count_crossings(is_graph, row, column, neighbor_steps) == 1:
                 is_graph[row, column] = False
                 has_changed = True
 
 
 @kernel
-def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbors: IntArray) -> int:
+def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbor_steps: IntArray) -> int:
     """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it."""
     crossings = 0
     for k in range(0, 8, 2):
-        first = (k + 1) % 8
-        second = (k + 2) % 8
-        if not is_graph[row + neighbors[k, 0], column + neighbors[k, 1]] and (
-            is_graph[row + neighbors[first, 0], column + neighbors[first, 1]]
-            or is_graph[row + neighbors[second, 0], column + neighbors[second, 1]]
-        ):
+        is_first = _is_graph_at(is_graph, row, column, neighbor_steps[k])
+        is_second = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 1) % 8])
+        is_third = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 2) % 8])
+        if not is_first and (is_second or is_third):
             crossings += 1
     return crossings
 
 
 @kernel
-def _group_cells(is_graph: BoolArray, max_steps: int, neighbors: IntArray) -> tuple[IntArray, IntArray]:
+def _is_graph_at(is_graph: BoolArray, row: int, column: int, step: IntArray) -> bool:
+    """Return whether the cell one step away belongs to the graph."""
+    return bool(is_graph[row + step[_UP], column + step[_RIGHT]])
+
+
+@kernel
+def _group_cells(is_graph: BoolArray, max_steps: int, neighbor_steps: IntArray) -> tuple[IntArray, IntArray]:
     """Return the first cell of each group, and the group of each cell, (rows, columns), or -1 for none.
 
     A group consists of the cells within `max_steps` of its first cell that are not in an earlier group.
@@ -149,12 +160,12 @@ def _group_cells(is_graph: BoolArray, max_steps: int, neighbors: IntArray) -> tu
     first_cells = np.empty(is_graph.size, dtype=np.intp)
     queue = np.empty(is_graph.size, dtype=np.intp)
     steps = np.empty(is_graph.size, dtype=np.intp)
-    groups = 0
+    group_count = 0
     for first in range(is_graph.size):
         if not is_graph[first // columns, first % columns] or group[first // columns, first % columns] >= 0:
             continue
-        first_cells[groups] = first
-        group[first // columns, first % columns] = groups
+        first_cells[group_count] = first
+        group[first // columns, first % columns] = group_count
         queue[0] = first
         steps[0] = 0
         head = 0
@@ -164,21 +175,21 @@ def _group_cells(is_graph: BoolArray, max_steps: int, neighbors: IntArray) -> tu
             column = queue[head] % columns
             step = steps[head]
             head += 1
-            for k in range(len(neighbors)):
-                i = row + neighbors[k, 0]
-                j = column + neighbors[k, 1]
+            for k in range(len(neighbor_steps)):
+                i = row + neighbor_steps[k, _UP]
+                j = column + neighbor_steps[k, _RIGHT]
                 is_inside = 0 <= i < rows and 0 <= j < columns
                 if step < max_steps and is_inside and is_graph[i, j] and group[i, j] < 0:
-                    group[i, j] = groups
+                    group[i, j] = group_count
                     queue[tail] = i * columns + j
                     steps[tail] = step + 1
                     tail += 1
-        groups += 1
-    return first_cells[:groups], group
+        group_count += 1
+    return first_cells[:group_count], group
 
 
 def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the pairs of groups with cells next to each other, the smaller number first."""
+    """List the pairs of groups with adjacent cells, each pair once, the smaller index first."""
     rows, columns = group.shape
     pairs = []
     for up, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
@@ -191,7 +202,7 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @kernel
-def _spread_groups(group: IntArray, is_free: BoolArray, neighbors: IntArray) -> None:
+def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray) -> None:
     """Give each free cell the group of the nearest cell that has one, measured in steps between cells."""
     rows, columns = is_free.shape
     queue = np.empty(is_free.size, dtype=np.intp)
@@ -205,9 +216,9 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbors: IntArray) -> 
         row = queue[head] // columns
         column = queue[head] % columns
         head += 1
-        for k in range(len(neighbors)):
-            i = row + neighbors[k, 0]
-            j = column + neighbors[k, 1]
+        for k in range(len(neighbor_steps)):
+            i = row + neighbor_steps[k, _UP]
+            j = column + neighbor_steps[k, _RIGHT]
             if 0 <= i < rows and 0 <= j < columns and is_free[i, j] and group[i, j] < 0:
                 group[i, j] = group[row, column]
                 queue[tail] = i * columns + j

@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 from robocov.arrays import Array
 from robocov.planning.raster import Raster
 
+_MIN_HALF_WIDTH_CELLS = 4
+"""Minimum distance of the border of a window from its center."""
+_STEPS_PER_HALF_WIDTH = 4
+"""A window moves in steps of its half width divided by this number."""
+
 CellValue = TypeVar("CellValue", bound=np.generic)
 
 
@@ -51,7 +56,7 @@ class Window(NamedTuple):
         if math.isinf(reach):
             half_width = rows + columns
         else:
-            half_width = max(4, math.ceil(reach / raster.cell_size))
+            half_width = max(_MIN_HALF_WIDTH_CELLS, math.ceil(reach / raster.cell_size))
         low_row, high_row = _compute_stepped_interval(int(row), half_width, rows)
         low_column, high_column = _compute_stepped_interval(int(column), half_width, columns)
         height = high_row - low_row
@@ -117,8 +122,8 @@ class Window(NamedTuple):
 
 
 def _compute_stepped_interval(middle: int, half_width: int, count: int) -> tuple[int, int]:
-    """Return the bounds of an interval of cells, rounded outwards to whole steps and clipped to `count`."""
-    step = max(1, half_width // 4)
+    """Return the bounds of an interval of cells, rounded outward to whole steps and clipped to `count`."""
+    step = max(1, half_width // _STEPS_PER_HALF_WIDTH)
     low = (middle - half_width) // step * step
     high = -((-middle - half_width - 1) // step) * step
     return max(0, low), min(count, high)

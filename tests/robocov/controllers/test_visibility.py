@@ -158,7 +158,7 @@ def test_the_end_of_a_wall_is_a_window() -> None:
     view = View(distances=np.minimum(wall, 20.0)[None], hit=(wall < 20.0)[None])
     windows = find_windows(view, directions, np.array([20.0]), 0.3)
     assert len(windows.robot) == 1
-    assert windows.corner[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
+    assert windows.corner_distance[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
     assert windows.across[0] @ [0.3, 1.0] > 0.0
 
 
