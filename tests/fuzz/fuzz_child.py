@@ -86,7 +86,8 @@ def _require_map(environment: Any) -> str:
         raise WrongError("the text of the map is another one after it was read and written")
     report = check_map(environment)
     json.dumps(report.to_dict(), allow_nan=False)
-    return f"{report.obstacles} obstacles, {report.vertices} vertices, {len(report.components)} components"
+    counts = f"{report.obstacle_count} obstacles, {report.vertex_count} vertices"
+    return f"{counts}, {len(report.components)} components"
 
 
 def _import(path: Path, job: dict[str, Any]) -> str:

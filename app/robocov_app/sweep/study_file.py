@@ -134,7 +134,7 @@ class _SchemaReader:
     Attributes
     ----------
     unknown_keys : list of str
-        Messages about unknown keys. A misspelt key is also a missing one; naming it helps more.
+        Messages about unknown keys. A misspelled key is also a missing one; naming it helps more.
     other_mistakes : list of str
         All other messages.
     """

@@ -121,17 +121,17 @@ class Adaptive(BaseController):
 
     def begin(self, region: Region, team: Team) -> AdaptiveMemory:
         """Return the memory of robots that have not measured anything."""
-        robots = len(team)
+        robot_count = len(team)
         lattice = Lattice.build(region, int(self.basis), self.correlation)
-        samples, functions = lattice.functions.shape
+        sample_count, function_count = lattice.functions.shape
         return AdaptiveMemory(
             team=team,
             lattice=lattice,
-            estimates=np.full((robots, samples), self.prior),
-            parameters=np.full((robots, functions), self.prior),
-            information=np.zeros((robots, functions, functions)),
-            projections=np.zeros((robots, functions)),
-            measurements=np.full((robots, len(lattice.squares)), np.nan),
+            estimates=np.full((robot_count, sample_count), self.prior),
+            parameters=np.full((robot_count, function_count), self.prior),
+            information=np.zeros((robot_count, function_count, function_count)),
+            projections=np.zeros((robot_count, function_count)),
+            measurements=np.full((robot_count, len(lattice.squares)), np.nan),
         )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
@@ -251,24 +251,24 @@ def _multiply(first: Array, second: Array) -> Array:
 
 
 @kernel
-def _solve(matrices: Array, right: Array) -> Array:
+def _solve(matrices: Array, right_sides: Array) -> Array:
     """Return the solutions, (n, m), of symmetric positive definite systems, (n, m, m), by elimination."""
     matrices = matrices.copy()
-    right = right.copy()
-    m = right.shape[1]
-    for i in range(len(right)):
+    solutions = right_sides.copy()
+    m = solutions.shape[1]
+    for i in range(len(solutions)):
         for k in range(m):
             for r in range(k + 1, m):
                 factor = matrices[i, r, k] / matrices[i, k, k]
                 if factor != 0.0:
-                    right[i, r] -= factor * right[i, k]
+                    solutions[i, r] -= factor * solutions[i, k]
                     for c in range(k, m):
                         matrices[i, r, c] -= factor * matrices[i, k, c]
         for k in range(m - 1, -1, -1):
             for c in range(k + 1, m):
-                right[i, k] -= matrices[i, k, c] * right[i, c]
-            right[i, k] /= matrices[i, k, k]
-    return right
+                solutions[i, k] -= matrices[i, k, c] * solutions[i, c]
+            solutions[i, k] /= matrices[i, k, k]
+    return solutions
 
 
 def _measure(seen: Observations) -> Array:
@@ -354,5 +354,5 @@ def _evaluate_basis(points: Array, centers: Array, width: float) -> Array:
 
 def _compute_exponents(points: Array, others: Array, length: float) -> Array:
     """Return half the squared distances of (k, 2) and (m, 2) points, in units of a length, (k, m)."""
-    squares = ((points[:, None] - others) ** 2).sum(axis=2)
-    return np.asarray(squares / (2.0 * length * length))
+    squared_distances = ((points[:, None] - others) ** 2).sum(axis=2)
+    return np.asarray(squared_distances / (2.0 * length * length))

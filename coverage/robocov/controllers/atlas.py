@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.controllers.atlas_memory import (
+    AtlasMemory,
+    JamState,
+    OwnMotion,
+    PlanBasis,
+    PlannerState,
+    TeamGoals,
+    TeamKnowledge,
+    TraveledPath,
+)
 from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
@@ -84,85 +94,6 @@ _MAX_DOUBLINGS = 60.0
 """Limit of exponents of 2: larger powers make no difference."""
 _GOLDEN_FRACTION = (math.sqrt(5.0) - 1.0) / 2.0
 """Its multiples, modulo 1, are spread evenly between 0 and 1."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlannerState:
-    """Memory of one robot. Immutable."""
-
-    known_map: DiscoveredMap
-    next_plan_time: float
-    """s"""
-    teammates: Teammates
-    encountered: frozenset[int] = frozenset()
-    """Robots that it has heard, or that others have reported to it, except for failed ones."""
-    loss_times: Mapping[int, float] = field(default_factory=dict)
-    """Times at which it lost robots, because they had failed or were missing, s. Never changed in place."""
-    start_time: float = 0.0
-    """Time of its start, or of the last change of the team or the walls, s."""
-    path_length: float = 0.0
-    """Length of its path since then, m."""
-    looking_length: float = 0.0
-    """Length of the part of that path to viewpoints, m."""
-    planned_map: DiscoveredMap | None = None
-    """The map when the last plan was made."""
-    planner: GridPlanner | None = None
-    """Planner of its own goal and its routes."""
-    team_planner: GridPlanner | None = None
-    """Planner of the placement of the team."""
-    group: IntArray | None = None
-    """(k,) Robots that it knew of when the last plan was made, itself first."""
-    positions: Array | None = None
-    """(k, 2) m, positions of these robots at that time."""
-    was_quiet: bool = False
-    """Whether all others were at rest at that time."""
-    planned_robots: IntArray | None = None
-    """(p,) Robots that the last plan was made for."""
-    planned_goals: Array | None = None
-    """(p, 2) m, their goals in it."""
-    own_goal: Array | None = None
-    """(2,) m"""
-    viewpoint: Array | None = None
-    """(2,) m, point to which it moves first, to look around."""
-    former_viewpoints: tuple[Array, ...] = ()
-    """(2,) m each, viewpoints that it has reached since `start_time`."""
-    is_idle: bool = False
-    """Whether the next plan may be skipped if nothing has changed."""
-    stuck_plans: int = 0
-    """Number of consecutive plans for which it has been stuck."""
-    evasion_end: float = 0.0
-    """Time until which it moves out of a jam, s."""
-
-    def __deepcopy__(self, memo: object) -> PlannerState:
-        return self
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AtlasMemory:
-    """Memory of the robots."""
-
-    team: Team
-    """A robot knows its own limits."""
-    states: tuple[PlannerState, ...]
-    """State of each robot."""
-    routes: tuple[Array, ...]
-    """Waypoints of each robot, (w, 2) m, the last one the goal."""
-    legs: IntArray
-    """(n,) Index of the waypoint that each robot heads for."""
-    returns: Array | None = None
-    """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
-    estimates: Estimates | None = None
-    """Position estimates, if robots know positions of others by messages."""
-
-    @property
-    def maps(self) -> tuple[DiscoveredMap, ...]:
-        """The map that each robot has discovered."""
-        return tuple(state.known_map for state in self.states)
-
-    @property
-    def reports(self) -> tuple[Teammates, ...]:
-        """Knowledge of each robot about the others, which it reports if maps are shared."""
-        return tuple(state.teammates for state in self.states)
 
 
 class _Others(NamedTuple):
@@ -292,13 +223,13 @@ class Atlas(BaseController):
     def begin(self, region: Region, team: Team) -> AtlasMemory:
         """Return the memory of robots that know neither walls nor other robots."""
         unknown_map = build_unknown_map(region)
-        nobody = Teammates.build_empty()
+        no_knowledge = TeamKnowledge(Teammates.build_empty())
         states = []
         for robot in range(len(team)):
             delay = 0.0
             if self.is_staggered:
                 delay = self.period * _STAGGERING * (robot * _GOLDEN_FRACTION % 1.0)
-            states.append(PlannerState(unknown_map, delay, nobody))
+            states.append(PlannerState(unknown_map, next_plan_time=delay, knowledge=no_knowledge))
         routes = (np.full((1, 2), np.nan),) * len(team)
         return AtlasMemory(team, tuple(states), routes, np.zeros(len(team), dtype=np.intp))
 
@@ -342,11 +273,11 @@ class Atlas(BaseController):
             if seen.time >= max(state.next_plan_time, first_plan_time) - TIME_TOLERANCE_S:
                 reports = self._list_reports(states, seen.neighbors.list_neighbors(robot))
                 states[robot], goal = self._plan(seen, memory.team, state, robot, reports)
-                planner = states[robot].planner
-                if goal is not None and planner is not None:
-                    routes[robot] = planner.find_route(seen.positions[robot], goal)
+                basis = states[robot].basis
+                if goal is not None and basis is not None:
+                    routes[robot] = basis.planner.find_route(seen.positions[robot], goal)
                     legs[robot] = 0
-            elif state.planned_map is None:
+            elif state.basis is None:
                 routes[robot] = seen.positions[robot : robot + 1]
         return replace(memory, states=tuple(states), routes=tuple(routes), legs=legs)
 
@@ -366,7 +297,7 @@ class Atlas(BaseController):
         return []
 
     def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
-        """Return whether all robots plan on the same map, see `_Cooperation`."""
+        """Return whether all robots plan on the same map; see `_Cooperation`."""
         return False
 
     def _plan(
@@ -374,35 +305,41 @@ class Atlas(BaseController):
     ) -> tuple[PlannerState, Array | None]:
         """Update a robot's plan; return its state, and its goal or None if it keeps its route."""
         position = seen.positions[robot]
+        known_map = previous.known_map
         radius = float(team.radius[robot])
         max_speed = float(team.max_speed[robot])
-        state = self._update_teammates(seen, team, previous, robot, reports)
-        is_agreed = self._is_agreed(state.teammates, seen)
-        others = _list_others(state.teammates, position, seen.time, is_agreed=is_agreed)
-        window = Window.build_around(state.known_map.raster, position, math.inf, _OWN_NODES)
-        spacing = window.stride * state.known_map.raster.cell_size
+        knowledge = _update_knowledge(previous, seen, team, robot, reports)
+        is_agreed = self._is_agreed(knowledge.teammates, seen)
+        others = _list_others(knowledge.teammates, position, seen.time, is_agreed=is_agreed)
+        window = Window.build_around(known_map.raster, position, math.inf, _OWN_NODES)
+        spacing = window.stride * known_map.raster.cell_size
         period = self._compute_period(previous, robot, spacing / max_speed)
-        state = replace(state, next_plan_time=seen.time + period, was_quiet=others.is_quiet)
-        group = np.concatenate([[robot], others.robots])
+        state = replace(previous, knowledge=knowledge, next_plan_time=seen.time + period)
+        robots = np.concatenate([[robot], others.robots])
         positions = np.vstack([position, others.positions])
-        if _may_skip_plan(previous, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
+        if _may_skip_plan(previous, robots, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
             return state, None
-        state = _update_path_lengths(previous, state, position, seen.time, radius)
-        planner = state.planner or GridPlanner.get_shared(state.known_map, window, radius + self.clearance)
-        state = replace(
-            state,
-            planned_map=state.known_map,
+        if previous.basis is None:
+            planner = GridPlanner.get_shared(known_map, window, radius + self.clearance)
+        else:
+            planner = previous.basis.planner
+        basis = PlanBasis(
+            known_map=known_map,
+            planner=planner.update(known_map, window),
+            robots=robots,
             positions=positions,
-            group=group,
-            planner=planner.update(state.known_map, window),
+            is_quiet=others.is_quiet,
         )
+        path = _extend_path(previous, state, position, seen.time, radius)
+        state = replace(state, basis=basis, path=path)
         cooperation = self._choose_cooperation(state, seen, others, max_speed=max_speed, is_agreed=is_agreed)
-        state = self._plan_for_team(state, seen, cooperation)
+        team_goals = self._plan_for_team(state.team_goals, basis, seen, cooperation)
+        state = replace(state, team_goals=team_goals)
         return self._plan_own_motion(previous, state, seen, cooperation, robot)
 
     def _plan_own_motion(
         self,
-        before: PlannerState,
+        previous: PlannerState,
         state: PlannerState,
         seen: Observations,
         cooperation: _Cooperation,
@@ -410,18 +347,23 @@ class Atlas(BaseController):
     ) -> tuple[PlannerState, Array]:
         """Return the state of a robot after the plan for its team, and the robot's next goal."""
         position = seen.positions[robot]
+        viewpoint = None if previous.motion is None else previous.motion.viewpoint
         own = self._find_own_goal(state, seen, cooperation)
         if own is None:
-            return replace(state, own_goal=position, is_idle=False), position
-        state = replace(state, own_goal=own.goal)
-        if cooperation.is_agreed and before.positions is not None:
-            step_length = math.dist(position, before.positions[0])
-            state, evasion_goal = self._find_evasion_goal(state, step_length, seen.time, robot)
+            return replace(state, motion=OwnMotion(position, viewpoint)), position
+        if cooperation.is_agreed and previous.basis is not None:
+            step_length = math.dist(position, previous.basis.positions[0])
+            jam, evasion_goal = _find_evasion_goal(state, own.goal, step_length, seen.time, robot)
+            state = replace(state, jam=jam)
             if evasion_goal is not None:
-                return state, evasion_goal
+                return replace(state, motion=OwnMotion(own.goal, viewpoint)), evasion_goal
         # After a change of the team or the walls, the path length starts from zero.
-        path_increase = max(state.path_length - before.path_length, 0.0)
-        return self._choose_goal(state, own, position, path_increase, is_agreed=cooperation.is_agreed)
+        path_increase = max(state.path.length - previous.path.length, 0.0)
+        path, motion = self._choose_motion(
+            state, own, position, path_increase, is_agreed=cooperation.is_agreed
+        )
+        goal = motion.goal if motion.viewpoint is None else motion.viewpoint
+        return replace(state, path=path, motion=motion), goal
 
     def _choose_cooperation(
         self, state: PlannerState, seen: Observations, others: _Others, *, max_speed: float, is_agreed: bool
@@ -429,13 +371,13 @@ class Atlas(BaseController):
         """Choose the extent to which a robot plans for the others, which shrinks over time."""
         diameter = seen.region.diameter
         joint_planning_time = _JOINT_PLANNING_CROSSINGS * diameter / max_speed
-        is_joint = is_agreed or seen.time - state.start_time <= joint_planning_time
+        is_joint = is_agreed or seen.time - state.path.start_time <= joint_planning_time
         is_fixed = others.is_fixed
         if is_agreed:
             is_fixed = np.zeros_like(is_fixed)
         elif not is_joint:
             is_fixed = np.ones_like(is_fixed)
-        doublings = min(state.path_length / (self.settling * diameter), _MAX_DOUBLINGS)
+        doublings = min(state.path.length / (self.settling * diameter), _MAX_DOUBLINGS)
         return _Cooperation(
             is_agreed=is_agreed, is_joint=is_joint, is_fixed=is_fixed, savings_factor=2.0**doublings
         )
@@ -444,83 +386,61 @@ class Atlas(BaseController):
         self, state: PlannerState, seen: Observations, cooperation: _Cooperation
     ) -> OwnGoal | None:
         """Return a robot's own goal, near its goal in the plan; None if that goal has no node nearby."""
-        planner = state.planner
-        goals = state.planned_goals
-        assert planner is not None and state.positions is not None and goals is not None
+        assert state.basis is not None and state.team_goals is not None
+        planner = state.basis.planner
+        goals = state.team_goals.goals
         first_node = planner.find_nearest_node(goals[0])
         if first_node < 0:
             return None
         is_free = ~cooperation.is_fixed
-        other_positions = state.positions[1:].copy()
+        other_positions = state.basis.positions[1:].copy()
         other_positions[is_free] = goals[1:][is_free[: len(goals) - 1]]
         return find_own_goal(
             planner,
             compute_node_weights(planner, seen.density),
             other_positions,
             first_node,
-            np.full(2, np.nan) if state.own_goal is None else state.own_goal,
-            min(1.0, self.rest * cooperation.savings_factor),
+            former_goal=np.full(2, np.nan) if state.motion is None else state.motion.goal,
+            min_saving=min(1.0, self.rest * cooperation.savings_factor),
         )
 
-    def _compute_period(self, before: PlannerState, robot: int, time_to_next_node: float) -> float:
+    def _compute_period(self, previous: PlannerState, robot: int, time_to_next_node: float) -> float:
         """Return the time until the next plan, s: at least the time to move to the next node."""
         period = max(self.period, time_to_next_node)
-        if before.planned_map is None and self.is_staggered:
+        if previous.basis is None and self.is_staggered:
             period = period * (1.0 + (robot + 1) * _GOLDEN_FRACTION % 1.0)
         return period
 
-    def _update_teammates(
-        self, seen: Observations, team: Team, state: PlannerState, robot: int, reports: Sequence[Teammates]
-    ) -> PlannerState:
-        """Return the state with a robot's present knowledge of the others."""
-        teammates = _assume_at_goals(state)
-        lost = _find_lost_robots(teammates, seen, team, robot)
-        is_lost = lost.has_failed | lost.is_missing
-        failed_robots = teammates.robots[lost.has_failed].tolist()
-        lost_robots = teammates.robots[is_lost].tolist()
-        loss_times = {**state.loss_times, **dict.fromkeys(lost_robots, seen.time)}
-        teammates = teammates.add_observation(
-            robots=seen.neighbors.list_neighbors(robot),
-            positions=seen.get_neighbor_positions(robot),
-            own_position=seen.positions[robot],
-            time=seen.time,
-            is_lost=is_lost,
-        )
-        if reports:
-            teammates = teammates.add_reports(reports, robot, loss_times)
-        encountered = (state.encountered - {*failed_robots}) | {*teammates.robots.tolist()}
-        return replace(state, teammates=teammates, encountered=encountered, loss_times=loss_times)
-
     def _plan_for_team(
-        self, state: PlannerState, seen: Observations, cooperation: _Cooperation
-    ) -> PlannerState:
-        """Return the state with a plan for the team, or for the robot and its nearest neighbors."""
-        assert state.planner is not None and state.positions is not None and state.group is not None
-        size = len(state.group)
+        self, former: TeamGoals | None, basis: PlanBasis, seen: Observations, cooperation: _Cooperation
+    ) -> TeamGoals:
+        """Return goals for the team, or for a robot and its nearest neighbors."""
+        size = len(basis.robots)
         if not cooperation.is_agreed:
             size = min(size, MAX_PLANNING_GROUP)
-        group = state.group[:size]
-        is_whole_team = size == len(state.group)
-        window = _build_team_window(state.known_map, state.positions[:size], is_whole_team=is_whole_team)
-        planner = (state.team_planner or state.planner).update(state.known_map, window)
-        situation = _build_situation(state, group, cooperation.is_fixed)
-        min_savings = self._compute_min_savings(state, cooperation, size)
+        group = basis.robots[:size]
+        is_whole_team = size == len(basis.robots)
+        window = _build_team_window(basis.known_map, basis.positions[:size], is_whole_team=is_whole_team)
+        former_planner = basis.planner if former is None else former.planner
+        planner = former_planner.update(basis.known_map, window)
+        situation = _build_situation(basis, size, former, cooperation.is_fixed)
+        min_savings = self._compute_min_savings(cooperation, size, is_quiet=basis.is_quiet)
         if cooperation.is_agreed:
             goals = _place_agreed_team(planner, seen.density, group, situation, min_savings)
         else:
             # A robot that plans for itself alone does not move to cells that may not be free.
             weights = compute_node_weights(planner, seen.density, only_known=not cooperation.is_joint)
             goals = place_team(planner, weights, situation, min_savings)
-        return replace(state, team_planner=planner, planned_robots=group, planned_goals=goals)
+        return TeamGoals(planner=planner, robots=group, goals=goals)
 
     def _compute_min_savings(
-        self, state: PlannerState, cooperation: _Cooperation, group_size: int
+        self, cooperation: _Cooperation, group_size: int, *, is_quiet: bool
     ) -> MinSavings:
         """Return the fractions of the cost that changes of a plan must save; 1 allows no change."""
         # A plan that all robots share must not depend on the path length of the robot that computes it.
         factor = 1.0 if cooperation.is_agreed else cooperation.savings_factor
         relocation = 1.0
-        if cooperation.is_joint or state.was_quiet:
+        if cooperation.is_joint or is_quiet:
             # The relocation of one of many robots saves less.
             scale = min(1.0, MAX_PLANNING_GROUP / group_size)
             relocation = min(1.0, self.threshold * scale * factor)
@@ -530,69 +450,90 @@ class Atlas(BaseController):
             swap=_SWAP_SAVING if cooperation.is_agreed else 0.0,
         )
 
-    def _find_evasion_goal(
-        self, state: PlannerState, step_length: float, time: float, robot: int
-    ) -> tuple[PlannerState, Array | None]:
-        """Return the state, and a goal outside the jam of robots; None if it is not in a jam."""
-        assert state.positions is not None and state.own_goal is not None
-        positions = state.positions
-        position = positions[0]
-        is_stuck = step_length < _MIN_PROGRESS_M and math.dist(position, state.own_goal) > _ARRIVAL_RADIUS_M
-        state = replace(state, stuck_plans=state.stuck_plans + 1 if is_stuck else 0)
-        if state.stuck_plans >= _MAX_STUCK_PLANS:
-            # Robots move away for different times, so that they do not all return at once.
-            duration = _MAX_EVASION_S * ((robot + time) * _GOLDEN_FRACTION % 1.0)
-            state = replace(state, stuck_plans=0, evasion_end=time + duration)
-        is_close = ((positions - position) ** 2).sum(axis=1) < _JAM_RADIUS_M**2
-        away = position - positions[is_close].mean(axis=0)
-        if not (time < state.evasion_end and away.any()):
-            return state, None
-        goal = position + away * (_JAM_RADIUS_M / float(np.hypot(*away)))
-        return replace(state, stuck_plans=0, is_idle=False), goal
-
-    def _choose_goal(
+    def _choose_motion(
         self, state: PlannerState, own: OwnGoal, position: Array, path_increase: float, *, is_agreed: bool
-    ) -> tuple[PlannerState, Array]:
-        """Return the state, and the next goal: the own goal, or first a viewpoint."""
-        planner = state.planner
-        assert planner is not None and state.group is not None
-        if state.viewpoint is None and math.dist(own.goal, position) > _ARRIVAL_RADIUS_M:
-            return replace(state, is_idle=False), own.goal
-        former_viewpoints = state.former_viewpoints
-        looking_length = state.looking_length
-        if state.viewpoint is not None:
-            looking_length += path_increase
-            if math.dist(state.viewpoint, position) < _ARRIVAL_RADIUS_M:
-                former_viewpoints = (*former_viewpoints, state.viewpoint)
+    ) -> tuple[TraveledPath, OwnMotion]:
+        """Return a robot's path, and its motion: to its own goal, or first to a viewpoint."""
+        assert state.basis is not None
+        planner = state.basis.planner
+        path = state.path
+        former_viewpoint = None if state.motion is None else state.motion.viewpoint
+        if former_viewpoint is None and math.dist(own.goal, position) > _ARRIVAL_RADIUS_M:
+            return path, OwnMotion(own.goal)
+        if former_viewpoint is not None:
+            path = replace(path, viewpoint_length=path.viewpoint_length + path_increase)
+            if math.dist(former_viewpoint, position) < _ARRIVAL_RADIUS_M:
+                path = replace(path, viewpoints=(*path.viewpoints, former_viewpoint))
         viewpoint = None
         node = planner.find_own_node(position)
         # The goal of a robot without others hardly depends on unknown space.
-        if node >= 0 and self.stake < 1.0 and len(state.group) > 1:
+        if node >= 0 and self.stake < 1.0 and len(state.basis.robots) > 1:
             patience = self.patience * (_SHARED_PATIENCE_FACTOR if is_agreed else 1.0)
             doubling_length = patience * state.known_map.raster.region.diameter
-            min_stake = self.stake * own.cost * 2.0 ** min(looking_length / doubling_length, _MAX_DOUBLINGS)
-            path_lengths = planner.get_distances(node)
+            doublings = min(path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
             viewpoint = find_viewpoint(
-                planner, own.cell_distances, path_lengths, min_stake, former_viewpoints
+                planner,
+                own.cell_distances,
+                path_lengths=planner.get_distances(node),
+                min_stake=self.stake * own.cost * 2.0**doublings,
+                former_viewpoints=path.viewpoints,
             )
-        state = replace(
-            state,
-            viewpoint=viewpoint,
-            former_viewpoints=former_viewpoints,
-            looking_length=looking_length,
-            is_idle=viewpoint is None,
-        )
-        return state, own.goal if viewpoint is None else viewpoint
+        return path, OwnMotion(own.goal, viewpoint, is_idle=viewpoint is None)
 
 
-def _assume_at_goals(state: PlannerState) -> Teammates:
+def _update_knowledge(
+    state: PlannerState, seen: Observations, team: Team, robot: int, reports: Sequence[Teammates]
+) -> TeamKnowledge:
+    """Return what a robot knows of the others now."""
+    knowledge = state.knowledge
+    teammates = _assume_at_goals(knowledge.teammates, state.team_goals)
+    lost = _find_lost_robots(teammates, seen, team, robot)
+    is_lost = lost.has_failed | lost.is_missing
+    failed_robots = teammates.robots[lost.has_failed].tolist()
+    lost_robots = teammates.robots[is_lost].tolist()
+    loss_times = {**knowledge.loss_times, **dict.fromkeys(lost_robots, seen.time)}
+    teammates = teammates.add_observation(
+        robots=seen.neighbors.list_neighbors(robot),
+        positions=seen.get_neighbor_positions(robot),
+        own_position=seen.positions[robot],
+        time=seen.time,
+        is_lost=is_lost,
+    )
+    if reports:
+        teammates = teammates.add_reports(reports, robot, loss_times)
+    encountered = (knowledge.encountered - {*failed_robots}) | {*teammates.robots.tolist()}
+    return TeamKnowledge(teammates=teammates, encountered=encountered, loss_times=loss_times)
+
+
+def _find_evasion_goal(
+    state: PlannerState, own_goal: Array, step_length: float, time: float, robot: int
+) -> tuple[JamState, Array | None]:
+    """Return whether a robot is in a jam, and a goal outside the jam; None if it need not move away."""
+    assert state.basis is not None
+    positions = state.basis.positions
+    position = positions[0]
+    jam = state.jam
+    is_stuck = step_length < _MIN_PROGRESS_M and math.dist(position, own_goal) > _ARRIVAL_RADIUS_M
+    jam = replace(jam, stuck_plans=jam.stuck_plans + 1 if is_stuck else 0)
+    if jam.stuck_plans >= _MAX_STUCK_PLANS:
+        # Robots move away for different times, so that they do not all return at once.
+        duration = _MAX_EVASION_S * ((robot + time) * _GOLDEN_FRACTION % 1.0)
+        jam = JamState(stuck_plans=0, evasion_end=time + duration)
+    is_close = ((positions - position) ** 2).sum(axis=1) < _JAM_RADIUS_M**2
+    away = position - positions[is_close].mean(axis=0)
+    if not (time < jam.evasion_end and away.any()):
+        return jam, None
+    goal = position + away * (_JAM_RADIUS_M / float(np.hypot(*away)))
+    return replace(jam, stuck_plans=0), goal
+
+
+def _assume_at_goals(teammates: Teammates, plan: TeamGoals | None) -> Teammates:
     """Return what a robot knows of the others, with each one at its goal in the last plan, if it has one."""
-    teammates = state.teammates
-    if state.planned_robots is None or state.planned_goals is None:
+    if plan is None:
         return teammates
-    _, rows, planned_rows = np.intersect1d(teammates.robots, state.planned_robots, return_indices=True)
+    _, rows, planned_rows = np.intersect1d(teammates.robots, plan.robots, return_indices=True)
     positions = teammates.positions.copy()
-    positions[rows] = state.planned_goals[planned_rows]
+    positions[rows] = plan.goals[planned_rows]
     return teammates._replace(positions=positions)
 
 
@@ -609,32 +550,37 @@ def _find_lost_robots(teammates: Teammates, seen: Observations, team: Team, robo
     )
 
 
-def _update_path_lengths(
-    before: PlannerState, state: PlannerState, position: Array, time: float, radius: float
-) -> PlannerState:
-    """Return the state with the path since the last plan added; after a change, lengths restart from zero."""
-    if _has_changed(before, state, radius):
-        return replace(state, start_time=time, path_length=0.0, looking_length=0.0, former_viewpoints=())
-    assert before.positions is not None
-    return replace(state, path_length=before.path_length + math.dist(position, before.positions[0]))
+def _extend_path(
+    previous: PlannerState, state: PlannerState, position: Array, time: float, radius: float
+) -> TraveledPath:
+    """Return the path with the move since the last plan; after a change, a new path starts."""
+    if previous.basis is None or _has_changed(previous.basis, previous, state, radius):
+        return TraveledPath(start_time=time)
+    move = math.dist(position, previous.basis.positions[0])
+    return replace(state.path, length=state.path.length + move)
 
 
-def _build_situation(state: PlannerState, group: IntArray, is_fixed: BoolArray) -> TeamSituation:
-    """Return the situation of a group, whose robots start from their former goals unless they are fixed."""
-    assert state.positions is not None
-    size = len(group)
-    positions = state.positions[:size]
+def _build_situation(
+    basis: PlanBasis, size: int, former: TeamGoals | None, is_fixed: BoolArray
+) -> TeamSituation:
+    """Return the situation of the first `size` robots of a team; they start from their former goals.
+
+    Fixed robots, and those without a former goal, start from their positions. `is_fixed`, (k - 1,), is about
+    the robots after the first one.
+    """
+    group = basis.robots[:size]
+    positions = basis.positions[:size]
     is_fixed_in_group = np.concatenate([[False], is_fixed])[:size]
     former_goals = positions.copy()
-    if state.planned_robots is not None and state.planned_goals is not None:
-        _, rows, planned_rows = np.intersect1d(group, state.planned_robots, return_indices=True)
+    if former is not None:
+        _, rows, former_rows = np.intersect1d(group, former.robots, return_indices=True)
         is_free = ~is_fixed_in_group[rows]
-        former_goals[rows[is_free]] = state.planned_goals[planned_rows[is_free]]
+        former_goals[rows[is_free]] = former.goals[former_rows[is_free]]
     return TeamSituation(
         positions=positions,
         former_goals=former_goals,
         is_fixed=is_fixed_in_group,
-        other_positions=state.positions[size:],
+        other_positions=basis.positions[size:],
     )
 
 
@@ -690,26 +636,27 @@ def _list_others(teammates: Teammates, position: Array, time: float, *, is_agree
     )
 
 
-def _has_changed(before: PlannerState, state: PlannerState, radius: float) -> bool:
-    """Return whether this is the first plan, or the team or the walls have changed."""
-    if before.planned_map is None or state.encountered != before.encountered:
+def _has_changed(basis: PlanBasis, previous: PlannerState, state: PlannerState, radius: float) -> bool:
+    """Return whether the team or the walls have changed since the last plan, which had the given basis."""
+    if state.knowledge.encountered != previous.knowledge.encountered:
         return True
-    changed_walls = state.known_map.count_changed_walls(before.planned_map)
+    changed_walls = state.known_map.count_changed_walls(basis.known_map)
     return changed_walls * state.known_map.raster.cell_size > _CHANGED_WALL_RADII * radius
 
 
 def _may_skip_plan(
-    before: PlannerState, group: IntArray, positions: Array, is_quiet: bool, *, max_move: float
+    previous: PlannerState, robots: IntArray, positions: Array, is_quiet: bool, *, max_move: float
 ) -> bool:
     """Return whether a robot may skip its plan: it is idle, and nothing has changed since its last plan."""
-    if before.group is None or before.positions is None:
+    basis = previous.basis
+    if basis is None or previous.motion is None:
         return False
     return (
-        before.is_idle
-        and before.planned_map is before.known_map
-        and before.was_quiet == is_quiet
-        and np.array_equal(before.group, group)
-        and bool(np.abs(positions - before.positions).max() < max_move)
+        previous.motion.is_idle
+        and basis.known_map is previous.known_map
+        and basis.is_quiet == is_quiet
+        and np.array_equal(basis.robots, robots)
+        and bool(np.abs(positions - basis.positions).max() < max_move)
     )
 
 
@@ -764,7 +711,7 @@ class AtlasShared(Atlas):
         hears_all = len(neighbors) == len(states) - 1
         if hears_all:
             return []
-        return [states[neighbor].teammates for neighbor in neighbors.tolist()]
+        return [states[neighbor].knowledge.teammates for neighbor in neighbors.tolist()]
 
     def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
         return bool((teammates.heard_times == seen.time).all())

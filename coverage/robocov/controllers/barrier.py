@@ -27,6 +27,7 @@ _MIN_DISTANCE_M = 1e-9
 _MIN_PASSING_CLEARANCE_M = 1e-3
 """Margin added to the safe gap, for the lower bound of the distance to a passing robot."""
 _MIN_NORM = 1e-300
+"""Lower bound of norms in divisions."""
 
 
 class NeighborReports(NamedTuple):
@@ -135,12 +136,13 @@ class Barrier(BaseController):
         near = self._find_near_neighbors(seen, team)
         reports = _collect_reports(near, seen)
         neighbor_velocities = _derive_velocities(reports, memory.reports, team.max_speed[near.neighbor])
-        robots = self._constrain_to_robots(seen, team, near, neighbor_velocities)
-        obstacles = self._constrain_to_obstacles(seen, team, collect_obstacle_points(seen, returns))
+        robot_planes = self._keep_off_robots(seen, team, near, neighbor_velocities)
+        obstacle_points = collect_obstacle_points(seen, returns)
+        obstacle_planes = self._keep_off_obstacles(seen, team, obstacle_points)
         nearest, is_feasible = find_nearest_allowed(
             desired,
-            np.concatenate([robots.normals, obstacles.normals], axis=1),
-            np.concatenate([robots.limits, obstacles.limits], axis=1),
+            np.concatenate([robot_planes.normals, obstacle_planes.normals], axis=1),
+            np.concatenate([robot_planes.limits, obstacle_planes.limits], axis=1),
             team.max_acceleration,
         )
         # Brake to rest within the response time, or as hard as possible.
@@ -151,19 +153,19 @@ class Barrier(BaseController):
 
     def _find_near_neighbors(self, seen: Observations, team: Team) -> NearNeighbors:
         """Find the neighbors that constrain a robot now."""
-        # Two robots at full speed can stop from farther away. Twice that, because gamma h³ is then not small.
+        min_distance = 2.0 * float(team.radius.max()) + self.safe_gap
+        # Upper bound of the distance that two robots need to stop if they meet at full speed.
         stopping_distance = (
             2.0 * float(team.max_speed.max()) ** 2 / float(self._compute_braking_limits(team).min())
         )
-        return seen.find_near_neighbors(
-            2.0 * float(team.radius.max()) + self.safe_gap + 2.0 * stopping_distance
-        )
+        # At twice that distance, gamma h³ is so large that the constraint has no effect.
+        return seen.find_near_neighbors(min_distance + 2.0 * stopping_distance)
 
     def _compute_braking_limits(self, team: Team) -> Array:
         """Return alpha, the deceleration that each robot is assumed to be capable of, (n,) m/s²."""
         return np.asarray(self.braking * team.max_acceleration)
 
-    def _constrain_to_robots(
+    def _keep_off_robots(
         self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: Array
     ) -> HalfPlanes:
         """Return the half planes that keep robots apart."""
@@ -187,7 +189,7 @@ class Barrier(BaseController):
             limits=arrange_in_rows(robot, n, limit, np.inf),
         )
 
-    def _constrain_to_obstacles(self, seen: Observations, team: Team, points: Array) -> HalfPlanes:
+    def _keep_off_obstacles(self, seen: Observations, team: Team, points: Array) -> HalfPlanes:
         """Return the half planes that keep robots away from obstacle points, (n, k, 2) m; nan for none."""
         offset = seen.positions[:, None] - points
         distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)

@@ -101,7 +101,7 @@ def get_information(controller: Any) -> Information:
 
 
 def inform_controller(controller: Controller, environment: Environment) -> Controller:
-    """Return the controller with the map, if it uses the whole map; return any other one unchanged.
+    """Give the map to a controller that uses the whole map; return any other controller unchanged.
 
     Parameters
     ----------

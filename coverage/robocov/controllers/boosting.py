@@ -26,7 +26,7 @@ from robocov.observation import Decision, NearNeighbors, Observations, Scanning,
 from robocov.observation.scanned_view import (
     View,
     Windows,
-    compute_step_fractions,
+    compute_speed_fractions,
     compute_view,
     evaluate_density,
     find_windows,
@@ -36,8 +36,9 @@ from robocov.observation.scanned_view import (
 )
 
 _SAMPLES_PER_RAY = 10
+"""Number of samples with which integrals along a ray are approximated."""
 _SAMPLE_FRACTIONS = (np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY
-"""Points of each ray, as fractions of its length: samples of the integrals."""
+"""Positions of the samples of each ray, as fractions of its length."""
 _SETTLE_TIME_S = 2.0
 """Time at rest after which a robot is considered to be at an optimum."""
 _REST_RADIUS_M = 0.1
@@ -144,12 +145,12 @@ class BoostingMemory(Memory):
     view: View | None = None
     gradient: Array | None = None
     """(n, 2) m, gradient that each robot follows."""
-    step: Array | None = None
+    speed_fraction: Array | None = None
     """(n,) Fraction of full speed with which each robot follows the gradient."""
     ascents: tuple[Ascent, ...] = ()
 
 
-class Slopes(NamedTuple):
+class Contributions(NamedTuple):
     """Contribution of each robot to the objective, and how it changes with the robot's position."""
 
     value: Array
@@ -255,15 +256,17 @@ class Boosting(BaseController):
         reach = np.minimum(team.sensing_range, seen.region.diameter)
         view = compute_view(seen, memory.view, self.scanning, reach)
         gradient = memory.gradient
-        step = memory.step
+        speed_fraction = memory.speed_fraction
         ascents = memory.ascents
-        if gradient is None or step is None or seen.scans is not None:
-            slopes = self.compute_slopes(seen, view, reach)
-            ascents = self._update_ascents(ascents, seen, slopes.value)
+        if gradient is None or speed_fraction is None or seen.scans is not None:
+            contributions = self.compute_contributions(seen, view, reach)
+            ascents = self._update_ascents(ascents, seen, contributions.value)
             is_boosted = np.array([ascent.mode is Mode.BOOSTED for ascent in ascents])
-            gradient = np.where(is_boosted[:, None], slopes.boosted_gradient, slopes.gradient)
-            step = compute_step_fractions(gradient, memory.gradient, step)
-        velocities = compute_approach_velocities(gradient, self.k_grad, team.max_speed) * step[:, None]
+            gradient = np.where(is_boosted[:, None], contributions.boosted_gradient, contributions.gradient)
+            speed_fraction = compute_speed_fractions(gradient, memory.gradient, speed_fraction)
+        velocities = (
+            compute_approach_velocities(gradient, self.k_grad, team.max_speed) * speed_fraction[:, None]
+        )
         for robot, ascent in enumerate(ascents):
             if ascent.mode is Mode.RETURN:
                 offset = (ascent.trail[-1] - seen.positions[robot])[None]
@@ -278,7 +281,12 @@ class Boosting(BaseController):
             forces=forces,
             terms={"attraction": forces},
             memory=BoostingMemory(
-                team=team, returns=returns, view=view, gradient=gradient, step=step, ascents=ascents
+                team=team,
+                returns=returns,
+                view=view,
+                gradient=gradient,
+                speed_fraction=speed_fraction,
+                ascents=ascents,
             ),
         )
 
@@ -294,7 +302,7 @@ class Boosting(BaseController):
             for ascent, position, value in zip(ascents, seen.positions, values.tolist(), strict=True)
         )
 
-    def compute_slopes(self, seen: Observations, view: View, reach: Array) -> Slopes:
+    def compute_contributions(self, seen: Observations, view: View, reach: Array) -> Contributions:
         """Compute what each robot contributes to H, with its gradient and its boosted gradient.
 
         Parameters
@@ -308,14 +316,14 @@ class Boosting(BaseController):
         pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
         samples = self._sample_views(seen, view, pairs, directions, reach)
         windows = find_windows(view, directions, reach, self.jump)
-        boosted_weight = self._boost_weight(samples)
+        boosted_weight = self._compute_boosted_weight(samples)
         boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, reach)
         if self.boost == "neighbours":
             repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
                 pairs.robot, repulsion[:, None] * pairs.offset, len(reach)
             )
-        return Slopes(
+        return Contributions(
             value=(samples.weight * samples.detection * samples.areas).sum(axis=(1, 2)),
             gradient=self._compute_gradient(samples.weight, samples, view, windows, reach),
             boosted_gradient=boosted_gradient,
@@ -328,8 +336,8 @@ class Boosting(BaseController):
         angle = 2.0 * np.pi / len(directions)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
-        walls = np.where(view.hit, view.distances, np.inf)
-        undetected = compute_undetected(depths, walls, directions, pairs, reach, self.decay)
+        wall_distances = np.where(view.hit, view.distances, np.inf)
+        undetected = compute_undetected(depths, wall_distances, directions, pairs, reach, self.decay)
         return _ViewSamples(
             depths=depths,
             areas=depths * (view.distances / _SAMPLES_PER_RAY * angle)[..., None],
@@ -338,7 +346,7 @@ class Boosting(BaseController):
             weight=evaluate_density(seen.density, points) * undetected,
         )
 
-    def _boost_weight(self, samples: _ViewSamples) -> Array:
+    def _compute_boosted_weight(self, samples: _ViewSamples) -> Array:
         """Return the boosted weight of the samples, (n, rays, k)."""
         if self.boost == "phi":
             return np.asarray(self.kappa * samples.undetected**self.gamma * samples.weight)
@@ -364,7 +372,7 @@ class Boosting(BaseController):
 
 @kernel
 def compute_undetected(
-    depths: Array, walls: Array, directions: Array, pairs: NearNeighbors, reach: Array, decay: float
+    depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, reach: Array, decay: float
 ) -> Array:
     """Compute the probability that no neighbor detects the points of each robot's view.
 
@@ -372,7 +380,7 @@ def compute_undetected(
     ----------
     depths : (n, rays, k) array, m
         Distances of the points along each ray.
-    walls : (n, rays) array, m
+    wall_distances : (n, rays) array, m
         Distances of the walls in view; infinite where there is none.
     directions : (rays, 2) array
         Unit vectors along the rays.
@@ -394,7 +402,7 @@ def compute_undetected(
         neighbor_x = -pairs.offset[m, 0]
         neighbor_y = -pairs.offset[m, 1]
         neighbor_reach = reach[pairs.neighbor[m]]
-        if is_behind_wall(neighbor_x, neighbor_y, walls[i]):
+        if is_behind_wall(neighbor_x, neighbor_y, wall_distances[i]):
             continue
         for r in range(len(directions)):
             for c in range(depths.shape[2]):
@@ -403,6 +411,6 @@ def compute_undetected(
                 dx = neighbor_x - x
                 dy = neighbor_y - y
                 distance = math.sqrt(dx * dx + dy * dy)
-                if distance <= neighbor_reach and is_path_clear(x, y, dx, dy, walls[i]):
+                if distance <= neighbor_reach and is_path_clear(x, y, dx, dy, wall_distances[i]):
                     undetected[i, r, c] *= 1.0 - math.exp(-decay * distance)
     return undetected

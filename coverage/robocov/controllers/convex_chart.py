@@ -244,7 +244,7 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     weights = _build_weights(mesh, stiffness)
     inner = np.flatnonzero(~mesh.is_fixed)
     fixed = np.flatnonzero(mesh.is_fixed)
-    right = weights[inner][:, fixed] @ mesh.points[fixed]
+    right_side = weights[inner][:, fixed] @ mesh.points[fixed]
     laplacian = diags_array(weights.sum(axis=1)) - weights
     system = laplacian.tocsr()[inner][:, inner].tocoo()
     # Vertices are sorted: the indices of neighbors are close, and the matrix has a narrow band.
@@ -252,7 +252,7 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     band = np.zeros((len(inner), 2 * bandwidth + 1))
     band[system.row, system.col - system.row + bandwidth] = system.data
     images = mesh.points.copy()
-    images[inner] = _solve_banded_system(band, right)
+    images[inner] = _solve_banded_system(band, right_side)
     return images
 
 
@@ -283,15 +283,15 @@ def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
 
 
 @kernel
-def _solve_banded_system(band: Array, right: Array) -> Array:
+def _solve_banded_system(band: Array, right_side: Array) -> Array:
     """Solve a diagonally dominant system with 2 b + 1 diagonals, in place.
 
     Parameters
     ----------
     band : (v, 2 b + 1) array
         Element (i, j) of the matrix is at (i, j - i + b). It is overwritten.
-    right : (v, 2) array
-        Right-hand side, which is overwritten by the solution.
+    right_side : (v, 2) array
+        It is overwritten by the solution.
     """
     size = len(band)
     b = band.shape[1] // 2
@@ -300,11 +300,11 @@ def _solve_banded_system(band: Array, right: Array) -> Array:
         for row in range(k + 1, end):
             factor = band[row, k - row + b] / band[k, b]
             if factor != 0.0:
-                right[row] -= factor * right[k]
+                right_side[row] -= factor * right_side[k]
                 for column in range(k, end):
                     band[row, column - row + b] -= factor * band[k, column - k + b]
     for k in range(size - 1, -1, -1):
         for column in range(k + 1, min(size, k + b + 1)):
-            right[k] -= band[k, column - k + b] * right[column]
-        right[k] /= band[k, b]
-    return right
+            right_side[k] -= band[k, column - k + b] * right_side[column]
+        right_side[k] /= band[k, b]
+    return right_side

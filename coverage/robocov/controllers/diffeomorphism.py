@@ -23,6 +23,7 @@ from robocov.team import Team
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _MIN_DETERMINANT = 1e-300
+"""Lower limit of determinants in divisions."""
 
 # Charts take long to build, and must not be copied with the memories of robots.
 _get_chart = lru_cache(maxsize=8)(ConvexChart)

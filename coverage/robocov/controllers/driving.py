@@ -22,6 +22,16 @@ _DEFAULT_BRAKING_FRACTION = 0.5
 """Fraction of the maximum acceleration that is assumed to be available for braking."""
 
 
+_MIN_LENGTH = 1e-300
+"""Lower limit of lengths in divisions, which only that of a zero vector is below."""
+_MIN_RATE = 1e-9
+"""Lower limit in 1/s of the rate of approach in divisions."""
+_RELATIVE_SLACK = 1e-12
+"""Amount by which a constraint may be violated because of rounding, relative to the radius of the disc."""
+_MIN_SLOPE = 1e-12
+"""Sine of the angle up to which the lines of two constraints count as parallel."""
+
+
 class Margins(NamedTuple):
     """Distances that `avoid_collisions` keeps, and how fast robots may approach them."""
 
@@ -71,7 +81,7 @@ def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -
            [0.2, 0. ]])
     """
     distance = np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2)
-    factor = np.minimum(gain, max_speed / np.maximum(distance, 1e-300))
+    factor = np.minimum(gain, max_speed / np.maximum(distance, _MIN_LENGTH))
     return np.asarray(offsets * factor[:, None])
 
 
@@ -147,13 +157,13 @@ def avoid_collisions(
     robot_braking = 0.5 * margins.braking * team.max_acceleration
     # A robot at full speed need not brake for anything farther away.
     stopping_distance = np.maximum(
-        team.max_speed / max(margins.rate, 1e-9), team.max_speed**2 / (2.0 * robot_braking)
+        team.max_speed / max(margins.rate, _MIN_RATE), team.max_speed**2 / (2.0 * robot_braking)
     )
     reach = float((margins.separation + stopping_distance).max())
     robot_offsets = list_neighbor_offsets(seen, reach)
     wall_offsets = seen.positions[:, None] - obstacle_points
-    robots = robot_offsets.shape[1]
-    is_robot = np.arange(robots + wall_offsets.shape[1]) < robots
+    max_neighbors = robot_offsets.shape[1]
+    is_robot = np.arange(max_neighbors + wall_offsets.shape[1]) < max_neighbors
     return limit_approach_speed(
         velocities,
         offsets=np.concatenate([robot_offsets, wall_offsets], axis=1),
@@ -235,7 +245,7 @@ def find_nearest_allowed(
     is_feasible = np.ones(len(points), dtype=np.bool_)
     for i in range(len(points)):
         r = radius[i]
-        slack = 1e-12 * max(r, 1.0)
+        slack = _RELATIVE_SLACK * max(r, 1.0)
         x = points[i, 0]
         y = points[i, 1]
         length = math.sqrt(x * x + y * y)
@@ -245,21 +255,21 @@ def find_nearest_allowed(
         for k in range(offsets.shape[1]):
             nx = normals[i, k, 0]
             ny = normals[i, k, 1]
-            level = offsets[i, k]
+            offset = offsets[i, k]
             # Neither a half plane that contains the disc nor nan is a constraint.
-            if not (level < r and nx * x + ny * y - level > slack):
+            if not (offset < r and nx * x + ny * y - offset > slack):
                 continue
-            high = math.sqrt(max(r * r - level * level, 0.0))
+            high = math.sqrt(max(r * r - offset * offset, 0.0))
             low = -high
-            if level < -r:
+            if offset < -r:
                 low = math.inf
             for j in range(k):
-                # Points of the line are level n + t (-ny, nx).
+                # Points of the line are offset (nx, ny) + t (-ny, nx).
                 slope = normals[i, j, 1] * nx - normals[i, j, 0] * ny
-                rest = offsets[i, j] - level * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
-                if slope >= 1e-12:
+                rest = offsets[i, j] - offset * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
+                if slope >= _MIN_SLOPE:
                     high = min(high, rest / slope)
-                elif slope <= -1e-12:
+                elif slope <= -_MIN_SLOPE:
                     low = max(low, rest / slope)
                 elif rest < -slack:
                     low = math.inf
@@ -267,8 +277,8 @@ def find_nearest_allowed(
                 is_feasible[i] = False
                 break
             t = min(max(points[i, 1] * nx - points[i, 0] * ny, min(low, high)), high)
-            x = level * nx - t * ny
-            y = level * ny + t * nx
+            x = offset * nx - t * ny
+            y = offset * ny + t * nx
         nearest[i, 0] = x
         nearest[i, 1] = y
     return nearest, is_feasible
@@ -312,8 +322,8 @@ def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Arra
 
 
 def sum_by_robot(robot: IntArray, vectors: Array, n: int) -> Array:
-    """Return the sum of the vectors, (m, 2), of each robot, (n, 2); `robot`, (m,), holds their robots."""
+    """Sum the vectors, (m, 2), of each robot, (n, 2); `robot`, (m,), is the robot of each vector."""
     x = np.bincount(robot, vectors[:, 0], minlength=n)
     y = np.bincount(robot, vectors[:, 1], minlength=n)
-    # The counts of no vectors at all are integers.
+    # Without any vectors, `bincount` returns integers.
     return np.column_stack([x, y]).astype(np.float64, copy=False)

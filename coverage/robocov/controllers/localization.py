@@ -20,7 +20,12 @@ _OUTLIER_SIGMAS = 6.0
 _MIN_FIXES = 10
 """Number of fixes after which their noise is known."""
 _MIN_DISTANCE_M = 1e-9
-_MANOEUVRE_FRACTION = 0.5
+"""Lower limit of distances in divisions."""
+_MIN_SIGMA_M = 1e-9
+"""Lower limit of standard deviations in divisions."""
+_SENT_TOLERANCE_S = 1e-6
+"""A message is new if it was sent later than the last one by more than this, because sums of steps round."""
+_MANEUVER_FRACTION = 0.5
 """Fraction of the maximum acceleration with which others are assumed to change their velocity."""
 _MAX_EXTRAPOLATION_S = 1.5
 """Time for which others are assumed to keep their velocities."""
@@ -75,7 +80,7 @@ class Estimates(NamedTuple):
 
     @classmethod
     def build_initial(cls, n: int) -> Estimates:
-        """Build the state before the first observation."""
+        """Build the state of n robots before the first observation."""
         tracks = Tracks(
             sent=np.full((n, n), np.nan),
             counts=np.zeros((n, n), dtype=np.intp),
@@ -130,7 +135,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
         previous.tracks,
         messages,
         sigma=np.sqrt(variance),
-        manoeuvre=_MANOEUVRE_FRACTION * team.max_acceleration,
+        maneuver=_MANEUVER_FRACTION * team.max_acceleration,
         max_speed=team.max_speed,
     )
     estimates = Estimates(
@@ -151,7 +156,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
 
 
 def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Array, Array, Array]:
-    """Return positions, (n, 2) m, the number of fixes and their variance after one more fix of each robot."""
+    """Return the positions, the numbers of fixes and their variances after one more fix of each robot."""
     dt = seen.time - previous.time
     predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
     residual = ((seen.positions - predicted) ** 2).sum(axis=1)
@@ -191,9 +196,9 @@ def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observa
 
 @kernel
 def _update_tracks(
-    previous: Tracks, messages: _Messages, sigma: Array, manoeuvre: Array, max_speed: Array
+    previous: Tracks, messages: _Messages, sigma: Array, maneuver: Array, max_speed: Array
 ) -> Tracks:
-    """Return the tracks after messages.
+    """Return the tracks after the newest messages, of which some may be known already.
 
     Parameters
     ----------
@@ -201,7 +206,7 @@ def _update_tracks(
     messages : _Messages
     sigma : (n,) array, m
         Standard deviation of position fixes of each robot.
-    manoeuvre : (n,) array, m/s²
+    maneuver : (n,) array, m/s²
         Assumed acceleration of others.
     max_speed : (n,) array, m/s
         Assumed maximum speed of others.
@@ -217,18 +222,17 @@ def _update_tracks(
         i = messages.receiver[m]
         j = messages.sender[m]
         is_heard[i, j] = True
-        # Sums of steps are slightly off.
-        if tracks.counts[i, j] and not messages.sent[m] > tracks.sent[i, j] + 1e-6:
+        if tracks.counts[i, j] and not messages.sent[m] > tracks.sent[i, j] + _SENT_TOLERANCE_S:
             continue
         if tracks.counts[i, j] == 0:
             for axis in range(2):
                 tracks.velocities[i, j, axis] = 0.0
                 tracks.positions[i, j, axis] = messages.positions[m, axis]
         else:
-            _update_track(tracks, messages, m, sigma[i], manoeuvre[i], max_speed[i])
+            _update_track(tracks, messages, m, sigma[i], maneuver[i], max_speed[i])
         tracks.sent[i, j] = messages.sent[m]
         tracks.counts[i, j] += 1
-    # A track starts again when a robot is heard again.
+    # If a robot that is not heard now is heard again later, its track starts from scratch.
     for i in range(len(is_heard)):
         for j in range(len(is_heard)):
             if not is_heard[i, j]:
@@ -238,14 +242,14 @@ def _update_tracks(
 
 @kernel
 def _update_track(
-    tracks: Tracks, messages: _Messages, m: int, sigma: float, manoeuvre: float, max_speed: float
+    tracks: Tracks, messages: _Messages, m: int, sigma: float, maneuver: float, max_speed: float
 ) -> None:
     """Update the position and the velocity of one track, in place, by message m."""
     i = messages.receiver[m]
     j = messages.sender[m]
     dt = messages.sent[m] - tracks.sent[i, j]
     k = tracks.counts[i, j] + 1.0
-    tracking_index = manoeuvre * dt * dt / max(sigma, 1e-9)
+    tracking_index = maneuver * dt * dt / max(sigma, _MIN_SIGMA_M)
     discriminant = 8.0 * tracking_index + tracking_index * tracking_index
     root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
     alpha = max(1.0 - root * root, 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0)))

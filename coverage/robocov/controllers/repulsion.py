@@ -34,6 +34,8 @@ from robocov.voronoi.delaunay import Mesh
 
 _MIN_DISTANCE_M = 1e-9
 """Lower bound of distances between robots, to avoid division by zero."""
+_MIN_LENGTH = 1e-300
+"""Lower bound of lengths in divisions, which only that of a zero vector is below."""
 _MIN_CHARGE_DISTANCE_M = 0.05
 """Distance below which Howard's forces no longer grow; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)
@@ -217,7 +219,7 @@ class Howard(BaseController):
 def _compute_inverse_squares(offsets: Array) -> Array:
     """Return vectors of length 1 / r² along offsets of length r, (..., 2); zero for an offset of zero."""
     distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
-    cube = np.maximum(distance, _MIN_CHARGE_DISTANCE_M) ** 2 * np.maximum(distance, 1e-300)
+    cube = np.maximum(distance, _MIN_CHARGE_DISTANCE_M) ** 2 * np.maximum(distance, _MIN_LENGTH)
     return np.asarray(offsets / cube[..., None])
 
 
@@ -428,5 +430,5 @@ class Dispersion(BaseController):
             factor = self.explore_speed / speed[is_exploring]
             velocities[is_exploring] = seen.velocities[is_exploring] * factor[:, None]
         speed = np.hypot(*velocities.T)
-        factor = np.minimum(1.0, team.max_speed / np.maximum(speed, 1e-300))
+        factor = np.minimum(1.0, team.max_speed / np.maximum(speed, _MIN_LENGTH))
         return np.asarray(velocities * factor[:, None])

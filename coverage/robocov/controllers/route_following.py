@@ -36,6 +36,8 @@ _MAX_EVASION_SPEED = 0.3
 """Maximum speed in m/s with which a robot passes another one on the left."""
 _EVASION_RANGE_M = 1.5
 """Distance from which robots pass each other on the left."""
+_MIN_DISTANCE_M = 1e-9
+"""Lower limit of distances in divisions."""
 
 
 class RouteCommand(NamedTuple):
@@ -133,7 +135,7 @@ def _compute_evasion(seen: Observations, team: Team, velocities: Array, separati
         return np.zeros_like(velocities)
     braking = _BRAKING_FRACTION * team.max_acceleration
     distance = np.hypot(*np.moveaxis(offsets, -1, 0))
-    normals = offsets / np.maximum(distance, 1e-9)[..., None]
+    normals = offsets / np.maximum(distance, _MIN_DISTANCE_M)[..., None]
     allowed_speed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - separation[:, None], 0.0))
     excess = -(normals * velocities[:, None]).sum(axis=2) - allowed_speed
     excess = np.nan_to_num(excess, nan=-np.inf)

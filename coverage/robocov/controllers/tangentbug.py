@@ -41,6 +41,14 @@ _CONTACT_FRACTION = 0.95
 """Fraction of its present distance to which a robot may approach a point that is within the clearance."""
 
 
+_MIN_LENGTH = 1e-300
+"""Lower limit of lengths in divisions, which only that of a zero vector is below."""
+_ROUNDING_M = 1e-9
+"""Length by which a free distance may be too small because of rounding."""
+_MAX_RETURN_FACTOR = 3.0
+"""A robot gives up its return after the maximum length of its boundary, times this factor."""
+
+
 class Mode(Enum):
     """Mode of a robot."""
 
@@ -291,7 +299,7 @@ class Navigator:
     def update(self, bug: BugState) -> BugState:
         """Return the navigation state after the scan."""
         is_goal_in_view = self._is_in_view(self.goal)
-        is_free_ahead = self._compute_free_distance(self.goal) >= self.reach - 1e-9
+        is_free_ahead = self._compute_free_distance(self.goal) >= self.reach - _ROUNDING_M
         if is_goal_in_view or (bug.mode is Mode.GOAL and is_free_ahead):
             return self._head_for(bug, Mode.GOAL, self.position + self.goal)
         if bug.mode is Mode.PROJECTED:
@@ -320,11 +328,11 @@ class Navigator:
     def _is_in_view(self, offset: Array) -> bool:
         """Return whether the robot can move straight to a point."""
         distance = math.hypot(*offset)
-        return distance < _ARRIVAL_RADIUS_M or self._compute_free_distance(offset) >= distance - 1e-9
+        return distance < _ARRIVAL_RADIUS_M or self._compute_free_distance(offset) >= distance - _ROUNDING_M
 
     def _compute_free_distance(self, offset: Array) -> float:
         """Return the distance that the robot can move straight toward a point, m."""
-        direction = offset / max(math.hypot(*offset), 1e-300)
+        direction = offset / max(math.hypot(*offset), _MIN_LENGTH)
         return float(compute_free_distances(self.points, direction[None], self.clearance, self.reach)[0])
 
     def _find_contour_ends(self, direction: Array) -> dict[int, ContourEnd]:
@@ -407,7 +415,7 @@ class Navigator:
         best_point = self._find_best_point(bug, ends)
         bug = replace(bug, waypoint=freeze(self.position + offset), best_point=best_point)
         if bug.mode is Mode.RETURN:
-            if bug.followed_length > 3.0 * bug.max_followed_length:
+            if bug.followed_length > _MAX_RETURN_FACTOR * bug.max_followed_length:
                 # The robot has lost its best point, and stays where it is.
                 bug = replace(bug, best_point=freeze(self.position))
             return self._move_to_best_point(bug)
@@ -460,7 +468,7 @@ class Navigator:
         # Seen from here, the boundary may be a little closer to the point than it was before.
         if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.clearance:
             return replace(bug, mode=Mode.RETURN)
-        fraction = min(1.0, free_distance / max(distance, 1e-300))
+        fraction = min(1.0, free_distance / max(distance, _MIN_LENGTH))
         return replace(
             bug,
             mode=Mode.PROJECTED,

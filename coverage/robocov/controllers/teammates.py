@@ -11,11 +11,11 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 
 REST_RADIUS_M = 0.1
-"""Distance within which a robot at rest stays."""
+"""A robot is at rest while it stays within this distance of one point."""
 
 
 class Teammates(NamedTuple):
-    """Knowledge of a robot about (k,) others."""
+    """Knowledge of a robot about k others."""
 
     robots: IntArray
     """(k,) Their numbers, ascending."""
@@ -60,9 +60,11 @@ class Teammates(NamedTuple):
         distances = np.sqrt(((positions - own_position) ** 2).sum(axis=1))
         observed = Teammates(robots, positions, now, distances, now, positions)
         is_kept = ~(np.isin(self.robots, robots) | is_lost)
-        columns = [np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True)]
-        order = np.argsort(columns[0])
-        updated = Teammates(*(column[order] for column in columns))
+        joined = Teammates(
+            *(np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True))
+        )
+        order = np.argsort(joined.robots)
+        updated = Teammates(*(column[order] for column in joined))
         _, rows, former_rows = np.intersect1d(
             updated.robots, self.robots, assume_unique=True, return_indices=True
         )
@@ -98,10 +100,9 @@ class Teammates(NamedTuple):
             # A reported robot may never have been in range: its silence does not mean that it has failed.
             report = report._replace(heard_distances=np.full(len(is_new), math.inf))
             sources.append([column[is_new] for column in report])
-        columns = [np.concatenate(parts) for parts in zip(*sources, strict=True)]
-        merged = Teammates(*columns)
+        merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
         # By robot, the most recent first. The sort is stable.
         order = np.lexsort((-merged.heard_times, merged.robots))
         _, first = np.unique(merged.robots[order], return_index=True)
         order = order[first]
-        return Teammates(*(column[order] for column in columns))
+        return Teammates(*(column[order] for column in merged))

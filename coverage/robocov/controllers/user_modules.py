@@ -75,15 +75,16 @@ def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovEr
         For all other exceptions. The message names file and line.
     """
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("robot ")]
-    place = _format_place(error) + "".join(f" for {note}" for note in notes) + when
+    location = _format_fault_location(error)
+    suffix = location + "".join(f" for {note}" for note in notes) + when
     try:
         message = str(error)
     except Exception:  # The class of the exception may be the user's own.
         message = "it has no message"
     fault = f"{type(error).__name__}: {message}" if message else type(error).__name__
     if isinstance(error, Exception):
-        return ParameterError(f"{where}: {fault}{place}")
-    return ControllerEndedError(f"{where}: it ended Python with {fault}{place}")
+        return ParameterError(f"{where}: {fault}{suffix}")
+    return ControllerEndedError(f"{where}: it ended Python with {fault}{suffix}")
 
 
 def explain_user_fault(error: BaseException) -> RobocovError | None:
@@ -101,15 +102,15 @@ def format_location(function: object) -> str:
     return ""
 
 
-def _format_place(error: BaseException) -> str:
+def _format_fault_location(error: BaseException) -> str:
     """Return file and line of the last call outside robocov, as " (mine.py, line 12)", or an empty string."""
     calls = _list_calls(error)
-    places = [call for call in calls if _is_in_user_file(call)]
-    if not places:
-        places = [call for call in calls if not call.file.startswith((_LIBRARY_FOLDER, "<"))]
-    if not places:
+    user_calls = [call for call in calls if _is_in_user_file(call)]
+    if not user_calls:
+        user_calls = [call for call in calls if not call.file.startswith((_LIBRARY_FOLDER, "<"))]
+    if not user_calls:
         return ""
-    return f" ({Path(places[-1].file).name}, line {places[-1].line})"
+    return f" ({Path(user_calls[-1].file).name}, line {user_calls[-1].line})"
 
 
 def _list_calls(error: BaseException) -> list[_Call]:

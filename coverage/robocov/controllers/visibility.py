@@ -21,7 +21,7 @@ from robocov.observation import Decision, Observations, Scanning, compute_ray_di
 from robocov.observation.observations import NearNeighbors
 from robocov.observation.scanned_view import (
     View,
-    compute_step_fractions,
+    compute_speed_fractions,
     compute_view,
     evaluate_density,
     find_windows,
@@ -31,8 +31,9 @@ from robocov.observation.scanned_view import (
 )
 
 _SAMPLES_PER_RAY = 12
+"""Number of samples with which integrals along a ray are approximated."""
 _SAMPLE_FRACTIONS = np.append((np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY, 1.0)
-"""Points of each ray, as fractions of its length: samples of the integrals over edges, and the end."""
+"""Positions of the samples of each ray, and of its end, as fractions of its length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +43,7 @@ class VisibilityMemory(Memory):
     view: View | None = None
     gradient: Array | None = None
     """(n, 2) m, gradient of the area in view."""
-    step: Array | None = None
+    speed_fraction: Array | None = None
     """(n,) Fraction of full speed with which each robot follows the gradient."""
 
 
@@ -93,14 +94,16 @@ class Visibility(BaseController):
         """Compute the forces that drive each robot along the gradient of its area in view."""
         team = memory.team
         gradient = memory.gradient
-        step = memory.step
+        speed_fraction = memory.speed_fraction
         reach = np.minimum(team.sensing_range, seen.region.diameter)
         view = compute_view(seen, memory.view, self.scanning, reach)
-        if gradient is None or step is None or seen.scans is not None:
+        if gradient is None or speed_fraction is None or seen.scans is not None:
             gradient = self.compute_gradient(seen, view, reach)
-            step = compute_step_fractions(gradient, memory.gradient, step)
+            speed_fraction = compute_speed_fractions(gradient, memory.gradient, speed_fraction)
         returns = update_returns(seen, memory.returns)
-        velocities = compute_approach_velocities(gradient, self.k_area, team.max_speed) * step[:, None]
+        velocities = (
+            compute_approach_velocities(gradient, self.k_area, team.max_speed) * speed_fraction[:, None]
+        )
         margins = Margins.build_with_gap(team, self.clearance)
         obstacle_points = collect_obstacle_points(seen, returns)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
@@ -108,7 +111,9 @@ class Visibility(BaseController):
         return Decision(
             forces=forces,
             terms={"attraction": forces},
-            memory=VisibilityMemory(team=team, returns=returns, view=view, gradient=gradient, step=step),
+            memory=VisibilityMemory(
+                team=team, returns=returns, view=view, gradient=gradient, speed_fraction=speed_fraction
+            ),
         )
 
     def compute_gradient(self, seen: Observations, view: View, reach: Array) -> Array:
@@ -126,25 +131,25 @@ class Visibility(BaseController):
         (n, 2) array, m
             Growth of the area, weighted by φ, per meter of the robot's motion.
         """
-        robots, rays = view.distances.shape
-        directions = compute_ray_directions(rays)
+        robot_count, ray_count = view.distances.shape
+        directions = compute_ray_directions(ray_count)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
-        walls = np.where(view.hit, view.distances, np.inf)
+        wall_distances = np.where(view.hit, view.distances, np.inf)
         pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
         weight = evaluate_density(seen.density, points)
-        weight = weight * find_cells_in_view(depths, walls, directions, pairs, reach)
-        arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / rays)
+        weight = weight * find_cells_in_view(depths, wall_distances, directions, pairs, reach)
+        arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / ray_count)
         windows = find_windows(view, directions, reach, self.jump)
         # The last sample is the end of the ray, which only the arcs need.
         growth = integrate_over_windows(windows, view, depths[..., :-1], weight[..., :-1])
-        window_terms = sum_by_robot(windows.robot, growth, robots)
+        window_terms = sum_by_robot(windows.robot, growth, robot_count)
         return np.asarray((arcs[..., None] * directions).sum(axis=1) + window_terms)
 
 
 @kernel
 def find_cells_in_view(
-    depths: Array, walls: Array, directions: Array, pairs: NearNeighbors, reach: Array
+    depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, reach: Array
 ) -> BoolArray:
     """Find which points of each robot's view belong to its cell.
 
@@ -152,7 +157,7 @@ def find_cells_in_view(
     ----------
     depths : (n, rays, k) array, m
         Distances of the points along each ray.
-    walls : (n, rays) array, m
+    wall_distances : (n, rays) array, m
         Distances of the walls in view; infinite where there is none.
     directions : (rays, 2) array
         Unit vectors along the rays.
@@ -172,7 +177,7 @@ def find_cells_in_view(
         neighbor_x = -pairs.offset[m, 0]
         neighbor_y = -pairs.offset[m, 1]
         neighbor_reach = reach[pairs.neighbor[m]]
-        if is_behind_wall(neighbor_x, neighbor_y, walls[i]):
+        if is_behind_wall(neighbor_x, neighbor_y, wall_distances[i]):
             continue
         for r in range(len(directions)):
             for c in range(depths.shape[2]):
@@ -183,5 +188,5 @@ def find_cells_in_view(
                 power = dx * dx + dy * dy - neighbor_reach * neighbor_reach
                 own_power = depths[i, r, c] ** 2 - reach[i] ** 2
                 if power <= 0.0 and power < own_power and is_own[i, r, c]:
-                    is_own[i, r, c] = not is_path_clear(x, y, dx, dy, walls[i])
+                    is_own[i, r, c] = not is_path_clear(x, y, dx, dy, wall_distances[i])
     return is_own

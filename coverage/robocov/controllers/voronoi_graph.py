@@ -16,12 +16,12 @@ from robocov.planning.team_placement import UNREACHABLE_M
 from robocov.planning.voronoi_roadmap import VoronoiRoadmap
 from robocov.planning.window import Window
 
-MAX_CELLS = 150_000
-"""Number of blocks of cells on which the map is thinned."""
+MAX_BLOCKS = 150_000
+"""Maximum number of square blocks of cells that stand for the map when it is thinned."""
 MAX_VERTICES = 300
 """Approximate number of vertices of the graph."""
 _MIN_SPACING_M = 0.25
-"""Distance between vertices."""
+"""Minimum distance between vertices."""
 _MIN_FURTHER_SAVING = 1e-6
 """Fraction of the cost that an exchange must save after one that saved the threshold."""
 
@@ -77,18 +77,19 @@ class VoronoiGraphCoverage(SharedMapController):
         return Placement(goals=assign_goals(situation, candidates.positions[chosen]), is_final=True)
 
     def _build_vertices(self, situation: Situation) -> Candidates:
-        """Build the vertices of the graph where the robots are, with distances along it."""
+        """Build the vertices that the robots can reach, with their distances along the graph."""
         known_map = situation.known_map
         raster = known_map.raster
-        window = Window.build_around(raster, situation.positions[0], math.inf, MAX_CELLS)
+        window = Window.build_around(raster, situation.positions[0], math.inf, MAX_BLOCKS)
         is_reachable = _find_reachable_blocks(situation, window)
-        free_cells = window.crop(~known_map.is_blocked, False).reshape(window.block_shape).sum(axis=(1, 3))
+        cells_by_block = window.crop(~known_map.is_blocked, False).reshape(window.block_shape)
+        free_counts = cells_by_block.sum(axis=(1, 3))
         block_size = raster.cell_size * window.stride
         roadmap = VoronoiRoadmap.build(
-            is_reachable, free_cells > 0, _MIN_SPACING_M / block_size, MAX_VERTICES
+            is_reachable, free_counts > 0, _MIN_SPACING_M / block_size, MAX_VERTICES
         )
         vertices = np.asarray(raster.origin) + (roadmap.vertices[:, ::-1] + 0.5) * block_size
-        mass = free_cells.astype(np.float64)
+        mass = free_counts.astype(np.float64)
         if situation.density is not None and not situation.density.is_uniform:
             mass *= situation.density.evaluate(window.compute_nodes(raster)).reshape(mass.shape)
         has_vertex = roadmap.vertex_of_cell >= 0

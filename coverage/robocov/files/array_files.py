@@ -25,10 +25,11 @@ from robocov.files.writing import replace_file
 MAX_BYTES = 2_000_000_000
 """Default limit for the arrays of one file: about the largest run that the application accepts."""
 _MAX_COMPRESSION_RATIO = 100
+"""Maximum size of the arrays relative to that of the file: more is a decompression bomb."""
 _MIN_RATIO_BYTES = 256_000_000
-"""Bytes of arrays up to which the compression ratio does not matter."""
+"""Size of arrays up to which the compression ratio does not matter."""
 _MAX_READ_BYTES = 1 << 20
-"""Largest single read: the directory of an array file is short."""
+"""Largest single read: the central directory of a zip file with arrays is short."""
 _DAMAGE_ERRORS = (
     ValueError,
     EOFError,
@@ -44,7 +45,7 @@ _DAMAGE_ERRORS = (
 _SUFFIX = ".robocov"
 _FORMAT = b"robocov arrays 1\n"
 _DIGEST_BYTES = 16
-"""Length of the check sum between the format and the data of a cached file."""
+"""Length of the checksum between the format and the data of a cached file."""
 _STALE_S = 24 * 3600.0
 """Age at which a partly written file counts as abandoned."""
 
@@ -198,9 +199,9 @@ class ArrayCache:
             if path.stat().st_size > self.max_bytes or not is_private(path):
                 return None
             data = path.read_bytes()
-            start = len(_FORMAT) + _DIGEST_BYTES
-            payload = memoryview(data)[start:]
-            if data[:start] != _FORMAT + _compute_digest(payload):
+            payload_start = len(_FORMAT) + _DIGEST_BYTES
+            payload = memoryview(data)[payload_start:]
+            if data[:payload_start] != _FORMAT + _compute_digest(payload):
                 path.unlink()
                 return None
             arrays = read_arrays(io.BytesIO(payload), path.name, self.max_bytes)

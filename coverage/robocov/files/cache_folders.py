@@ -16,7 +16,10 @@ CACHE_VARIABLE = "ROBOCOV_CACHE"
 
 
 def find_cache_root() -> Path | None:
-    """Return the folder in `CACHE_VARIABLE`, by default the user's cache folder; None if it is empty."""
+    """Return the folder for caches; None if there is to be no cache.
+
+    It is the folder in the environment variable `CACHE_VARIABLE`, or by default the user's cache folder.
+    """
     configured = os.environ.get(CACHE_VARIABLE)
     if configured == "":
         return None
@@ -48,7 +51,7 @@ def open_private_folder(folder: Path) -> Path | None:
 
 
 def is_private(path: Path) -> bool:
-    """Return whether a file or folder belongs to this user, and nobody else can have changed or replaced it.
+    """Return whether a file or folder belongs to this user, and no other user can have changed it.
 
     Always true on systems without file owners and modes, such as Windows, which separate users themselves.
 
@@ -67,14 +70,14 @@ def is_private(path: Path) -> bool:
     """
     if sys.platform == "win32":
         return True
-    real = path.resolve(strict=True)
-    status = real.stat()
+    real_path = path.resolve(strict=True)
+    status = real_path.stat()
     if status.st_uid != os.geteuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return False
-    return not any(_everybody_can_replace_entries(parent) for parent in real.parents)
+    return not any(_lets_all_users_replace_entries(parent) for parent in real_path.parents)
 
 
-def _everybody_can_replace_entries(folder: Path) -> bool:
-    """Return whether all users may write to a folder, and rename entries that are not theirs."""
+def _lets_all_users_replace_entries(folder: Path) -> bool:
+    """Return whether all users may replace the entries of a folder, including those of other users."""
     mode = folder.stat().st_mode
     return bool(mode & stat.S_IWOTH) and not mode & stat.S_ISVTX

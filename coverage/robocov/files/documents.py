@@ -183,7 +183,7 @@ def build_document_error(
     MapError
     """
     details = error.errors(include_url=False, include_context=False)
-    # A misspelt key is also a missing one. Naming the key that is there helps more.
+    # A misspelled key is also a missing one. It is more helpful to name the key that is there.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     mistakes = [build_mistake(detail) for detail in details[: MapError.MAX_LISTED]]
     return MapError.from_mistakes(where, mistakes, len(details) - len(mistakes))

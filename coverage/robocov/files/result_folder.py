@@ -54,6 +54,7 @@ _SIGNATURES = {
 }
 """Patterns in the first bytes of files that robocov has written."""
 _SIGNATURE_BYTES = 4096
+"""Number of bytes at the start of a file in which its signature is searched for."""
 
 
 class ResultFolder:

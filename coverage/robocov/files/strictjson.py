@@ -29,15 +29,16 @@ MAX_DEPTH = 32
 """Deepest nesting of lists and objects; maps need 6."""
 MAX_TOML_BYTES = 4_000_000
 """Largest TOML file: parsing one of this size takes a second."""
-_TOML_PART = re.compile(rb"[=,\n]")
+_TOML_SEPARATOR = re.compile(rb"[=,\n]")
 _MAX_TOML_DOTS = 1000
-"""Dots in a key, or in a text without commas."""
+"""Maximum number of dots between two separators: in a key, or in a text without commas."""
 _TOO_DEEP = f"nested too deeply, expected at most {MAX_DEPTH} levels"
 _MAX_DIGITS = 400
 """Whole numbers with more digits exceed every float."""
 _MAX_BITS = 1023
 """Bits of a whole number that a float can represent."""
 _SYNTAX_EXCERPT_CHARACTERS = 12
+"""Number of characters of the text that the message about a syntax error quotes."""
 _WHITESPACE = " \t\n\r"
 
 
@@ -154,7 +155,7 @@ def parse_toml(content: bytes, where: str) -> dict[str, Any]:
     if len(content) > MAX_TOML_BYTES:
         raise InputError(f"{where}: expected at most {MAX_TOML_BYTES // 1_000_000} MB of TOML, got more")
     # The parser takes seconds for keys of very many parts.
-    if max(part.count(b".") for part in _TOML_PART.split(content)) > _MAX_TOML_DOTS:
+    if max(part.count(b".") for part in _TOML_SEPARATOR.split(content)) > _MAX_TOML_DOTS:
         raise InputError(f"{where}: {_TOO_DEEP}")
     try:
         document = tomllib.loads(content.decode("utf-8-sig"))
@@ -251,7 +252,7 @@ def _find_first_mistake(value: Any, path: JsonPath) -> Mistake | None:
             return mistake
         items = value.items()
     for key, item in items:
-        # Most of a large file are numbers, for which no call is made.
+        # Most values in a large file are numbers: skipping the call for them saves time.
         if type(item) is float and math.isfinite(item):
             continue
         mistake = _find_first_mistake(item, (*path, key))
@@ -264,8 +265,8 @@ def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Mistake | None:
     """Return the mistake of the first key that is not a string, or of the first duplicate one."""
     for key in value:
         if not isinstance(key, str) or not _is_encodable(key):
-            place = f"{format_path(path)}: " if path else ""
-            text = f"{place}key: expected text that UTF-8 can encode, got {quote(key)}"
+            prefix = f"{format_path(path)}: " if path else ""
+            text = f"{prefix}key: expected text that UTF-8 can encode, got {quote(key)}"
             return Mistake((*path, key), text, at_key=True)
     if isinstance(value, _Object) and value.duplicate_key is not None:
         return Mistake.at_path((*path, value.duplicate_key), "duplicate key", at_key=True)

@@ -36,6 +36,10 @@ _TARGETS_PER_BLOCK = 1024
 """Number of targets that are indexed at the same time, which limits the memory."""
 _MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
 """Initial number of index entries per source, by number of bins. It is doubled whenever it is too small."""
+_MAX_DEPTH_M = 2.0 * GRID_M
+"""Depth in an obstacle from which points are moved to free space, in addition to `_MAX_RELATIVE_DEPTH`."""
+_MAX_RELATIVE_DEPTH = 1e-9
+"""The same for large maps, as a fraction of the size of the map."""
 _SNAP_STEPS = 2
 """Number of grid steps around the nearest point of a slanted wall where a free point is searched for."""
 
@@ -223,7 +227,7 @@ class Geodesics:
         grid_position = self.grid.snap(point)
         nearest = self._find_nearest_free(grid_position)
         depth = float(np.hypot(*(nearest - grid_position))) * self.grid.unit
-        if depth > 2.0 * GRID_M + 1e-9 * self.size:
+        if depth > _MAX_DEPTH_M + _MAX_RELATIVE_DEPTH * self.size:
             raise InputError(
                 f"{name}: expected a point inside the boundary and outside every obstacle of map "
                 f"{self._name!r}, got {coordinates}, {depth:.3g} m outside the free space"

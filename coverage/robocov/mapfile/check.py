@@ -30,7 +30,7 @@ MANY_VERTICES = 5000
 _SECONDS_PER_SQUARED_VERTEX = 6.1e-8
 """Measured time to set up a `robocov.cost.CoverageCost`, divided by the squared number of vertices."""
 _MAX_EQUAL_DISTANCE_M = 1e-6
-"""Vertices closer than this are probably meant to be one."""
+"""Vertices closer than this are probably meant to be the same."""
 
 
 class StartReport(NamedTuple):
@@ -42,7 +42,7 @@ class StartReport(NamedTuple):
     kind : str
         ``disc``, ``uniform`` or ``points``.
     capacity : int
-        About how many robots fit.
+        Approximate number of robots that fit.
     """
 
     name: str
@@ -61,7 +61,7 @@ class MapReport:
         Area inside the boundary.
     free_area : float, m²
         Area inside the boundary and outside every obstacle.
-    vertices, obstacles : int
+    vertex_count, obstacle_count : int
         Numbers in the file; circles have no vertices.
     components : tuple of float, m²
         Areas of the connected components of the free space, the largest first.
@@ -81,8 +81,8 @@ class MapReport:
     name: str
     area: float
     free_area: float
-    vertices: int
-    obstacles: int
+    vertex_count: int
+    obstacle_count: int
     components: tuple[float, ...]
     narrowest_gap: Gap | None
     starts: tuple[StartReport, ...]
@@ -109,8 +109,8 @@ class MapReport:
             "area_m2": self.area,
             "free_area_m2": self.free_area,
             "free_fraction": self.free_fraction,
-            "vertices": self.vertices,
-            "obstacles": self.obstacles,
+            "vertices": self.vertex_count,
+            "obstacles": self.obstacle_count,
             "components_m2": list(self.components),
             "narrowest_gap_m": None if gap is None else gap.width,
             "narrowest_gap_between": None if gap is None else [list(point) for point in gap.between],
@@ -148,8 +148,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         name=environment.name,
         area=environment.area,
         free_area=environment.free_area,
-        vertices=count_vertices(environment),
-        obstacles=len(environment.obstacles),
+        vertex_count=count_vertices(environment),
+        obstacle_count=len(environment.obstacles),
         components=tuple(float(component.area) for component in environment.free.geoms),
         narrowest_gap=gap,
         starts=tuple(_build_start_report(environment, name, radius) for name in environment.starts),
@@ -228,9 +228,9 @@ def _iterate_rings(environment: Environment) -> Iterator[tuple[str, Ring]]:
 
 
 def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> Iterator[str]:
-    vertices = count_vertices(environment)
-    if vertices > MANY_VERTICES:
-        yield describe_vertex_count(vertices)
+    vertex_count = count_vertices(environment)
+    if vertex_count > MANY_VERTICES:
+        yield describe_vertex_count(vertex_count)
     yield from _find_shape_warnings(environment)
     yield from _find_path_warnings(environment)
     yield from _find_component_warnings(environment, radius)

@@ -11,6 +11,10 @@ from robocov.errors import InputError, describe_error, to_one_line
 
 MAX_PICTURE_BYTES = 8_000_000
 """Largest image file."""
+_WHITE_8_BIT = 255.0
+"""Gray level of white in images with 8 bits per pixel."""
+_WHITE_16_BIT = 65535.0
+"""Gray level of white in images with 16 bits per pixel."""
 
 
 def read_picture_file(name: str, folder: Path | None) -> bytes:
@@ -87,9 +91,9 @@ def read_gray_levels(content: bytes) -> Array:
                 raise InputError(
                     f"expected at most {MAX_RASTER_SIZE} x {MAX_RASTER_SIZE} pixels, got {width} x {height}"
                 )
-            if image.mode.startswith("I"):  # Gray levels of 16 bits.
-                return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
-            return np.asarray(image.convert("L"), dtype=float) / 255.0
+            if image.mode.startswith("I"):
+                return np.clip(np.asarray(image, dtype=float) / _WHITE_16_BIT, 0.0, 1.0)
+            return np.asarray(image.convert("L"), dtype=float) / _WHITE_8_BIT
     except InputError:
         raise
     except Exception as error:  # Damaged images raise various errors in decoders.

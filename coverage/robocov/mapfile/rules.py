@@ -193,11 +193,11 @@ def _find_room_mistakes(
     try:
         environment.start(name).sample(1, radius=DEFAULT_RADIUS_M)
     except StartError:
-        place = "the free space"
+        area = "the free space"
         if isinstance(start, DiscStart):
             x, y = start.center
-            place = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
-        message = f"{place} has no room for a robot of radius {DEFAULT_RADIUS_M:g} m"
+            area = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
+        message = f"{area} has no room for a robot of radius {DEFAULT_RADIUS_M:g} m"
         yield Mistake.at_path(("starts", name), message)
 
 

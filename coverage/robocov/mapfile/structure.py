@@ -127,8 +127,8 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
 def _build_unknown_key_mistake(path: list[Any], model: type[Model]) -> Mistake:
     *parent, key = path
     known = [field.alias or name for name, field in model.model_fields.items()]
-    place = f"{format_path(parent)}: " if parent else ""
-    return Mistake(tuple(path), f"{place}{describe_unknown_name('key', str(key), known)}", at_key=True)
+    prefix = f"{format_path(parent)}: " if parent else ""
+    return Mistake(tuple(path), f"{prefix}{describe_unknown_name('key', str(key), known)}", at_key=True)
 
 
 def _build_kind_mistake(path: JsonPath, value: object, kinds: list[str]) -> Mistake:

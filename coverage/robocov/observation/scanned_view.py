@@ -178,7 +178,7 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
     return density.evaluate(points.reshape(-1, 2)).reshape(points.shape[:-1])
 
 
-def compute_step_fractions(gradient: Array, previous: Array | None, fraction: Array | None) -> Array:
+def compute_speed_fractions(gradient: Array, previous: Array | None, fraction: Array | None) -> Array:
     """Compute the fraction of full speed with which robots follow discontinuous gradients.
 
     The visible area has ridges, for example at doors. On both sides of a ridge the gradient points toward it,

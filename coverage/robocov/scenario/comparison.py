@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -90,10 +90,10 @@ class Comparison(Drawable):
         return pandas.DataFrame(self.table()).set_index("controller")
 
     def __repr__(self) -> str:
-        lines = [["controller", *_COLUMNS.values()]]
+        rows = [["controller", *_COLUMNS.values()]]
         for row in self.table():
             settled = row["settled_at_s"]
-            line = [
+            cells = [
                 row["controller"],
                 f"{row['mean_distance_m']:.3f}",
                 f"{100 * row['above_best']:.1f} %",
@@ -101,14 +101,14 @@ class Comparison(Drawable):
                 str(row["contacts"]),
                 f"{row['mean_path_length_m']:.1f}",
             ]
-            lines.append(line)
-        widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
-        texts = []
-        for first, *others in lines:
-            cells = [first.ljust(widths[0])]
-            cells += [cell.rjust(width) for cell, width in zip(others, widths[1:], strict=True)]
-            texts.append("  ".join(cells))
-        return "\n".join(texts)
+            rows.append(cells)
+        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+        lines = []
+        for label, *values in rows:
+            aligned = [label.ljust(widths[0])]
+            aligned += [value.rjust(width) for value, width in zip(values, widths[1:], strict=True)]
+            lines.append("  ".join(aligned))
+        return "\n".join(lines)
 
 
 def compare(
@@ -161,11 +161,11 @@ def compare(
     return Comparison(records=records, histories=histories)
 
 
-def _make_unique(label: str, taken: Mapping[str, object]) -> str:
-    """Return a label, with a number if it is taken."""
-    unique = label
+def _make_unique(label: str, labels: Collection[str]) -> str:
+    """Return a label, with a number added if it is one of the given labels."""
+    unique_label = label
     number = 1
-    while unique in taken:
+    while unique_label in labels:
         number += 1
-        unique = f"{label} ({number})"
-    return unique
+        unique_label = f"{label} ({number})"
+    return unique_label

@@ -42,6 +42,7 @@ from robocov.team import PARAMETERS, Team
 MAX_RECORD_ROWS = 2e7
 """Maximum number of recorded steps times the number of robots: about 2 GB."""
 MAX_DURATION_S = 1e6
+MAX_SEED = 2**63 - 1
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -145,7 +146,7 @@ class Scenario:
             raise ParameterError("velocities: expected starts as well, got none")
         check_dt(dt)
         if seed is not None:
-            require_number("seed", seed, 0, 2**63 - 1, whole=True)
+            require_number("seed", seed, 0, MAX_SEED, whole=True)
         values: dict[str, Any] = {
             "environment": environment if isinstance(environment, Environment) else load_map(environment),
             "team": _build_team(team, robots, state),

@@ -10,7 +10,8 @@ import pytest
 
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, get_information, make_controller
-from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, PlannerState
+from robocov.controllers.atlas import MAX_PLANNING_GROUP
+from robocov.controllers.atlas_memory import AtlasMemory, OwnMotion, PlanBasis, PlannerState, TeamKnowledge
 from robocov.controllers.teammates import Teammates
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
@@ -20,6 +21,8 @@ from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations
 from robocov.observation.neighbors import Neighbors
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.window import Window
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -76,7 +79,7 @@ def test_the_team_comes_to_rest(finished: Simulation) -> None:
 @pytest.mark.slow
 def test_robots_plan_again_when_all_others_have_come_to_rest(finished: Simulation) -> None:
     """Only then they may relocate, although nothing else has changed."""
-    assert all(state.is_idle and state.was_quiet for state in finished.memory.states)
+    assert all(state.motion.is_idle and state.basis.is_quiet for state in finished.memory.states)
 
 
 @pytest.mark.slow
@@ -265,7 +268,7 @@ def test_robots_that_meet_pass_each_other_on_the_left() -> None:
         memory = simulation.memory
         # No robot makes a plan of its own.
         states = tuple(
-            replace(state, next_plan_time=math.inf, planned_map=state.known_map) for state in memory.states
+            replace(state, next_plan_time=math.inf, basis=build_basis(state)) for state in memory.states
         )
         legs = np.zeros(2, dtype=np.intp)
         simulation = simulation.with_memory(replace(memory, states=states, routes=tuple(goals), legs=legs))
@@ -344,8 +347,8 @@ def test_only_with_shared_maps_a_robot_reports_others_to_its_neighbors(
     simulation = Simulation(HALL, kind(), [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]], team)
     run_until(simulation, 2.5)
     state = simulation.memory.states[0]
-    assert state.teammates.robots.tolist() == expected
-    assert state.encountered == set(expected)
+    assert state.knowledge.teammates.robots.tolist() == expected
+    assert state.knowledge.encountered == set(expected)
 
 
 PAIR = [[9.8, 1.5], [10.2, 1.5]]
@@ -468,9 +471,10 @@ def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(plan_times) == len(set(plan_times)) == 3
     states = simulation.memory.states
     assert len({id(state.known_map) for state in states}) == 1
-    assert len({id(state.team_planner) for state in states}) == 1
-    plans = [state.planned_goals[np.argsort(state.planned_robots)] for state in states]
-    assert all(np.array_equal(plan, plans[0]) for plan in plans)
+    plans = [state.team_goals for state in states]
+    assert len({id(plan.planner) for plan in plans}) == 1
+    goals = [plan.goals[np.argsort(plan.robots)] for plan in plans]
+    assert all(np.array_equal(goals_of_one, goals[0]) for goals_of_one in goals)
 
 
 @pytest.mark.slow
@@ -507,29 +511,33 @@ def test_a_robot_is_missed_only_after_a_while() -> None:
         rest_times=np.zeros(1),
         rest_positions=assumed_position,
     )
-    state = replace(Atlas().begin(ROOMS.region, team).states[0], teammates=teammates)
+    state = replace(Atlas().begin(ROOMS.region, team).states[0], knowledge=TeamKnowledge(teammates))
     for time, expected in ((1.0, [1]), (4.9, [1]), (5.1, [])):
-        later = Atlas()._update_teammates(replace(observations, time=time), team, state, 0, [])
+        later = atlas._update_knowledge(state, replace(observations, time=time), team, 0, [])
         assert later.teammates.robots.tolist() == expected
+
+
+def build_basis(state: PlannerState) -> PlanBasis:
+    window = Window.build_around(state.known_map.raster, np.array([1.0, 1.0]), math.inf, 100)
+    return PlanBasis(
+        known_map=state.known_map,
+        planner=GridPlanner(state.known_map, window, 0.1),
+        robots=np.array([0, 1]),
+        positions=np.array([[1.0, 1.0], [2.0, 1.0]]),
+        is_quiet=True,
+    )
 
 
 def build_idle_state() -> PlannerState:
     state = Atlas().begin(ROOMS.region, Team.homogeneous(1)).states[0]
-    return replace(
-        state,
-        planned_map=state.known_map,
-        group=np.array([0, 1]),
-        positions=np.array([[1.0, 1.0], [2.0, 1.0]]),
-        was_quiet=True,
-        is_idle=True,
-    )
+    return replace(state, basis=build_basis(state), motion=OwnMotion(np.array([1.0, 1.0]), is_idle=True))
 
 
 def test_a_plan_is_skipped_only_if_nothing_has_changed() -> None:
     state = build_idle_state()
     group = np.array([0, 1])
-    positions = state.positions
-    assert positions is not None
+    assert state.basis is not None and state.motion is not None
+    positions = state.basis.positions
 
     def is_skipped(state: PlannerState, group: np.ndarray, positions: np.ndarray, is_quiet: bool) -> bool:
         return atlas._may_skip_plan(state, group, positions, is_quiet, max_move=0.1)
@@ -538,10 +546,10 @@ def test_a_plan_is_skipped_only_if_nothing_has_changed() -> None:
     assert not is_skipped(state, group, positions + [[0.0, 0.0], [0.11, 0.0]], True)
     assert not is_skipped(state, np.array([0, 2]), positions, True)
     assert not is_skipped(state, group, positions, False)
-    assert not is_skipped(replace(state, is_idle=False), group, positions, True)
+    assert not is_skipped(replace(state, motion=replace(state.motion, is_idle=False)), group, positions, True)
     other_map = DiscoveredMap(state.known_map.raster, np.ones_like(state.known_map.state))
     assert not is_skipped(replace(state, known_map=other_map), group, positions, True)
-    assert not is_skipped(replace(state, positions=None), group, positions, True)
+    assert not is_skipped(replace(state, basis=None), group, positions, True)
 
 
 def test_a_robot_starts_again_when_walls_change() -> None:
@@ -550,10 +558,12 @@ def test_a_robot_starts_again_when_walls_change() -> None:
     free = np.full(raster.shape, FREE, dtype=np.uint8)
     walls = free.copy()
     walls[50, 20:40] = WALL
-    before = replace(state, known_map=DiscoveredMap(raster, walls), planned_map=DiscoveredMap(raster, walls))
-    assert not atlas._has_changed(before, before, 0.1)
+    before = replace(state, known_map=DiscoveredMap(raster, walls))
+    basis = build_basis(replace(state, known_map=DiscoveredMap(raster, walls)))
+    assert not atlas._has_changed(basis, before, before, 0.1)
     after = replace(before, known_map=DiscoveredMap(raster, free))
-    assert atlas._has_changed(before, after, 0.1)
+    assert atlas._has_changed(basis, before, after, 0.1)
     # Small changes are the side of another robot that has come into view, or is gone.
-    assert not atlas._has_changed(before, after, 0.3)
-    assert atlas._has_changed(before, replace(before, encountered=frozenset({1})), 0.1)
+    assert not atlas._has_changed(basis, before, after, 0.3)
+    met = replace(before, knowledge=replace(before.knowledge, encountered=frozenset({1})))
+    assert atlas._has_changed(basis, before, met, 0.1)

@@ -19,7 +19,7 @@ from robocov.observation.region import Region
 from robocov.observation.scanned_view import (
     View,
     Windows,
-    compute_step_fractions,
+    compute_speed_fractions,
     find_windows,
     integrate_over_windows,
 )
@@ -108,10 +108,12 @@ def test_the_gradient_is_that_of_the_probability_of_detection(
 ) -> None:
     seen = observe(np.array([position]), density)
     view = scan_room(seen.positions[0], 1440, 3.0)
-    slopes = Boosting(jump=0.1, decay=0.5).compute_slopes(seen, view, np.array([3.0]))
-    assert slopes.value[0] == pytest.approx(integrate_view(seen.positions[0], 3.0, 0.5, density), rel=0.01)
+    contributions = Boosting(jump=0.1, decay=0.5).compute_contributions(seen, view, np.array([3.0]))
+    assert contributions.value[0] == pytest.approx(
+        integrate_view(seen.positions[0], 3.0, 0.5, density), rel=0.01
+    )
     expected = differentiate_view(seen.positions[0], 3.0, 0.5, density)
-    np.testing.assert_allclose(slopes.gradient[0], expected, atol=0.06 * np.hypot(*expected) + 0.05)
+    np.testing.assert_allclose(contributions.gradient[0], expected, atol=0.06 * np.hypot(*expected) + 0.05)
 
 
 @settings(max_examples=25)
@@ -201,9 +203,9 @@ def test_robots_spread_their_views_without_collisions(controller: Visibility | B
 def test_steps_are_halved_when_the_gradient_turns_back() -> None:
     forward = np.array([[1.0, 0.0]])
     backward = np.array([[-1.0, 0.1]])
-    assert compute_step_fractions(forward, None, None) == 1.0
-    assert compute_step_fractions(backward, forward, np.array([0.8])) == 0.4
-    assert compute_step_fractions(forward, forward, np.array([0.5])) == pytest.approx(0.6)
+    assert compute_speed_fractions(forward, None, None) == 1.0
+    assert compute_speed_fractions(backward, forward, np.array([0.8])) == 0.4
+    assert compute_speed_fractions(forward, forward, np.array([0.5])) == pytest.approx(0.6)
 
 
 def test_a_neighbor_behind_a_wall_detects_nothing_here() -> None:
@@ -228,9 +230,9 @@ def test_boosts_lead_to_where_no_robot_detects() -> None:
     seen = observe(np.array([[4.0, 4.0], [4.8, 4.0]]))
     view = View(np.full((2, 72), 3.0), np.zeros((2, 72), dtype=bool))
     for boost in ("phi", "p", "neighbours"):
-        slopes = Boosting(boost=boost).compute_slopes(seen, view, np.full(2, 3.0))
-        assert not np.allclose(slopes.gradient, slopes.boosted_gradient)
-        assert slopes.boosted_gradient[0, 0] < 0.0 < slopes.boosted_gradient[1, 0]
+        contributions = Boosting(boost=boost).compute_contributions(seen, view, np.full(2, 3.0))
+        assert not np.allclose(contributions.gradient, contributions.boosted_gradient)
+        assert contributions.boosted_gradient[0, 0] < 0.0 < contributions.boosted_gradient[1, 0]
 
 
 def test_an_ascent_is_boosted_at_rest_and_returns_to_a_better_optimum() -> None:

@@ -41,8 +41,8 @@ def test_measures() -> None:
     )
     report = check_map(environment)
     assert report.area == 60.0
-    assert report.vertices == 4 + 4 + 4 + 2
-    assert report.obstacles == 3
+    assert report.vertex_count == 4 + 4 + 4 + 2
+    assert report.obstacle_count == 3
     assert report.components == pytest.approx((60 - 4 - 1 - 0.1253, 1.0), abs=1e-3)
     assert report.free_area == pytest.approx(sum(report.components))
     assert report.free_fraction == pytest.approx(report.free_area / 60)
@@ -60,7 +60,7 @@ def test_the_warning_about_many_vertices_has_the_time(count: int, expected: str)
 def test_many_vertices_are_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robocov.mapfile.check.MANY_VERTICES", 7)
     report = check_map(room(block(4, 2, 2, 2)))
-    assert report.vertices == 8
+    assert report.vertex_count == 8
     assert report.warnings[0].startswith("This map has many vertices (8): ")
 
 

@@ -220,7 +220,7 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         "name": report.name,
         "area": f"{report.area:.6g} m²",
         "free area": f"{report.free_area:.6g} m² ({report.free_fraction:.1%})",
-        "obstacles": f"{report.obstacles}, with {report.vertices} vertices (boundary included)",
+        "obstacles": f"{report.obstacle_count}, with {report.vertex_count} vertices (boundary included)",
         "components": f"{len(report.components)} ({', '.join(areas)})",
         "narrowest gap": _format_narrowest_gap(report),
     }
