@@ -16,7 +16,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.observation.bins import find_bin, sort_into_bins
+from robocov.observation.bins import count_starts, find_bin, sort_into_bins
 from robocov.observation.neighbors import NeighborPositions
 
 CONTACT_DISTANCE = 0.01
@@ -200,7 +200,7 @@ def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Arr
     sums = np.zeros((n, 2))
     if n == 0:
         return sums
-    starts = np.empty(2 * n + 8, np.intp)
+    starts = np.empty(count_starts(n), np.intp)
     order = np.empty(n, np.intp)
     left, low, scale, columns, rows = sort_into_bins(positions, 0, n, gains.rho_0, starts, order)
     for i in range(n):

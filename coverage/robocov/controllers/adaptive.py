@@ -147,7 +147,7 @@ class Adaptive(BaseController):
         return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
     def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with new estimates, and the centroids of the cells under these as goals."""
+        """Return the memory with new estimates, and with the centroids of the cells under them as goals."""
         samples = memory.lattice.samples
         pairs = seen.find_near_neighbors(np.inf)
         neighbor_positions = seen.positions[pairs.robot] - pairs.offset

@@ -9,6 +9,7 @@ from robocov.arrays import Array, IntArray
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     arrange_in_rows,
+    clip_lengths,
     collect_obstacle_points,
     compute_approach_velocities,
     find_nearest_allowed,
@@ -173,16 +174,19 @@ class Barrier(BaseController):
         robot, neighbor, offset, distance = near
         alpha = self._compute_braking_limits(team)
         relative_velocities = seen.velocities[robot] - neighbor_velocities
-        is_together = distance < _MIN_DISTANCE_M
+        is_at_same_position = distance < _MIN_DISTANCE_M
         normal = offset / np.maximum(distance, _MIN_DISTANCE_M)[:, None]
-        normal[is_together] = compute_separations(robot[is_together], neighbor[is_together])
+        normal[is_at_same_position] = compute_separations(
+            robot[is_at_same_position], neighbor[is_at_same_position]
+        )
         total_alpha = alpha[robot] + alpha[neighbor]
         gap = distance - team.radius[robot] - team.radius[neighbor] - self.safe_gap
-        along = (normal * relative_velocities).sum(axis=1)
-        squared_sideways = np.maximum((relative_velocities * relative_velocities).sum(axis=1) - along**2, 0.0)
+        speed_away = (normal * relative_velocities).sum(axis=1)
+        squared_speed = (relative_velocities * relative_velocities).sum(axis=1)
+        squared_sideways_speed = np.maximum(squared_speed - speed_away**2, 0.0)
         min_distance = self.safe_gap + _MIN_PASSING_CLEARANCE_M
-        limit = self._limit_approach(gap, along, total_alpha)
-        limit += squared_sideways / np.maximum(distance, min_distance)
+        limit = self._limit_approach(gap, speed_away, total_alpha)
+        limit += squared_sideways_speed / np.maximum(distance, min_distance)
         limit *= alpha[robot] / total_alpha
         return HalfPlanes(
             normals=arrange_in_rows(robot, n, -normal, np.nan),
@@ -194,21 +198,21 @@ class Barrier(BaseController):
         offset = seen.positions[:, None] - points
         distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
         normal = offset / np.where(distance > 0.0, distance, np.nan)[..., None]
-        along = (normal * seen.velocities[:, None]).sum(axis=2)
+        speed_away = (normal * seen.velocities[:, None]).sum(axis=2)
         gap = distance - (team.radius + self.safe_gap)[:, None]
         alpha = self._compute_braking_limits(team)[:, None]
-        limit = self._limit_approach(np.nan_to_num(gap), np.nan_to_num(along), alpha)
-        return HalfPlanes(normals=-normal, limits=np.where(np.isnan(along), np.inf, limit))
+        limit = self._limit_approach(np.nan_to_num(gap), np.nan_to_num(speed_away), alpha)
+        return HalfPlanes(normals=-normal, limits=np.where(np.isnan(speed_away), np.inf, limit))
 
-    def _limit_approach(self, gap: Array, along: Array, alpha: Array) -> Array:
+    def _limit_approach(self, gap: Array, speed_away: Array, alpha: Array) -> Array:
         """Return the maximum acceleration toward each other: gamma h³ plus the derivative of the root in h.
 
         Parameters
         ----------
         gap : array, m
             Distance minus D_s.
-        along : array, m/s
-            Speed away from each other.
+        speed_away : array, m/s
+            Speed at which the distance grows.
         alpha : array, m/s²
             Sum of the braking limits of both.
 
@@ -219,8 +223,8 @@ class Barrier(BaseController):
         """
         rounded = np.sqrt(np.abs(gap) + _ROUNDING_M)
         root = np.sqrt(2.0 * alpha)
-        h = root * np.copysign(rounded - np.sqrt(_ROUNDING_M), gap) + along
-        return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * along, -alpha))
+        h = root * np.copysign(rounded - np.sqrt(_ROUNDING_M), gap) + speed_away
+        return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * speed_away, -alpha))
 
 
 def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports:
@@ -251,4 +255,4 @@ def _derive_velocities(reports: NeighborReports, previous: NeighborReports | Non
         )
         moves = reports.positions[rows] - previous.positions[former_rows]
         velocities[rows] = moves / (reports.time - previous.time)
-    return compute_approach_velocities(velocities, 1.0, max_speed)
+    return clip_lengths(velocities, max_speed)

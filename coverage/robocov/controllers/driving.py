@@ -85,6 +85,27 @@ def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -
     return np.asarray(offsets * factor[:, None])
 
 
+def clip_lengths(vectors: Array, max_length: Array) -> Array:
+    """Shorten vectors that are too long.
+
+    Parameters
+    ----------
+    vectors : (n, 2) array
+    max_length : (n,) array
+
+    Returns
+    -------
+    (n, 2) array
+
+    Examples
+    --------
+    >>> clip_lengths(np.array([[3.0, 4.0], [0.1, 0.0]]), np.array([1.0, 1.0]))
+    array([[0.6, 0.8],
+           [0.1, 0. ]])
+    """
+    return compute_approach_velocities(vectors, 1.0, max_length)
+
+
 def compute_drive_forces(velocities: Array, seen: Observations, team: Team, response_time: float) -> Array:
     """Compute the forces that track desired velocities.
 

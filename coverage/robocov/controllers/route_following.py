@@ -10,6 +10,7 @@ from robocov.arrays import Array, IntArray
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
+    clip_lengths,
     collect_obstacle_points,
     compute_approach_velocities,
     compute_drive_forces,
@@ -93,7 +94,7 @@ def follow_routes(
     velocities = np.where((legs == last_legs)[:, None], to_goal, to_waypoint)
     # Turning must not use up the acceleration that is needed for braking.
     max_change = _STEERING_FRACTION * team.max_acceleration * response_time
-    velocities = seen.velocities + compute_approach_velocities(velocities - seen.velocities, 1.0, max_change)
+    velocities = seen.velocities + clip_lengths(velocities - seen.velocities, max_change)
     # A robot does not know how large others are: it assumes its own size.
     separation = 2.0 * team.radius + _ROBOT_GAP_M
     velocities = velocities + _compute_evasion(seen, team, velocities, separation)

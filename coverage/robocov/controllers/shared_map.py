@@ -358,7 +358,7 @@ def update_maps(
     Parameters
     ----------
     maps : sequence of DiscoveredMap
-        One of each robot.
+        One for each robot.
     seen : Observations
     scans : Scans
     hearing_groups : sequence of HearingGroup

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -63,8 +63,7 @@ class Teammates(NamedTuple):
         joined = Teammates(
             *(np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True))
         )
-        order = np.argsort(joined.robots)
-        updated = Teammates(*(column[order] for column in joined))
+        updated = joined._select(np.argsort(joined.robots))
         _, rows, former_rows = np.intersect1d(
             updated.robots, self.robots, assume_unique=True, return_indices=True
         )
@@ -104,5 +103,9 @@ class Teammates(NamedTuple):
         # By robot, the most recent first. The sort is stable.
         order = np.lexsort((-merged.heard_times, merged.robots))
         _, first = np.unique(merged.robots[order], return_index=True)
-        order = order[first]
-        return Teammates(*(column[order] for column in merged))
+        return merged._select(order[first])
+
+    def _select(self, rows: IntArray) -> Teammates:
+        """Return the knowledge about some of the robots, in the given order."""
+        columns: list[Any] = [column[rows] for column in self]
+        return Teammates(*columns)

@@ -84,7 +84,7 @@ class AngularWallIndex(NamedTuple):
         ----------
         source_count : int
         bin_count : int
-            Number of angular bins of each source, a power of 2.
+            Number of angular bins of each source, a power of 2: their indices wrap around by a bit mask.
         max_entries : int
             Maximum number of entries, for all sources together.
 
@@ -162,8 +162,9 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     bins_per_unit = bin_count / _FULL_TURN
     first = int(np.floor((angle - half_angle) * bins_per_unit))
     last = int(np.floor((angle + half_angle) * bins_per_unit))
-    for k in range(first, min(last, first + bin_count - 1) + 1):
-        if index.squared_horizon[source, k & (bin_count - 1)] >= squared_distance:
+    for unwrapped_bin in range(first, min(last, first + bin_count - 1) + 1):
+        k = unwrapped_bin & (bin_count - 1)
+        if index.squared_horizon[source, k] >= squared_distance:
             return False
     return True
 
@@ -287,7 +288,7 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     k = covered_end & (bin_count - 1)
     has_partial_bin = covered_first <= covered_end < first_bin + bin_count
     if has_partial_bin and squared_far < index.squared_horizon[source, k]:
-        squared_chain_far = _compute_max_squared_distance(
+        squared_chain_far = _compute_max_squared_chain_distance(
             walls, wall, x, y, stop, (covered_end + 1) / bins_per_unit, squared_far
         )
         index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_chain_far)
@@ -295,10 +296,10 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
 
 
 @kernel
-def _compute_max_squared_distance(
+def _compute_max_squared_chain_distance(
     walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, squared_far: float
 ) -> float:
-    """Return the largest squared distance from (x, y) to a chain of walls up to a pseudo-angle.
+    """Return the largest squared distance from (x, y) to a chain of walls, up to a pseudo-angle.
 
     The chain consists of the walls that follow `wall`, as long as they face (x, y). `squared_far` is the
     largest squared distance to `wall` itself, which ends at `angle`. The result is inf if the chain does not

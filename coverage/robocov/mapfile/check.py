@@ -228,6 +228,7 @@ def _iterate_rings(environment: Environment) -> Iterator[tuple[str, Ring]]:
 
 
 def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> Iterator[str]:
+    """Warn of all likely mistakes."""
     vertex_count = count_vertices(environment)
     if vertex_count > MANY_VERTICES:
         yield describe_vertex_count(vertex_count)
@@ -235,10 +236,9 @@ def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> 
     yield from _find_path_warnings(environment)
     yield from _find_component_warnings(environment, radius)
     if gap is not None and gap.width < 2 * radius:
-        (a, b), (c, d) = gap.between
+        ends = " and ".join(f"[{x:.4g}, {y:.4g}]" for x, y in gap.between)
         yield (
-            f"the gap between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}] is {gap.width:.3g} m wide: "
-            f"a robot of radius {radius:g} m cannot pass"
+            f"the gap between {ends} is {gap.width:.3g} m wide: a robot of radius {radius:g} m cannot pass"
         )
     yield from _find_start_warnings(environment, radius)
 

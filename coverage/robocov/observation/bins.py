@@ -46,6 +46,22 @@ def find_bin(offset: float, scale: float) -> int:
 
 
 @kernel
+def count_starts(point_count: int) -> int:
+    """Return the length of the array `starts` with which `sort_into_bins` can sort points.
+
+    Parameters
+    ----------
+    point_count : int
+
+    Returns
+    -------
+    int
+        Upper bound of the number of bins, which the area and the sides of the points' bounding box limit.
+    """
+    return 2 * point_count + 8
+
+
+@kernel
 def sort_into_bins(
     points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
 ) -> Bins:
@@ -60,7 +76,7 @@ def sort_into_bins(
         Only ``points[first:stop]`` are sorted.
     reach : float, m
         May be infinite.
-    starts : (2 (stop - first) + 8,) int array
+    starts : int array, `count_starts` of the number of sorted points long
         Overwritten: bin b contains the points ``order[starts[b]:starts[b + 1]]``, ascending.
     order : (stop - first,) int array
         Overwritten.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.observation.bins import find_bin, sort_into_bins
+from robocov.observation.bins import count_starts, find_bin, sort_into_bins
 
 _INITIAL_NEIGHBORS = 8
 """Number of neighbors per point for which memory is allocated at first."""
@@ -69,7 +69,7 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     distance = np.empty(_INITIAL_NEIGHBORS * n)
     if n == 0:
         return indptr, ClosePairs(first, second, distance)
-    starts = np.empty(2 * n + 8, np.intp)
+    starts = np.empty(count_starts(n), np.intp)
     order = np.empty(n, np.intp)
     bins = sort_into_bins(points, 0, n, ranges.max(), starts, order)
     total = 0

@@ -149,12 +149,12 @@ def compare(
     """
     if isinstance(controllers, str) or len(controllers) == 0:
         raise ParameterError(f"controllers: expected a list of controllers, got {quote(controllers)}")
-    first = Scenario(environment, controllers[0], **options)
-    cost = CoverageCost(first.environment, lattice=lattice)
+    scenario = Scenario(environment, controllers[0], **options)
+    cost = CoverageCost(scenario.environment, lattice=lattice)
     records: dict[str, Record] = {}
     histories: dict[str, CostHistory] = {}
     for controller in controllers:
-        record = first.replace(controller=controller).run()
+        record = scenario.replace(controller=controller).run()
         label = _make_unique(record.label, records)
         records[label] = record
         histories[label] = compute_cost_history(record, cost)

@@ -168,7 +168,7 @@ def test_the_view_grows_along_the_edge_beyond_a_corner() -> None:
     """For a constant weight, the integral of (s - ρ)/ρ from ρ to D is (D - ρ)²/(2 ρ)."""
     view = View(distances=np.full((1, 4), 5.0), hit=np.zeros((1, 4), dtype=bool))
     windows = Windows(
-        robot=np.array([0]), ray=np.array([2]), across=np.array([[0.0, 1.0]]), corner=np.array([2.0])
+        robot=np.array([0]), ray=np.array([2]), across=np.array([[0.0, 1.0]]), corner_distance=np.array([2.0])
     )
     depths = view.distances[..., None] * (np.arange(100) + 0.5) / 100
     growth = integrate_over_windows(windows, view, depths, np.full(depths.shape, 3.0))
