@@ -140,11 +140,12 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
         The integral of weight * (s - ρ)/ρ along the part of the edge beyond the corner, times t (see
         `Windows`): the growth per meter of the robot's motion.
     """
+    part_count = depths.shape[2]
     edge_depths = depths[windows.robot, windows.ray]
     beyond_corner = np.maximum(edge_depths - windows.corner_distance[:, None], 0.0)
     integral = (weight[windows.robot, windows.ray] * beyond_corner).sum(axis=1)
     integral /= np.maximum(windows.corner_distance, _MIN_CORNER_DISTANCE_M)
-    integral *= view.distances[windows.robot, windows.ray] / depths.shape[2]
+    integral *= view.distances[windows.robot, windows.ray] / part_count
     return np.asarray(integral[:, None] * windows.across)
 
 
