@@ -542,6 +542,7 @@ def _find_lost_robots(teammates: Teammates, seen: Observations, team: Team, robo
     communication_range = float(team.communication_range[robot])
     is_heard = np.isin(teammates.robots, seen.neighbors.list_neighbors(robot))
     silence = np.where(is_heard, 0.0, seen.time - teammates.heard_times)
+    # Both robots may have moved apart at full speed.
     max_distance = teammates.heard_distances + 2.0 * float(team.max_speed[robot]) * silence
     distance = np.sqrt(((teammates.positions - seen.positions[robot]) ** 2).sum(axis=1))
     return _LostRobots(

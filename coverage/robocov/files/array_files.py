@@ -208,7 +208,7 @@ class ArrayCache:
             for array in arrays.values():
                 array.setflags(write=False)
             with suppress(OSError):
-                os.utime(path)
+                os.utime(path)  # It is the most recently used file now.
             return arrays
         return None
 

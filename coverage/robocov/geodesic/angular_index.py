@@ -248,16 +248,10 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
-    ux = bx - ax
-    uy = by - ay
-    side = cross(ax, ay, ux, uy)
     # A wall in line with the source hides nothing, unless the source is in its interior.
-    if side < 0.0 or (side == 0.0 and ax * bx + ay * by >= 0.0):
+    if not _faces(walls.ends, wall, x, y):
         return used
-    along = min(max(-(ax * ux + ay * uy) / (ux * ux + uy * uy), 0.0), 1.0)
-    nearest_x = ax + along * ux
-    nearest_y = ay + along * uy
-    squared_near = (nearest_x * nearest_x + nearest_y * nearest_y) * (1.0 - _PADDING)
+    squared_near = _compute_squared_segment_distance(ax, ay, bx, by) * (1.0 - _PADDING)
     if squared_near >= index.squared_reach[source]:
         return used
     squared_far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
@@ -293,6 +287,17 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
         )
         index.squared_horizon[source, k] = min(index.squared_horizon[source, k], squared_chain_far)
     return used
+
+
+@kernel
+def _compute_squared_segment_distance(ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the squared distance from the origin to the segment from (ax, ay) to (bx, by)."""
+    ux = bx - ax
+    uy = by - ay
+    fraction = min(max(-(ax * ux + ay * uy) / (ux * ux + uy * uy), 0.0), 1.0)
+    nearest_x = ax + fraction * ux
+    nearest_y = ay + fraction * uy
+    return nearest_x * nearest_x + nearest_y * nearest_y
 
 
 @kernel

@@ -220,9 +220,9 @@ def is_behind_wall(x: float, y: float, wall_distances: Array) -> bool:
     -------
     bool
     """
-    rays = len(wall_distances)
-    ray = math.floor(math.atan2(y, x) * (rays / (2.0 * math.pi)) + 0.5) % rays
-    return bool(x * x + y * y > wall_distances[ray] ** 2)
+    ray_count = len(wall_distances)
+    nearest_ray = math.floor(math.atan2(y, x) * (ray_count / (2.0 * math.pi)) + 0.5) % ray_count
+    return bool(x * x + y * y > wall_distances[nearest_ray] ** 2)
 
 
 @kernel

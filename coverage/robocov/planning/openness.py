@@ -155,12 +155,12 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
                 # The centers of two blocks are one side apart, but the border of a block is only half a side
                 # from its center, so that the flow across it is twice as large.
                 leak = blocks.unknown_counts[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
-                flow = 2.0 * blocks.free_side_counts[i, j] + leak * PRIOR_OPENNESS
-                links = 2.0 * (blocks.free_side_counts[i, j] + blocks.wall_side_counts[i, j]) + leak
-                flow += up[i, j] * u[i + 1, j] + up[i - 1, j] * u[i - 1, j]
-                flow += right[i, j] * u[i, j + 1] + right[i, j - 1] * u[i, j - 1]
-                links += up[i, j] + up[i - 1, j] + right[i, j] + right[i, j - 1]
-                step = _RELAXATION_FACTOR * (flow / links - u[i, j])
+                inflow = 2.0 * blocks.free_side_counts[i, j] + leak * PRIOR_OPENNESS
+                conductance = 2.0 * (blocks.free_side_counts[i, j] + blocks.wall_side_counts[i, j]) + leak
+                inflow += up[i, j] * u[i + 1, j] + up[i - 1, j] * u[i - 1, j]
+                inflow += right[i, j] * u[i, j + 1] + right[i, j - 1] * u[i, j - 1]
+                conductance += up[i, j] + up[i - 1, j] + right[i, j] + right[i, j - 1]
+                step = _RELAXATION_FACTOR * (inflow / conductance - u[i, j])
                 u[i, j] += step
                 max_step = max(max_step, abs(step))
         if max_step < _TOLERANCE:
