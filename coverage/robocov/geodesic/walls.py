@@ -187,6 +187,7 @@ def _find_sectors(segments: _Segments) -> _Sectors:
     At a pinch, each outgoing wall is paired with the next incoming wall counter-clockwise; see `Walls`.
     """
     vertices = segments.vertices
+    # As many walls end at a vertex as start there: sorted by vertex, both kinds have the same rows.
     leaving = np.argsort(segments.start, kind="stable")
     arriving = np.argsort(segments.end, kind="stable")
     vertex = segments.start[leaving]

@@ -10,6 +10,8 @@ from robocov.planning.map_window import SIDES
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
+_ADDED_LENGTH_M = 1.0
+"""Length that is added to paths, so that very short ones do not outweigh the stake."""
 
 
 def find_viewpoint(
@@ -62,12 +64,15 @@ def find_viewpoint(
     column = frontier.columns[is_worth_visiting, None] + columns_right
     node = row // window.stride * window.columns + column // window.stride
     node = np.clip(node, 0, len(path_lengths) - 1)
-    stake_per_length = frontier_stakes[is_worth_visiting, None] / (1.0 + path_lengths[node])
+    stake_per_length = frontier_stakes[is_worth_visiting, None] / (_ADDED_LENGTH_M + path_lengths[node])
     value = frontier.is_side_free[is_worth_visiting] * stake_per_length
     first_center = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
+    # Former viewpoints in units of cells, from the center of the first cell of the window.
+    former_cells = (np.array(former_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
-    for x, y in (np.array(former_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size:
-        value[(x - column) ** 2 + (y - row) ** 2 < min_distance**2] = 0.0
+    for former_column, former_row in former_cells:
+        squared_distances = (former_column - column) ** 2 + (former_row - row) ** 2
+        value[squared_distances < min_distance**2] = 0.0
     best = value.argmax()
     if not value.flat[best] > 0.0:
         return None
