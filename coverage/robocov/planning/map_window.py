@@ -128,9 +128,11 @@ class MapWindow:
     @cached_property
     def frontier(self) -> Frontier:
         """The unknown cells next to free cells with room for a robot."""
+        height, width = self.is_free.shape
         is_usable = np.pad(self.is_free & ~self.is_tight, 1)
         is_side_free = np.stack(
-            [is_usable[1:-1, 2:], is_usable[2:, 1:-1], is_usable[1:-1, :-2], is_usable[:-2, 1:-1]], axis=-1
+            [is_usable[1 + up : 1 + up + height, 1 + right : 1 + right + width] for up, right in SIDES],
+            axis=-1,
         )
         rows, columns = np.nonzero(is_side_free.any(axis=-1) & (self.patches > 0))
         return Frontier(
