@@ -362,10 +362,10 @@ class Boosting(BaseController):
         """Return the gradient of the integral of a weight times p over the views, (n, 2) m."""
         directions = compute_ray_directions(view.distances.shape[1])
         angle = 2.0 * np.pi / len(directions)
-        density = weight * samples.detection
+        integrand = weight * samples.detection
         arcs = ~view.hit * np.exp(-self.decay * reach)[:, None] * reach[:, None] * angle
-        ray_terms = self.decay * (density * samples.areas).sum(axis=2) + weight[..., -1] * arcs
-        growth = integrate_over_windows(windows, view, samples.depths, density)
+        ray_terms = self.decay * (integrand * samples.areas).sum(axis=2) + weight[..., -1] * arcs
+        growth = integrate_over_windows(windows, view, samples.depths, integrand)
         window_terms = sum_by_robot(windows.robot, growth, len(reach))
         return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + window_terms)
 
