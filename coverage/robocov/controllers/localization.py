@@ -252,8 +252,13 @@ def _update_track(
     tracking_index = maneuver * dt * dt / max(sigma, _MIN_SIGMA_M)
     discriminant = 8.0 * tracking_index + tracking_index * tracking_index
     root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
-    alpha = max(1.0 - root * root, 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0)))
-    beta = min(max(2.0 * (1.0 - root) ** 2, 6.0 / (k * (k + 1.0))), 1.0)
+    steady_alpha = 1.0 - root * root
+    steady_beta = 2.0 * (1.0 - root) ** 2
+    # The gains with which k messages are fitted by least squares are larger for small k.
+    initial_alpha = 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0))
+    initial_beta = 6.0 / (k * (k + 1.0))
+    alpha = max(steady_alpha, initial_alpha)
+    beta = min(max(steady_beta, initial_beta), 1.0)
     for axis in range(2):
         expected = tracks.positions[i, j, axis] + dt * tracks.velocities[i, j, axis]
         residual = messages.positions[m, axis] - expected

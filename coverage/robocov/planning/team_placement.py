@@ -140,10 +140,10 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
     """Return sources, (k,), with a lower cost. The last column of the table represents all other robots."""
     # The order does not depend on who plans, so that all robots choose the same of two equally good plans.
     order = np.lexsort(team.former_goals.T)
-    others = table.shape[1] - 1
+    others_source = table.shape[1] - 1
     improved_sources = improve_sources(
         table,
-        np.append(chosen[order], others),
+        np.append(chosen[order], others_source),
         np.append(team.is_fixed[order], True),
         min_saving,
         removals=len(chosen) <= _MAX_ROBOTS_FOR_THOROUGH_SEARCH,

@@ -135,10 +135,10 @@ def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbor_steps:
     """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it."""
     crossings = 0
     for k in range(0, 8, 2):
-        is_first = _is_graph_at(is_graph, row, column, neighbor_steps[k])
-        is_second = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 1) % 8])
-        is_third = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 2) % 8])
-        if not is_first and (is_second or is_third):
+        has_side = _is_graph_at(is_graph, row, column, neighbor_steps[k])
+        has_corner = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 1) % 8])
+        has_next_side = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 2) % 8])
+        if not has_side and (has_corner or has_next_side):
             crossings += 1
     return crossings
 
