@@ -33,6 +33,10 @@ _MAX_EQUAL_DISTANCE_M = 1e-6
 """Vertices closer than this are probably meant to be the same."""
 
 
+_INTERIORS_INTERSECT = "T********"
+"""DE-9IM pattern of two shapes whose interiors have points in common."""
+
+
 class StartReport(NamedTuple):
     """A start of a map.
 
@@ -254,7 +258,7 @@ def _find_shape_warnings(environment: Environment) -> Iterator[str]:
             yield f"{path}[{index}] and the next vertex are at the same position"
     boundary = environment.boundary_polygon
     for k, obstacle in enumerate(environment.obstacles):
-        if not shapely.relate_pattern(obstacle.polygon, boundary, "T********"):
+        if not shapely.relate_pattern(obstacle.polygon, boundary, _INTERIORS_INTERSECT):
             yield f"{_format_obstacle(environment, k)} is entirely outside the boundary"
 
 
