@@ -204,9 +204,9 @@ def test_planning_starts_again_when_a_robot_fails() -> None:
     conditions = Conditions(failures=((4, 2.0),))
     simulation = Simulation(ROOMS, Atlas(), CORNER, dt=0.05, conditions=conditions)
     run_until(simulation, 1.9)
-    assert max(state.start_time for state in simulation.memory.states[:3]) < 1.0
+    assert max(state.path.start_time for state in simulation.memory.states[:3]) < 1.0
     run_until(simulation, 5.0)
-    assert all(2.0 <= state.start_time < 4.5 for state in simulation.memory.states[:3])
+    assert all(2.0 <= state.path.start_time < 4.5 for state in simulation.memory.states[:3])
 
 
 @pytest.mark.slow
@@ -214,14 +214,14 @@ def test_required_savings_double_with_the_path_length(monkeypatch: pytest.Monkey
     savings: list[float] = []
     find_own_goal = atlas.find_own_goal
 
-    def record_saving(*args: Any) -> Any:
-        savings.append(args[-1])
-        return find_own_goal(*args)
+    def record_saving(*args: Any, **kwargs: Any) -> Any:
+        savings.append(kwargs["min_saving"])
+        return find_own_goal(*args, **kwargs)
 
     monkeypatch.setattr(atlas, "find_own_goal", record_saving)
     simulation = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
     run_until(simulation, 8.0)
-    path_length = max(state.path_length for state in simulation.memory.states)
+    path_length = max(state.path.length for state in simulation.memory.states)
     assert path_length > 3.0
     assert min(savings) == 0.002
     doublings = path_length / (0.1 * ROOMS.region.diameter)
@@ -233,9 +233,9 @@ def test_robots_at_rest_stay_as_ready_to_move_as_they_were() -> None:
     """Required savings depend on the path length, not on time."""
     simulation = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
     run_until(simulation, 60.0)
-    path_lengths = [state.path_length for state in simulation.memory.states]
+    path_lengths = [state.path.length for state in simulation.memory.states]
     run_until(simulation, 90.0)
-    assert [state.path_length for state in simulation.memory.states] == path_lengths
+    assert [state.path.length for state in simulation.memory.states] == path_lengths
 
 
 @pytest.mark.slow
@@ -361,7 +361,7 @@ def test_robots_out_of_range_are_assumed_at_their_goals() -> None:
     run_until(simulation, 40.0)
     positions = simulation.positions
     np.testing.assert_allclose(np.sort(positions, axis=0), [[5.0, 1.5], [15.0, 1.5]], atol=0.5)
-    first, second = [state.teammates for state in simulation.memory.states]
+    first, second = [state.knowledge.teammates for state in simulation.memory.states]
     assert first.robots.tolist() == [1]
     assert second.robots.tolist() == [0]
     # They have been out of range for long.
@@ -375,7 +375,7 @@ def test_robots_that_become_silent_within_range_are_forgotten() -> None:
     team = Team.homogeneous(2, communication_range=5.0)
     simulation = Simulation(HALL, Atlas(), PAIR, team, dt=0.05, conditions=conditions)
     run_until(simulation, 40.0)
-    assert len(simulation.memory.states[0].teammates.robots) == 0
+    assert len(simulation.memory.states[0].knowledge.teammates.robots) == 0
     np.testing.assert_allclose(simulation.positions[0], [10.0, 1.5], atol=0.5)
 
 
@@ -386,18 +386,18 @@ def test_robots_that_are_not_at_their_assumed_positions_are_forgotten() -> None:
     simulation = Simulation(HALL, Atlas(), PAIR, team, dt=0.05)
     run_until(simulation, 20.0)
     memory = simulation.memory
-    start_time = memory.states[0].start_time
+    start_time = memory.states[0].path.start_time
     positions = simulation.positions.copy()
     positions[0, 0] += 0.8 * (positions[1, 0] - positions[0, 0])
     conditions = Conditions(failures=(Failure(2, 20.0),))
     simulation = simulation.with_changes(positions=positions, conditions=conditions).with_memory(memory)
     simulation.step()
     # At first, its messages may only be late.
-    assert simulation.memory.states[0].teammates.robots.tolist() == [1]
+    assert simulation.memory.states[0].knowledge.teammates.robots.tolist() == [1]
     run_until(simulation, 50.0)
     state = simulation.memory.states[0]
-    assert len(state.teammates.robots) == 0
-    assert state.start_time == start_time
+    assert len(state.knowledge.teammates.robots) == 0
+    assert state.path.start_time == start_time
     np.testing.assert_allclose(simulation.positions[0], [10.0, 1.5], atol=0.7)
 
 
