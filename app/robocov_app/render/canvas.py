@@ -125,6 +125,14 @@ class Canvas:
         if ends := clipped_segment(start, end):
             pygame.draw.aaline(self.surface, color, ends[0], ends[1], width)
 
+    def thin_path(self, points: Sequence[Pixel], color: Color, closed: bool = False) -> None:
+        """Draw a smooth line of one pixel through points within `FAR`."""
+        if len(points) == 2:
+            # With two points, aalines of pygame-ce 2.5 reads memory beyond them: frames would vary.
+            pygame.draw.aaline(self.surface, color, points[0], points[1])
+        else:
+            pygame.draw.aalines(self.surface, color, closed, points)
+
     def segments(self, ends: Array, color: Color, width: int = 1) -> None:
         """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
         far = len(ends) > 0 and np.abs(ends).max() > FAR

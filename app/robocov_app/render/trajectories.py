@@ -53,13 +53,15 @@ class Trajectories:
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         whole = canvas.width(width / canvas.scale)
         # mostly below the robot's disc, where seams do not show, nor steps in a crowd
-        lines = pygame.draw.aalines if len(ends) < CROWD else pygame.draw.lines
+        smooth = len(ends) < CROWD
         for path, end, color in zip(self._open, ends, colors, strict=True):
             still = len(path) == 1 and max(abs(path[0][0] - end[0]), abs(path[0][1] - end[1])) < 1.0
             if still or path[-1][0] != path[-1][0]:  # nan: not there yet
                 continue
-            if whole == 1:
-                lines(canvas.surface, color, False, [*path, end])
+            if whole == 1 and smooth:
+                canvas.thin_path([*path, end], color)
+            elif whole == 1:
+                pygame.draw.lines(canvas.surface, color, False, [*path, end])
             else:
                 canvas.outline(np.array([*path, end]), color, whole, closed=False)
 

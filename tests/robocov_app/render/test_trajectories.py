@@ -2,6 +2,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import pygame
 import pytest
 import shapely
 from drawn_pixels import SIZE, distance, drawn, layer_named, nearest
@@ -382,3 +383,21 @@ def test_pieces_on_the_page_and_new_ones_are_alike(size):
                 abs(distance(frame, pixel, LIGHT.background) - distance(at_once, pixel, LIGHT.background))
                 < 130
             )
+
+
+def test_a_short_path_is_drawn_once_and_smooth(monkeypatch):
+    """With two points, `pygame.draw.aalines` reads memory beyond them, so that frames would vary."""
+    n_points = []
+    draw_lines = pygame.draw.aalines
+
+    def draw_and_count(surface, color, closed, points):
+        n_points.append(len(points))
+        return draw_lines(surface, color, closed, points)
+
+    monkeypatch.setattr(pygame.draw, "aalines", draw_and_count)
+    painter, _ = painter_of()
+    painter.scale = 0.5
+    for rows in range(2, 30):
+        frame_of(painter, walks(rows))
+    assert n_points
+    assert min(n_points) > 2

@@ -360,7 +360,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
         for start, end in pairwise((0, *ends)):
             if end - start > 1:
-                pygame.draw.aalines(canvas.surface, color, True, corners[start:end].tolist())
+                canvas.thin_path(corners[start:end].tolist(), color, closed=True)
         return
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
