@@ -1,4 +1,4 @@
-"""The interface of executors of tasks, and what they do when a worker ends in the middle of a task."""
+"""The interface of executors of tasks, and their recovery when a worker ends in the middle of a task."""
 
 from __future__ import annotations
 

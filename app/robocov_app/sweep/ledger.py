@@ -1,4 +1,11 @@
-"""The folder of a sweep: each run in a folder of its own, complete or absent, with checksums."""
+"""The folder of a sweep: each run in a folder of its own, complete or absent, with checksums.
+
+There is no database next to the folders. An SQLite index of 2000 runs saved 0.1 ms a run when a sweep was
+resumed (0.07 instead of 0.17 ms, as the checksums must be verified in any case), but each of its transactions
+took 4 ms in addition to the 6 ms for the folder of the run. It would be a second description of the runs that
+may contradict the first one after a crash or after a user has removed a folder, and its write-ahead log does
+not work on network file systems, where sweeps of clusters are written.
+"""
 
 from __future__ import annotations
 
@@ -336,7 +343,7 @@ def is_sweep(folder: Path) -> bool:
 def _read_versions_of_format_1(
     folder: Path, figures: Mapping[str, Any], error: str | None
 ) -> Mapping[str, str]:
-    """Return the versions of a run of format 1; raise DamagedRunError if its two files disagree."""
+    """Read the versions of a run of format 1; raise DamagedRunError if its two files disagree."""
     file_name = "run.json" if error is None else "error.json"
     run = json.loads(_read_file(folder / file_name))
     if error is not None:

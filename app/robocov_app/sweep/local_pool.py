@@ -26,7 +26,7 @@ _KILLED_STATUS = -getattr(signal, "SIGKILL", 9)
 
 
 class LocalPool(Executor):
-    """Processes on this machine, each of which executes one task at a time. One that ends is replaced.
+    """Processes on this machine. Each executes one task at a time, and is replaced when it ends.
 
     Parameters
     ----------

@@ -204,7 +204,7 @@ def build_conditions(parameters: Mapping[str, ParameterValue], seed: int, robots
     Parameters
     ----------
     parameters : mapping of str to float, str or None
-        Values of parameters, of which only the conditions are used.
+        Values of parameters. Only the conditions are used.
     seed : int
         Seed of noise, message loss and failures.
     robots : int
@@ -241,7 +241,7 @@ def build_swept_team(robots: int, parameters: Mapping[str, ParameterValue]) -> T
     robots : int
         Number of robots.
     parameters : mapping of str to float, str or None
-        Values of parameters, of which conditions are ignored.
+        Values of parameters. Conditions are ignored.
 
     Returns
     -------

@@ -152,7 +152,7 @@ def report_progress(title: str, progress: SweepProgress, *, quiet: bool) -> Iter
     title : str
         Title of the bar, or beginning of each line.
     progress : SweepProgress
-        The progress, whose last state is printed at the end where there is no terminal.
+        The progress. Without a terminal, its last state is printed at the end.
     quiet : bool
         Whether nothing is printed.
 
@@ -169,13 +169,14 @@ def report_progress(title: str, progress: SweepProgress, *, quiet: bool) -> Iter
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as ProgressBar
 
-    columns = (
+    progress_bar = ProgressBar(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.fields[numbers]}", markup=False),
         TextColumn("{task.fields[outlook]}", markup=False),
+        console=Console(stderr=True),
     )
-    with ProgressBar(*columns, console=Console(stderr=True)) as bar:
+    with progress_bar as bar:
         bar.add_task(title, total=progress.total, numbers="", outlook="")
         yield ProgressReporter(title, bar=bar)
 

@@ -63,7 +63,7 @@ _MAX_LATTICE = 2048
 _MAX_NUMBERS = {"duration": 1e6, "dt": 1.0, "cost_hz": 1e4, "record_hz": 1e4}
 """Maximum values of a study's numbers, in s and Hz."""
 Swept: TypeAlias = float | Sequence[float | None] | None
-"""One value, or a list of values, each of which is tried."""
+"""One value, or a list of values that are all tried."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class StudyMap:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Definition of a sweep: all combinations of the given values.
+    """Definition of a sweep: all combinations of the given values; `generate_tasks` yields their scenarios.
 
     For the same map and seed, all controllers start from the same positions.
 
@@ -93,8 +93,8 @@ class Study:
     controllers : sequence of str
         Names of controllers, or ``file.py:Class``.
     gains : mapping of str to Gains
-        What is tried of each controller. Given as `build_gains` accepts it; controllers that are not named
-        have their default gains.
+        Sets of gains that are tried of each controller. Given as `build_gains` accepts it; controllers that
+        are not named have their default gains.
     robots : sequence of int
         Numbers of robots.
     starts : sequence of str
@@ -104,8 +104,8 @@ class Study:
     duration, dt : float, s
         Simulated time and control period.
     radius, max_speed, max_acceleration, viscosity, sensing_range, communication_range
-        Parameters of the robots in SI units, see `robocov.Team`: a value, or a list of values, each of which
-        is tried. None means no limit.
+        Parameters of the robots in SI units, see `robocov.Team`: a value, or a list of values that are all
+        tried. None means no limit.
     kinematics, track_width, turning_rate
         Further parameters of the robots, likewise.
     conditions : mapping of str to object
@@ -115,9 +115,9 @@ class Study:
     lattice : int
         The cost is computed on this number of sites along each side of the map.
     cost_hz : float, Hz
-        Rate at which the cost is evaluated; 0 for the first and the last moment only.
+        Rate at which the cost is evaluated; 0 for the first and the last step only.
     record_hz : float, Hz
-        Rate at which trajectories are saved; 0 for the first and the last moment only.
+        Rate at which trajectories are saved; 0 for the first and the last step only.
     metrics : bool
         Whether the table contains the metrics of `robocov.metrics.run_metrics`, too.
     sampling : Sampling or None

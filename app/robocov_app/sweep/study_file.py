@@ -103,11 +103,11 @@ _SAMPLING_KEYS = {"method": _METHOD, "samples": _WHOLE_NUMBER, "seed": _WHOLE_NU
 _STUDY = _TableSchema(
     "a table",
     {
-        "maps": _accept_list("a list of names of maps, or of paths beside this file", _TEXT),
+        "maps": _accept_list("a list of names of maps, or of paths relative to this file", _TEXT),
         "controllers": _accept_list("a list of controllers", _TEXT),
         "robots": _accept_list("a whole number, or a list of whole numbers", _WHOLE_NUMBER),
         "starts": _TEXTS,
-        "seeds": _accept_list("how many seeds, or a list of seeds", _WHOLE_NUMBER),
+        "seeds": _accept_list("a number of seeds, or a list of seeds", _WHOLE_NUMBER),
         "duration": _NUMBER,
         "dt": _NUMBER,
         "cost_hz": _NUMBER,

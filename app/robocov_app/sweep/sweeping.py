@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import compress, takewhile
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from robocov.errors import OutputError, RobocovError, require_number
 from robocov.kernel_compilation import compile_kernels
 from robocov_app.sweep.cluster import Cluster
 from robocov_app.sweep.executor import Executor
-from robocov_app.sweep.ledger import Ledger, describe_version_differences, open_ledger
+from robocov_app.sweep.ledger import Ledger, Survey, describe_version_differences, open_ledger
 from robocov_app.sweep.local_pool import LocalPool, count_processors
 from robocov_app.sweep.progress import SweepProgress, report_progress
 from robocov_app.sweep.study import Study
@@ -78,9 +79,9 @@ def sweep(
     title: str = "sweep",
     stop: Interruption | None = None,
 ) -> Totals:
-    """Execute all runs of a study that are left, and write its table.
+    """Execute the remaining runs of a study, and write its table.
 
-    Whatever ends it, the same call resumes it, and ends with the same table, byte for byte.
+    After any interruption, the same call resumes the sweep and ends with the same table, byte for byte.
 
     Parameters
     ----------
@@ -129,38 +130,41 @@ def sweep(
         reporter = stack.enter_context(report_progress(title, progress, quiet=quiet))
         surveyed_tasks = takewhile(lambda _: not interruption.requested, generate_tasks(study))
         survey = ledger.survey(surveyed_tasks, retry_failed=retry_failed, keep_versions=keep_versions)
-        progress.reused = len(survey.is_left) - sum(survey.is_left)
+        remaining_runs = sum(survey.is_left)
+        progress.reused = len(survey.is_left) - remaining_runs
         for line in survey.describe(keep_versions=keep_versions):
             reporter.print_line(line)
         rows = _RowWriter(ledger, table, zip(survey.is_left, generate_tasks(study), strict=False))
-
-        def open_executor() -> Executor:
-            if scheduler is not None:
-                return Cluster(scheduler)
-            compile_kernels()
-            return LocalPool(min(workers or count_processors(), sum(survey.is_left)))
-
-        def store(task: Task, outcome: Outcome) -> None:
-            if not keep_versions:
-                _require_same_versions(outcome)
-            ledger.store(task, outcome)
-            rows.finished.add(task.name)
-            rows.write()
-
+        outcomes = _OutcomeStore(ledger, rows, requires_same_versions=not keep_versions)
         tasks = compress(generate_tasks(study), survey.is_left)
+        processes = min(workers or count_processors(), remaining_runs)
+        open_executor = partial(_open_executor, scheduler, processes)
         failure: RobocovError | None = None
         try:
             rows.write()
-            for _ in execute_tasks(tasks, open_executor, progress, interruption, store):
+            for _ in execute_tasks(tasks, open_executor, progress, interruption, outcomes.store):
                 reporter.update(progress)
         except RobocovError as error:
             # The finished runs belong in the table all the same.
             failure = error
         table.is_complete = failure is None and not interruption.requested
         if not table.is_complete:
-            rows.write_all_finished()
+            rows.write_remaining()
     if failure is not None:
         raise failure
+    return _compute_totals(progress, survey, rows, table)
+
+
+def _open_executor(scheduler: str | None, processes: int) -> Executor:
+    """Connect to a Dask scheduler, or start processes on this machine if there is none."""
+    if scheduler is not None:
+        return Cluster(scheduler)
+    compile_kernels()
+    return LocalPool(processes)
+
+
+def _compute_totals(progress: SweepProgress, survey: Survey, rows: _RowWriter, table: Table) -> Totals:
+    """Combine the runs of this call with those of earlier calls."""
     return Totals(
         done=progress.done,
         failed=progress.failed + survey.failed,
@@ -233,7 +237,7 @@ def execute_tasks(
 
 
 class _RowWriter:
-    """Writes the rows of a table in the order of the tasks, in whatever order they finish.
+    """Writes the rows of a table in the order of the tasks; they may finish in any order.
 
     Attributes
     ----------
@@ -264,8 +268,8 @@ class _RowWriter:
                 raise OutputError(f"{self._ledger.folder}: {task.name} was removed by another program")
             self._advance(task)
 
-    def write_all_finished(self) -> None:
-        """Write the rows of all remaining tasks that have finished, leaving out the others."""
+    def write_remaining(self) -> None:
+        """Write the rows of all remaining tasks that have finished, and leave out the others."""
         while self._next is not None:
             _, task = self._next
             self._write_row(task)
@@ -287,3 +291,28 @@ class _RowWriter:
         if entry.error is not None and len(self.run_by_error) < _MAX_ERRORS:
             self.run_by_error.setdefault(entry.error, task.name)
         return True
+
+
+class _OutcomeStore:
+    """Stores the outcomes of tasks in the ledger, and writes their rows.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    rows : _RowWriter
+    requires_same_versions : bool
+        Whether outcomes of other versions than those of this process are rejected.
+    """
+
+    def __init__(self, ledger: Ledger, rows: _RowWriter, *, requires_same_versions: bool) -> None:
+        self._ledger = ledger
+        self._rows = rows
+        self._requires_same_versions = requires_same_versions
+
+    def store(self, task: Task, outcome: Outcome) -> None:
+        """Store the outcome of a task, and write the rows that can be written now."""
+        if self._requires_same_versions:
+            _require_same_versions(outcome)
+        self._ledger.store(task, outcome)
+        self._rows.finished.add(task.name)
+        self._rows.write()

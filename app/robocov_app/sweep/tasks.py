@@ -22,7 +22,7 @@ from robocov_app.sweep.study import Study
 MAX_CACHED_MAPS = 4
 """Number of maps that a process keeps in memory. Tasks come map by map."""
 _DIGEST_FORMAT = "robocov-task 1"
-"""Beginning of the text that is hashed. Other results of the same inputs are told apart by their versions."""
+"""Beginning of the text that is hashed. Results of other versions are distinguished by their versions."""
 _MAX_NAME_CHARS = 24
 """Maximum length of each name in the name of a folder."""
 _NAME_DIGEST_CHARS = 10
@@ -136,7 +136,7 @@ def parse_map(document: str, name: str) -> Environment:
 
 
 def _to_file_name(part: object) -> str:
-    """Return a part of a name with letters, digits, underscores, dots and hyphens only."""
+    """Return a part of a file name; characters other than ASCII letters, digits, `_`, `.` become hyphens."""
     name = re.sub(r"[^A-Za-z0-9_.]+", "-", str(part)).strip(".-")
     return name[:_MAX_NAME_CHARS] or "x"
 
@@ -150,7 +150,7 @@ class _TaskController(NamedTuple):
     source : ControllerSource or None
     gains : dict of str to float, str or None
     hashed_inputs : dict
-        What the digests of its tasks depend on.
+        Inputs that the digests of its tasks depend on.
     """
 
     name: str
@@ -179,7 +179,7 @@ def generate_tasks(study: Study) -> Iterator[Task]:
         "record_hz": study.record_hz,
     }
     if study.metrics:
-        # Without them, digests are those of the time before there were metrics.
+        # The entry is left out otherwise, so that earlier tasks without metrics keep their digests.
         settings["metrics"] = True
     controllers = _list_controllers(study)
     for study_map in study.maps:

@@ -175,7 +175,7 @@ def build_failure(message: str, details: str) -> Outcome:
     message : str
         Reason of the failure. It may contain anything, as controllers of the user write it.
     details : str
-        Traceback, or what the process printed last.
+        Traceback, or the last output of the process.
 
     Returns
     -------

@@ -141,7 +141,7 @@ WRONG = [
     ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: duplicate value 1, given already at seeds[0]"),
     ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: expected a whole number from 0 to "),
-    ("seeds = 4", "seeds = 1e3", "seeds: expected how many seeds, or a list of seeds, got 1000.0"),
+    ("seeds = 4", "seeds = 1e3", "seeds: expected a number of seeds, or a list of seeds, got 1000.0"),
     ("duration = 5.0", "duration = nan", "duration: expected a number from 0 to 1e+06, got nan"),
     ("duration = 5.0", "duration = [5]", "duration: expected a number, got [5]"),
     (
@@ -243,7 +243,7 @@ WRONG = [
     (
         'maps = ["rooms", "plans/hall.json"]',
         "",
-        "maps: missing, expected a list of names of maps, or of paths beside ",
+        "maps: missing, expected a list of names of maps, or of paths relative to ",
     ),
     (
         '"mine.py:Mine"]',
