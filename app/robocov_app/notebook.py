@@ -28,9 +28,9 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.text import escape_controls
 from robocov_app.figures.files import figure_png
+from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.render.camera import format_scale_length, round_length
 from robocov_app.render.density import mean_label
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.report.embedding import ReplayRun
@@ -305,7 +305,7 @@ def environment_html(environment: Environment) -> str:
     low_x, low_y, high_x, high_y = environment.region.bounds
     width = high_x - low_x
     frame = PictureFrame(environment, *_MAX_MAP_SIZE_PX)
-    bar_length = round_length(width / 5)
+    bar_length = round_down(width / 5)
     bar_ends = np.array([[low_x, low_y], [low_x + bar_length, low_y]])
     # Percent of the width, so that the bar stays right when the page shrinks the map.
     left, right = frame.to_pixels(bar_ends)[:, 0] / (frame.width / 100)

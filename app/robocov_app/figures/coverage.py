@@ -133,7 +133,7 @@ class _Extent:
 
 @dataclass(frozen=True)
 class _Arrangement:
-    """Where the parts of a page are, px.
+    """Positions of the parts of a page, px.
 
     Attributes
     ----------

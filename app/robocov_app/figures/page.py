@@ -16,8 +16,8 @@ from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
 from robocov_app.look.axes import MAX_VALUE_INTERVALS, TICK_FACTORS, VALUE_MARGIN, choose_value_limits
 from robocov_app.look.colors import Color
+from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.theme import Theme
-from robocov_app.render.camera import format_scale_length, round_length
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
@@ -196,7 +196,7 @@ class Page:
 
     def _scale_bar(self, left: float, y: float, zoom: float) -> float:
         """Draw a bar of a round length; return where its words end."""
-        length = round_length(self._longest_bar / zoom)
+        length = round_down(self._longest_bar / zoom)
         tick, right = 4 * self.scale, left + length * zoom
         for x1, x2, half in ((left, right, 0.0), (left, left, tick), (right, right, tick)):
             (a, b), (c, d) = self.at(x1, y - half), self.at(x2, y + half)

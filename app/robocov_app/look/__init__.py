@@ -8,6 +8,7 @@ everywhere. Nothing in this package draws.
 - `robot_colors`: hues of robots and of their cells; colors of trajectories.
 - `curve_styles`: color, dashes and marker of the curve of each controller.
 - `axes`: limits and ticks of axes.
+- `lengths`: round lengths of scale bars and grids, and their labels.
 - `labels`: places of labels side by side, and texts that fit in.
 - `legend`: names of the elements of a picture, and one legend for several pictures.
 """

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array
+from robocov_app.look.lengths import round_down
 
 MAX_LOW_FRACTION = 0.4
 """An axis starts at zero if its lowest value is below this fraction of its highest."""
@@ -162,16 +163,3 @@ def choose_growing_time_limit(end_s: float) -> float:
         step = round_down(end_s / 5.0)
     step = max(step, 5.0)
     return float(math.ceil((end_s * 1.03 + 1e-9) / step) * step)
-
-
-def round_down(number: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is not above a positive number.
-
-    Examples
-    --------
-    >>> [round_down(number) for number in (0.7, 1.0, 3.9, 49.0)]
-    [0.5, 1.0, 2.0, 20.0]
-    """
-    power = 10.0 ** math.floor(math.log10(number) + 1e-12)
-    factor = max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= number * (1 + 1e-9))
-    return float(f"{factor * power:.12g}")

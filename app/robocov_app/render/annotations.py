@@ -7,9 +7,10 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import Theme
-from robocov_app.render.camera import Camera, format_scale_length, round_length
+from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.fonts import shortened, text_width
 from robocov_app.render.scene import Scene
@@ -50,7 +51,7 @@ def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
 
 def bar_length(canvas: Canvas) -> float:
     room = min(max(canvas.surface.get_width() / 8, 30.0), 160 * canvas.scale)
-    return round_length(room / canvas.camera.zoom)
+    return round_down(room / canvas.camera.zoom)
 
 
 def draw_caption(canvas: Canvas, scene: Scene) -> None:

@@ -17,9 +17,6 @@ MAX_PIXEL = 1e8
 """Largest coordinate that pygame gets."""
 _MIN_SIZE_M = 1e-9
 _MIN_SIZE_PX = 1.0
-_METERS_PER_KILOMETER = 1000
-_MIN_METERS = 0.1
-"""Length below which labels are in centimeters, m."""
 Box: TypeAlias = tuple[float, float, float, float]
 
 
@@ -119,25 +116,3 @@ class Camera:
 
 def _limit_zoom(zoom: float) -> float:
     return min(max(zoom, MIN_ZOOM_PX_PER_M), MAX_ZOOM_PX_PER_M)
-
-
-def round_length(maximum: float) -> float:
-    """Return the largest of 1, 2 or 5 times a power of ten that does not exceed a length."""
-    power = float(10.0 ** np.floor(np.log10(maximum) + 1e-12))
-    step = max(step for step in (1.0, 2.0, 5.0) if step * power <= maximum * (1 + 1e-9))
-    return float(f"{step * power:.12g}")
-
-
-def format_scale_length(meters: float) -> str:
-    """Return a length with its unit, as on a scale bar.
-
-    Examples
-    --------
-    >>> [format_scale_length(meters) for meters in (0.05, 2.0, 5000.0)]
-    ['5 cm', '2 m', '5 km']
-    """
-    if meters >= _METERS_PER_KILOMETER:
-        return f"{meters / _METERS_PER_KILOMETER:g} km"
-    if meters < _MIN_METERS:
-        return f"{meters * 100:g} cm"
-    return f"{meters:g} m"

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from robocov.arrays import Array, IntArray
 from robocov.density import Density
 from robocov_app.look import legend
+from robocov_app.look.lengths import format_scale_length
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import STRIP
-from robocov_app.render.camera import format_scale_length
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import colors, density_label, parts
 from robocov_app.render.distance_field import Field, levels, middles, palette, strength, ticks

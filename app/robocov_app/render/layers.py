@@ -11,7 +11,7 @@ import shapely
 
 from robocov_app.look.colors import Color
 from robocov_app.look.legend import MOVING_OBSTACLE, UNKNOWN_OBSTACLE
-from robocov_app.render.camera import round_length
+from robocov_app.look.lengths import round_down
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.moving_obstacles import MovingObstacle
 from robocov_app.render.scene import Scene
@@ -92,8 +92,8 @@ def cells_legend(scene: Scene) -> list[LegendEntry]:
 def draw_grid(canvas: Canvas, scene: Scene) -> None:
     """Draw lines within the region at the least round distance that leaves `GRID_GAP` between them."""
     least = GRID_GAP * canvas.scale / canvas.camera.zoom
-    step = round_length(least)
-    step = step if step >= least else round_length(2.5001 * step)
+    step = round_down(least)
+    step = step if step >= least else round_down(2.5001 * step)
     region, seen = scene.environment.region, canvas.camera.compute_visible_bounds()
     color, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
     for axis in (0, 1):

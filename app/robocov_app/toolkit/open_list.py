@@ -21,7 +21,7 @@ _KEY_STEPS = {"up": -1, "down": 1, "page up": -8, "page down": 8, "home": -9999,
 
 
 class ListResponse(Enum):
-    """What an event does to an open list."""
+    """Effect of an event on an open list."""
 
     IGNORED = "ignored"
     """The event is not for the list."""

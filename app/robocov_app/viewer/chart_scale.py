@@ -1,4 +1,4 @@
-"""Where times and values are on the chart of a session."""
+"""Positions of times and values on the chart of a session."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

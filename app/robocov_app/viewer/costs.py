@@ -54,7 +54,7 @@ class KnownCost:
 
 
 class _SharedSites(NamedTuple):
-    """What all results on a map share: sites, corners of geodesics, and weights of the sites."""
+    """Data that all results on a map share: sites, corners of geodesics, and weights of the sites."""
 
     sites: Sites
     corners: Array

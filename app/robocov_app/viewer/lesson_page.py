@@ -1,4 +1,4 @@
-"""How a lesson is shown: as a page in place of the panel, or as a caption over the map."""
+"""Display of a lesson: a page in place of the panel, or a caption over the map."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

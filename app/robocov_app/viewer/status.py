@@ -24,7 +24,7 @@ _SUGGESTIONS = {
     "density": "paint where it matters (G)",
     "robot": "let one more join (A)",
 }
-"""What to try, by the kind of edit that it leads to."""
+"""Suggestions to the user, by the kind of edit that follows them."""
 
 
 def list_facts(

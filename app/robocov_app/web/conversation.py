@@ -31,7 +31,7 @@ _PAUSE_S = 0.05
 
 @dataclass
 class SharedWindow:
-    """What all pages have in common.
+    """The parts of a served window that all pages share.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ class TraveledPath:
 
 @dataclass(frozen=True, eq=False)
 class PlanBasis:
-    """What one robot knew when it made its last plan."""
+    """Knowledge of a robot when it made its last plan."""
 
     known_map: DiscoveredMap
     planner: GridPlanner
@@ -70,7 +70,7 @@ class TeamGoals:
 
 @dataclass(frozen=True, eq=False)
 class OwnMotion:
-    """What one robot does by its last plan."""
+    """Motion of a robot by its last plan."""
 
     goal: Array
     """(2,) m, its own goal."""

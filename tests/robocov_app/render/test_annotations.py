@@ -15,14 +15,14 @@ from robocov_app.render.picture import Painter, pane_layers, standard_layers
 @pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)
 @pytest.mark.parametrize("size", [(640, 480), (1920, 1080)])
 def test_the_scale_bar_is_as_long_as_it_says(environment, size):
-    from robocov_app.render.camera import round_length
+    from robocov_app.look.lengths import round_down
 
     pixels, painter = changed(scene_of(run_of(environment, 2)), "scale_bar", size=size)
     rows, counts = np.unique(pixels[:, 1], return_counts=True)
     bar = pixels[pixels[:, 1] == rows[counts.argmax()]]
     run = np.split(np.sort(bar[:, 0]), np.nonzero(np.diff(np.sort(bar[:, 0])) > 1)[0] + 1)[0]
     meters = (len(run) - 1) / painter.camera.zoom
-    assert meters == pytest.approx(round_length(meters * 1.02), rel=0.03)
+    assert meters == pytest.approx(round_down(meters * 1.02), rel=0.03)
 
 
 def test_the_status_line_says_what_it_is_given():

@@ -3,13 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.render.camera import (
-    MAX_ZOOM_PX_PER_M,
-    MIN_ZOOM_PX_PER_M,
-    Camera,
-    format_scale_length,
-    round_length,
-)
+from robocov_app.look.lengths import format_scale_length, round_down
+from robocov_app.render.camera import MAX_ZOOM_PX_PER_M, MIN_ZOOM_PX_PER_M, Camera
 
 lengths = st.floats(1e-2, 1e4)
 places = st.floats(-1e4, 1e4)
@@ -76,7 +71,7 @@ def test_visible_is_the_view(camera):
 
 @given(st.floats(1e-6, 1e6))
 def test_round_length_is_the_largest_round_one(limit):
-    length = round_length(limit)
+    length = round_down(limit)
     mantissa = float(f"{length:e}".split("e")[0])
     assert mantissa == pytest.approx(round(mantissa)) and round(mantissa) in (1, 2, 5)
     assert length <= limit * (1 + 1e-6) < 2.5001 * length * (1 + 1e-6)

@@ -5,7 +5,7 @@ import pygame
 import pytest
 
 from robocov_app.look.colors import mix, parse_hex_color
-from robocov_app.render.camera import format_scale_length, round_length
+from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.render.canvas import clipped_polygon, clipped_segment
 from robocov_app.render.density import cost_label
 from robocov_app.render.distance_field import round_limit, ticks
@@ -19,7 +19,7 @@ def test_colors() -> None:
 
 
 def test_round_lengths() -> None:
-    assert [round_length(x) for x in (0.7, 1.0, 3.9, 49.0)] == [0.5, 1.0, 2.0, 20.0]
+    assert [round_down(x) for x in (0.7, 1.0, 3.9, 49.0)] == [0.5, 1.0, 2.0, 20.0]
     assert [format_scale_length(x) for x in (0.05, 0.5, 2.0, 5000.0)] == ["5 cm", "0.5 m", "2 m", "5 km"]
     limits = [round_limit(x) for x in (0.93, 1.0, 4.2, 13.0, float("nan"))]
     assert limits == [1.0, 1.0, 5.0, 15.0, 1.0]

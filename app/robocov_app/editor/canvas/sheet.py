@@ -15,9 +15,10 @@ from robocov_app.editor.canvas.view import View, choose_outside_color, compute_p
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.look.colors import Color, mix
+from robocov_app.look.lengths import round_down
 from robocov_app.look.theme import LIGHT
 from robocov_app.render import fonts, heatmaps
-from robocov_app.render.camera import Camera, round_length
+from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.surface_cache import Latest
 
@@ -332,14 +333,14 @@ def compute_grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, f
     fine = grid
     min_fine = MIN_FINE_GRID_PX * scale / zoom
     if fine < min_fine:
-        factor = round_length(min_fine / grid)
+        factor = round_down(min_fine / grid)
         if factor < min_fine / grid:
-            factor = round_length(2.5001 * factor)
+            factor = round_down(2.5001 * factor)
         fine = grid * factor
     min_coarse = MIN_COARSE_GRID_PX * scale / zoom
-    factor = round_length(max(min_coarse / fine, 1.0))
+    factor = round_down(max(min_coarse / fine, 1.0))
     if factor * fine < min_coarse:
-        factor = round_length(2.5001 * factor)
+        factor = round_down(2.5001 * factor)
     coarse = fine * factor
     return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
 

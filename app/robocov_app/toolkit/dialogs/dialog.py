@@ -1,4 +1,4 @@
-"""What all dialogs have in common."""
+"""Base class of dialogs."""
 
 from pygame import Rect
 

@@ -1,4 +1,4 @@
-"""What widgets have in common: text sizes, boxes, faces, the focus ring, texts."""
+"""Common appearance of widgets: text sizes, boxes, faces, focus ring and texts."""
 
 import pygame
 from pygame import Rect

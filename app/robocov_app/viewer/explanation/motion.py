@@ -1,4 +1,4 @@
-"""How a robot moves: steadily, to and fro, not at all, or from now on."""
+"""Kinds of motion of a robot: steady, to and fro, none, or just begun."""
 
 from enum import Enum
 

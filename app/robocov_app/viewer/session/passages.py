@@ -1,4 +1,4 @@
-"""What an edit of a map does to passages: areas that it cuts off, and gaps that are too narrow."""
+"""Effects of an edit of the map on passages: areas that it cuts off, and gaps that are too narrow."""
 
 from collections.abc import Sequence
 

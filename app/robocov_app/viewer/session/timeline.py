@@ -130,7 +130,7 @@ class Timeline:
 
     @property
     def events(self) -> list[SessionEvent]:
-        """What happened up to the present."""
+        """The events up to the present."""
         return self.document.list_events(self.head, self.step, self.scenario.dt)
 
     @property

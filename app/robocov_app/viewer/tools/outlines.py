@@ -6,7 +6,7 @@ from math import dist
 
 import numpy as np
 
-from robocov.environment import Point, WallObstacle
+from robocov.environment import Obstacle, Point
 from robocov.errors import RobocovError
 from robocov_app.toolkit.drawn_outline import SAME_POINT_M, DrawnOutline
 from robocov_app.viewer.session import map_edits
@@ -73,21 +73,25 @@ class SnappedOutline:
 
 
 @dataclass
-class AddPolygonTool(Tool):
-    """Draws a polygon corner by corner."""
+class OutlineTool(Tool):
+    """Base class of tools that draw an obstacle point by point.
 
-    name = "polygon"
-    title = "Polygon"
-    key = "p"
-    hint = "click the corners; Enter, a double click or a click on the first corner closes it"
+    Attributes
+    ----------
+    drawing : SnappedOutline
+        The points so far.
+    """
+
     ends_on_double_click = True
 
-    drawing: SnappedOutline = field(
-        default_factory=lambda: SnappedOutline(DrawnOutline(min_points=3, closes=True)), repr=False
-    )
+    drawing: SnappedOutline = field(repr=False)
+
+    def build_obstacle(self, points: list[Point]) -> Obstacle:
+        """Build the obstacle with these points, m; raise RobocovError if they are none of its kind."""
+        raise NotImplementedError
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Add a corner, or close the polygon."""
+        """Add a point, or complete the obstacle."""
         return self.finish(session) if self.drawing.press(session, point, reach) else None
 
     def move(self, session: Session, point: Point) -> None:
@@ -99,14 +103,14 @@ class AddPolygonTool(Tool):
         return self.finish(session) if self.drawing.release(session, point) else None
 
     def finish(self, session: Session) -> str | None:
-        """Add the polygon to the map."""
-        corners = self.drawing.take_points()
-        if not corners:
+        """Add the obstacle to the map."""
+        points = self.drawing.take_points()
+        if not points:
             return None
-        return add_obstacle(session, map_edits.build_polygon(corners), self.name)
+        return add_obstacle(session, self.build_obstacle(points), self.name)
 
     def cancel(self, session: Session) -> bool:
-        """Drop the corners."""
+        """Drop the points."""
         return self.drawing.cancel()
 
     def build_preview(self, session: Session) -> Preview | None:
@@ -115,7 +119,25 @@ class AddPolygonTool(Tool):
 
 
 @dataclass
-class AddWallTool(Tool):
+class AddPolygonTool(OutlineTool):
+    """Draws a polygon corner by corner."""
+
+    name = "polygon"
+    title = "Polygon"
+    key = "p"
+    hint = "click the corners; Enter, a double click or a click on the first corner closes it"
+
+    drawing: SnappedOutline = field(
+        default_factory=lambda: SnappedOutline(DrawnOutline(min_points=3, closes=True)), repr=False
+    )
+
+    def build_obstacle(self, points: list[Point]) -> Obstacle:
+        """Build the polygon with these corners, m."""
+        return map_edits.build_polygon(points)
+
+
+@dataclass
+class AddWallTool(OutlineTool):
     """Draws a wall point by point, or with a single drag.
 
     Attributes
@@ -128,7 +150,6 @@ class AddWallTool(Tool):
     title = "Wall"
     key = "w"
     hint = "drag, or click its points; Enter or a double click ends it; [ and ] change its width"
-    ends_on_double_click = True
     is_resizable = True
 
     drawing: SnappedOutline = field(
@@ -136,38 +157,19 @@ class AddWallTool(Tool):
     )
     width: float = DEFAULT_WALL_WIDTH_M
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Add a point, or end the wall."""
-        return self.finish(session) if self.drawing.press(session, point, reach) else None
-
-    def move(self, session: Session, point: Point) -> None:
-        """Move the end that follows the cursor."""
-        self.drawing.move(session, point)
-
-    def release(self, session: Session, point: Point) -> str | None:
-        """End a drag."""
-        return self.finish(session) if self.drawing.release(session, point) else None
-
-    def finish(self, session: Session) -> str | None:
-        """Add the wall to the map."""
-        points = self.drawing.take_points()
-        if not points:
-            return None
-        return add_obstacle(session, map_edits.build_wall(points, self.width), self.name)
-
-    def cancel(self, session: Session) -> bool:
-        """Drop the points."""
-        return self.drawing.cancel()
+    def build_obstacle(self, points: list[Point]) -> Obstacle:
+        """Build the wall with these points, m."""
+        return map_edits.build_wall(points, self.width)
 
     def build_preview(self, session: Session) -> Preview | None:
         """Return the wall so far."""
         outline = self.drawing.build_preview()
         if outline is None:
             return None
-        wall: WallObstacle | None = None
+        wall: Obstacle | None = None
         # Two points in the same position are no wall yet.
         with suppress(RobocovError):
-            wall = map_edits.build_wall(list(outline.line), self.width)
+            wall = self.build_obstacle(list(outline.line))
         return Preview(outline.line, obstacle=wall, label=f"{outline.label}, {self.width:g} m wide")
 
     def resize(self, session: Session, factor: float) -> str:

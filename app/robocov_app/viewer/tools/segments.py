@@ -54,7 +54,32 @@ class DraggedSegment:
 
 
 @dataclass
-class RulerTool(Tool):
+class SegmentTool(Tool):
+    """Base class of tools that drag from one point to another.
+
+    Attributes
+    ----------
+    segment : DraggedSegment
+    """
+
+    segment: DraggedSegment = field(default_factory=DraggedSegment, repr=False)
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Start a segment."""
+        self.segment.press(point)
+        return None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Drag the end of the segment to the cursor."""
+        self.segment.move(point)
+
+    def cancel(self, session: Session) -> bool:
+        """Drop the segment."""
+        return self.segment.clear()
+
+
+@dataclass
+class RulerTool(SegmentTool):
     """Measures the distance between two points."""
 
     name = "ruler"
@@ -62,25 +87,10 @@ class RulerTool(Tool):
     key = "m"
     hint = "drag from one point to another"
 
-    segment: DraggedSegment = field(default_factory=DraggedSegment, repr=False)
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Start measuring."""
-        self.segment.press(point)
-        return None
-
-    def move(self, session: Session, point: Point) -> None:
-        """Measure up to the cursor."""
-        self.segment.move(point)
-
     def release(self, session: Session, point: Point) -> str | None:
         """Keep the measurement."""
         self.segment.release()
         return None
-
-    def cancel(self, session: Session) -> bool:
-        """Remove the measurement."""
-        return self.segment.clear()
 
     def build_preview(self, session: Session) -> Preview | None:
         """Return the segment with its length and its components."""
@@ -94,24 +104,13 @@ class RulerTool(Tool):
 
 
 @dataclass
-class AddCircleTool(Tool):
+class AddCircleTool(SegmentTool):
     """Draws a round pillar from its center."""
 
     name = "circle"
     title = "Circle"
     key = "c"
     hint = "drag from the center to the rim"
-
-    segment: DraggedSegment = field(default_factory=DraggedSegment, repr=False)
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Put the center."""
-        self.segment.press(point)
-        return None
-
-    def move(self, session: Session, point: Point) -> None:
-        """Drag the rim to the cursor."""
-        self.segment.move(point)
 
     def release(self, session: Session, point: Point) -> str | None:
         """Add the circle to the map."""
@@ -120,10 +119,6 @@ class AddCircleTool(Tool):
         if center is None:
             return None
         return add_obstacle(session, map_edits.build_circle(center, point), self.name)
-
-    def cancel(self, session: Session) -> bool:
-        """Drop the circle."""
-        return self.segment.clear()
 
     def build_preview(self, session: Session) -> Preview | None:
         """Return the circle so far."""
