@@ -93,7 +93,10 @@ class CoverageCost:
         self.spacing = self.sites.spacing
         # Each row describes the sites of one tile that are visible from one corner; see `build_corner_views`.
         indices, lengths = geodesics.run_for_corners(
-            partial(find_corner_views, geodesics.walls, tiles), progress
+            partial(find_corner_views, geodesics.walls, tiles),
+            index_columns=3,
+            length_columns=2,
+            progress=progress,
         )
         views = build_corner_views(len(tiles.boxes), indices, lengths)
         self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)

@@ -173,10 +173,10 @@ def find_links(
         The corners are those from `first` up to `end`.
     index : AngularWallIndex
         Scratch space for one source.
-    pairs : (m, 3) int array
-        Result: the two corners of each link, in the first two columns.
-    lengths : (m, 2) array, grid steps
-        Result: the length of each link, in the first column.
+    pairs : (m, 2) int array
+        Result: the two corners of each link.
+    lengths : (m, 1) array, grid steps
+        Result: the length of each link.
 
     Returns
     -------

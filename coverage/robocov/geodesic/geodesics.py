@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 import shapely
@@ -26,6 +26,8 @@ from robocov.geodesic.corner_graph import (
 from robocov.geodesic.grid import Grid
 from robocov.geodesic.walls import Walls, build_walls, count_windings
 
+_Result = TypeVar("_Result")
+
 SOURCE_BINS = 128
 """Number of angular bins per source."""
 _CORNER_BINS = 256
@@ -44,19 +46,13 @@ _SNAP_STEPS = 2
 """Number of grid steps around the nearest point of a slanted wall where a free point is searched for."""
 
 
-class IndexComputation(Protocol):
-    """A computation that uses an index and returns rows of indices and lengths.
-
-    What the columns mean is up to the computation. It returns the number of rows written, or -1 if space ran
-    out.
-    """
-
-    def __call__(self, index: AngularWallIndex, indices: IntArray, lengths: Array, /) -> int:
-        """Write rows of `indices` and `lengths`."""
-
-
 class CornerComputation(Protocol):
-    """A computation for the corners from `first` up to `end`; see `IndexComputation`."""
+    """A computation that produces rows for the corners from `first` up to `end`.
+
+    It writes whole numbers, such as the indices of corners, to `indices`, and the lengths that belong to them
+    to `lengths`. It chooses the columns of both. It returns the number of rows that it has written, or -1 if
+    there was not enough space for them or in the index.
+    """
 
     def __call__(
         self, first: int, end: int, index: AngularWallIndex, indices: IntArray, lengths: Array, /
@@ -117,44 +113,70 @@ class Geodesics:
     def _build_graph(self, heartbeat: Callable[[], None] | None) -> CornerGraph:
         count = len(self.corners)
         visible = np.empty(count, np.int64)
-        progress = None if heartbeat is None else lambda _: heartbeat()
-        pairs, lengths = self.run_for_corners(partial(find_links, self.walls, visible), progress)
-        return build_corner_graph(count, pairs[:, :2], lengths[:, 0])
+        pairs, lengths = self.run_for_corners(
+            partial(find_links, self.walls, visible),
+            index_columns=2,
+            length_columns=1,
+            progress=None if heartbeat is None else lambda _: heartbeat(),
+        )
+        return build_corner_graph(count, pairs, lengths[:, 0])
 
     def run_for_corners(
-        self, compute: CornerComputation, progress: Callable[[float], None] | None = None
+        self,
+        compute: CornerComputation,
+        index_columns: int,
+        length_columns: int,
+        progress: Callable[[float], None] | None = None,
     ) -> tuple[IntArray, Array]:
         """Run a computation for all corners, a batch at a time.
 
         Parameters
         ----------
         compute : callable
-            Called as ``compute(first, end, index, indices, lengths)`` for the corners from `first` up to
-            `end`. The index has space for one source.
+            See `CornerComputation`. The index that it is called with has space for one source.
+        index_columns, length_columns : int
+            Number of whole numbers and of lengths in each row that it writes.
         progress : callable, optional
             Called with the fraction that is done. It may raise an exception to stop.
 
         Returns
         -------
-        indices : (r, 3) int array
-        lengths : (r, 2) array, grid steps
+        indices : (r, index_columns) int array
+        lengths : (r, length_columns) array, grid steps
             All rows that `compute` has written.
         """
         count = len(self.corners)
-        all_indices = [np.empty((0, 3), np.int64)]
-        all_lengths = [np.empty((0, 2))]
+        all_indices = [np.empty((0, index_columns), np.int64)]
+        all_lengths = [np.empty((0, length_columns))]
         for first in range(0, count, _CORNERS_PER_REPORT):
             if progress is not None:
                 progress(first / count)
             end = min(first + _CORNERS_PER_REPORT, count)
-            _, indices, lengths = self.run_with_index(1, _CORNER_BINS, partial(compute, first, end))
+            indices, lengths = self._compute_rows(partial(compute, first, end), index_columns, length_columns)
             all_indices.append(indices)
             all_lengths.append(lengths)
         return np.concatenate(all_indices), np.concatenate(all_lengths)
 
+    def _compute_rows(
+        self,
+        compute: Callable[[AngularWallIndex, IntArray, Array], int],
+        index_columns: int,
+        length_columns: int,
+    ) -> tuple[IntArray, Array]:
+        """Return the rows of a `CornerComputation` for one batch of corners."""
+
+        def compute_rows(index: AngularWallIndex) -> tuple[IntArray, Array] | None:
+            max_rows = len(index.entry_wall)
+            indices = np.empty((max_rows, index_columns), np.int64)
+            lengths = np.empty((max_rows, length_columns))
+            used = compute(index, indices, lengths)
+            return None if used < 0 else (indices[:used].copy(), lengths[:used].copy())
+
+        return self.run_with_index(1, _CORNER_BINS, compute_rows)
+
     def run_with_index(
-        self, source_count: int, bin_count: int, compute: IndexComputation
-    ) -> tuple[AngularWallIndex, IntArray, Array]:
+        self, source_count: int, bin_count: int, compute: Callable[[AngularWallIndex], _Result | None]
+    ) -> _Result:
         """Run a computation with a new index; repeat it with a larger one until there is enough space.
 
         Parameters
@@ -164,23 +186,18 @@ class Geodesics:
         bin_count : int
             Number of bins of each source.
         compute : callable
-            Called as ``compute(index, indices, lengths)``. It returns the number of rows that it has written
-            to `indices` and `lengths`, or -1 if there was not enough space there or in the index.
+            Called with the index. It returns None if there was not enough space.
 
         Returns
         -------
-        index : AngularWallIndex
-        indices : (r, 3) int array
-        lengths : (r, 2) array
+        object
+            What `compute` has returned.
         """
         while True:
             max_entries = self._entries_per_source[bin_count] * source_count + 2 * bin_count
-            index = AngularWallIndex.allocate(source_count, bin_count, max_entries)
-            indices = np.empty((max_entries, 3), np.int64)
-            lengths = np.empty((max_entries, 2))
-            used = compute(index, indices, lengths)
-            if used >= 0:
-                return index, indices[:used].copy(), lengths[:used].copy()
+            result = compute(AngularWallIndex.allocate(source_count, bin_count, max_entries))
+            if result is not None:
+                return result
             self._entries_per_source[bin_count] *= 2
 
     def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
@@ -315,13 +332,13 @@ class Geodesics:
         distances = np.empty((len(grid_positions), corner_count))
         paths = CornerPaths.allocate(corner_count)
 
-        def fill(index: AngularWallIndex, _indices: IntArray, _lengths: Array) -> int:
-            used: int = _find_corner_distances(
+        def fill(index: AngularWallIndex) -> AngularWallIndex | None:
+            has_space = _find_corner_distances(
                 self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
             )
-            return used
+            return index if has_space else None
 
-        index, _, _ = self.run_with_index(len(grid_positions), SOURCE_BINS, fill)
+        index = self.run_with_index(len(grid_positions), SOURCE_BINS, fill)
         return index, distances, paths
 
     def find_path(self, source: Array, target: Array) -> Array:
@@ -369,11 +386,11 @@ def _find_corner_distances(
     must_be_straight: bool,
     distances: Array,
     paths: CornerPaths,
-) -> int:
+) -> bool:
     """Write the distances from (n, 2) points to the corners, (n, k).
 
-    `paths` is overwritten for each point, and finally contains the paths from the last one. Return the
-    number of index entries used, or -1 if there are too few.
+    `paths` is overwritten for each point, and finally contains the paths from the last one. Return whether
+    the index has enough space.
     """
     corner_count = len(walls.corners)
     queue = CornerQueue(np.empty(corner_count + 1, np.int64), np.empty(corner_count, np.bool_))
@@ -383,7 +400,7 @@ def _find_corner_distances(
         y = points[i, 1]
         used = add_walls(walls, index, i, x, y, np.inf, used)
         if used < 0:
-            return -1
+            return False
         for corner in range(corner_count):
             paths.length[corner] = np.inf
             paths.source[corner] = 0
@@ -400,7 +417,7 @@ def _find_corner_distances(
         if not must_be_straight:
             relax_paths(graph, paths, queue, count)
         distances[i] = paths.length
-    return used
+    return True
 
 
 @kernel

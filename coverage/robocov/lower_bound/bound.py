@@ -366,10 +366,9 @@ class _Dual:
         profits = np.empty((2, len(triangles)))
         grid_prices = prices / self._unit
 
-        def fill(index: AngularWallIndex, _indices: IntArray, _lengths: Array) -> int:
-            return int(
-                bound_profits(self._site_data, index, grid_prices, triangles, centers, scratch, profits)
-            )
+        def fill(index: AngularWallIndex) -> Array | None:
+            used = bound_profits(self._site_data, index, grid_prices, triangles, centers, scratch, profits)
+            return None if used < 0 else profits
 
         self._geodesics.run_with_index(1, SOURCE_BINS, fill)
         profits *= self._unit
