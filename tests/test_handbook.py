@@ -51,6 +51,20 @@ def test_every_public_name_is_in_use_on_a_page() -> None:
     assert used == {*rc.__all__}
 
 
+def test_the_architecture_page_names_every_package_and_only_existing_modules() -> None:
+    page = PAGES["architecture.md"]
+    names = set(re.findall(r"`(\w+)`", page))
+    for root in ROOTS:
+        modules = {
+            path.stem for path in root.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()
+        }
+        public_modules = {module for module in modules if not module.startswith("_")}
+        assert public_modules <= names
+    for path in re.findall(r"`([\w/]+\.py)`", page):
+        candidates = [ROOT / path, *(root / path for root in ROOTS)]
+        assert any(candidate.is_file() for candidate in candidates), path
+
+
 def test_every_extra_and_every_environment_variable_is_explained() -> None:
     source = "".join(path.read_text() for root in ROOTS for path in root.rglob("*.py"))
     for variable in re.findall(r'"(ROBOCOV_[A-Z]+)"', source):
