@@ -149,40 +149,73 @@ def _build_home(rng: np.random.Generator) -> FloorPlan:
     """Draw a flat: a rectangle that is divided repeatedly, a door in each wall, some furniture."""
     width = rng.uniform(10.0, 14.0)
     height = rng.uniform(8.0, 11.0)
-    walls: list[Obstacle] = []
-    furniture: list[Obstacle] = []
+    flat = _Flat(rng)
+    flat.divide(0.0, 0.0, width, height)
+    return _build_box(0.0, 0.0, width, height), [*flat.walls, *flat.furniture]
 
-    def divide(left: float, bottom: float, right: float, top: float) -> None:
+
+class _Flat:
+    """The walls and the furniture of a flat, which is divided into rooms."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.walls: list[Obstacle] = []
+        self.furniture: list[Obstacle] = []
+        self._rng = rng
+
+    def divide(self, left: float, bottom: float, right: float, top: float) -> None:
+        """Divide a rectangle across its longer side until its parts are rooms, and furnish them."""
         is_wide = right - left > top - bottom
-        low, high = (left, right) if is_wide else (bottom, top)
+        if is_wide:
+            split = self._add_wall(left, right, start=bottom, end=top, is_vertical=True)
+        else:
+            split = self._add_wall(bottom, top, start=left, end=right, is_vertical=False)
+        if split is None:
+            self._furnish(left, bottom, right, top)
+        elif is_wide:
+            self.divide(left, bottom, split, top)
+            self.divide(split, bottom, right, top)
+        else:
+            self.divide(left, bottom, right, split)
+            self.divide(left, split, right, top)
+
+    def _add_wall(
+        self, low: float, high: float, *, start: float, end: float, is_vertical: bool
+    ) -> float | None:
+        """Add a wall with a door near the middle of a range.
+
+        Parameters
+        ----------
+        low, high : float, m
+            Range that the wall divides.
+        start, end : float, m
+            Ends of the wall along its direction.
+        is_vertical : bool
+
+        Returns
+        -------
+        float or None, m
+            Position of the wall in its range; None, and no wall, if the range is that of a single room.
+        """
+        rng = self._rng
         if high - low < rng.uniform(4.6, 6.4):
-            furnish(left, bottom, right, top)
-            return
+            return None
         split = low + (high - low) * rng.uniform(0.38, 0.62)
-        start, end = (bottom, top) if is_wide else (left, right)
         door = rng.uniform(start + 0.8, end - 0.8)
         door_width = rng.uniform(0.8, 1.1)
-        walls.extend(
-            _build_wall_with_door(split, start, end, door=door, width=door_width, is_vertical=is_wide)
+        self.walls += _build_wall_with_door(
+            split, start, end, door=door, width=door_width, is_vertical=is_vertical
         )
-        if is_wide:
-            divide(left, bottom, split, top)
-            divide(split, bottom, right, top)
-        else:
-            divide(left, bottom, right, split)
-            divide(left, split, right, top)
+        return split
 
-    def furnish(left: float, bottom: float, right: float, top: float) -> None:
+    def _furnish(self, left: float, bottom: float, right: float, top: float) -> None:
         """Place one piece of furniture in a corner of a room that is large enough."""
-        block_width = rng.uniform(0.5, 1.6)
-        block_depth = rng.uniform(0.4, 0.9)
-        if right - left > block_width + 2.2 and top - bottom > block_depth + 2.2:
-            x = left + 0.06 if rng.random() < 0.5 else right - 0.06 - block_width
-            y = bottom + 0.06 if rng.random() < 0.5 else top - 0.06 - block_depth
-            furniture.append(_build_block(x, y, block_width, block_depth))
-
-    divide(0.0, 0.0, width, height)
-    return _build_box(0.0, 0.0, width, height), [*walls, *furniture]
+        rng = self._rng
+        width = rng.uniform(0.5, 1.6)
+        depth = rng.uniform(0.4, 0.9)
+        if right - left > width + 2.2 and top - bottom > depth + 2.2:
+            x = left + 0.06 if rng.random() < 0.5 else right - 0.06 - width
+            y = bottom + 0.06 if rng.random() < 0.5 else top - 0.06 - depth
+            self.furniture.append(_build_block(x, y, width, depth))
 
 
 def _build_office(rng: np.random.Generator) -> FloorPlan:

@@ -119,7 +119,7 @@ def plan_routes(
 ) -> tuple[Array, ...]:
     """Assign the positions of a placement to robots, and plan the shortest paths to them.
 
-    Goals are assigned anew even while the robots move: one that blocks the path of another takes over its
+    Goals are assigned again even while the robots move: one that blocks the path of another takes over its
     goal.
 
     Parameters

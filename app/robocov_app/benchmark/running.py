@@ -79,16 +79,21 @@ def run_benchmark(
             return None
         rows.extend(_read_rows(track, study, folder))
     any_study = next(iter(studies.values()))
-    result = {
+    result = _describe_result(controller.describe(any_study), selection)
+    _write_result(out / RESULT_FILE, result, rows)
+    return {**result, "rows": rows}
+
+
+def _describe_result(entry: dict[str, Any], selection: Selection) -> dict[str, Any]:
+    """Return a result without its rows, for the description of a controller."""
+    return {
         **RESULT_FORMAT,
         "suite": identify_suite(),
         "selection": {"quick": selection.quick, "tracks": selection.tracks, "maps": selection.maps},
-        "entry": controller.describe(any_study),
+        "entry": entry,
         "versions": list_result_versions(),
         "method": describe_method(),
     }
-    _write_result(out / RESULT_FILE, result, rows)
-    return {**result, "rows": rows}
 
 
 def _check_folder(out: Path) -> None:

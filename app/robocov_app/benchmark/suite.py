@@ -244,9 +244,9 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
     for name in tracks or default_tracks:
         track_maps = TRACKS[name].maps
         if maps:
-            track_maps = tuple(each for each in track_maps if each in maps)
+            track_maps = tuple(map_name for map_name in track_maps if map_name in maps)
         elif quick:
-            track_maps = _select_first_of_families(track_maps)
+            track_maps = _select_one_per_family(track_maps)
         if track_maps:
             selection[name] = track_maps
     if not selection:
@@ -255,7 +255,7 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
     return selection
 
 
-def _select_first_of_families(maps: Sequence[str]) -> tuple[str, ...]:
+def _select_one_per_family(maps: Sequence[str]) -> tuple[str, ...]:
     first: dict[str, str] = {}
     for name in maps:
         first.setdefault(FAMILY_OF[name], name)

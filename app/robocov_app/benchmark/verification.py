@@ -68,29 +68,52 @@ def verify_result(
     """
     result = read_result(path)
     studies = _build_studies(result, path, controller)
-    tasks = {
-        (track, task.map, task.seed): task
-        for track, study in studies.items()
-        for task in generate_tasks(study)
-    }
+    tasks = _index_tasks(studies)
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
     differences = list(_compare_without_running(result, rows, tasks))
     sampled = _sample_runs(rows.keys() & tasks.keys(), sample, seed)
-    keys_by_name = {tasks[key].name: key for key in sampled}
+    progress = SweepProgress(len(sampled))
+    differences += _repeat_runs(
+        {key: tasks[key] for key in sampled}, rows, progress, workers=workers, quiet=quiet, stop=stop
+    )
+    return progress.finished, list(dict.fromkeys(differences))
+
+
+def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
+    """Return the tasks of the sweeps of all tracks."""
+    tasks = {}
+    for track, study in studies.items():
+        for task in generate_tasks(study):
+            tasks[track, task.map, task.seed] = task
+    return tasks
+
+
+def _repeat_runs(
+    tasks: Mapping[RunKey, Task],
+    rows: Mapping[RunKey, Row],
+    progress: SweepProgress,
+    *,
+    workers: int,
+    quiet: bool,
+    stop: Interruption,
+) -> list[str]:
+    """Execute tasks again, and list the differences from their rows."""
+    differences: list[str] = []
+    keys_by_name = {task.name: key for key, task in tasks.items()}
 
     def compare(task: Task, outcome: Outcome) -> None:
         key = keys_by_name[task.name]
-        row = build_row(key[0], task, outcome, outcome.files.get(EFFORT_FILE, b"{}"))
+        track = key[0]
+        row = build_row(track, task, outcome, outcome.files.get(EFFORT_FILE, b"{}"))
         differences.extend(_list_differences(key, rows[key], row))
 
-    progress = SweepProgress(len(sampled))
-    sampled_tasks = [tasks[key] for key in sampled]
+    def open_pool() -> LocalPool:
+        return LocalPool(min(workers, len(tasks)))
+
     with report_progress("verify", progress, quiet=quiet) as reporter:
-        for _ in execute_tasks(
-            sampled_tasks, lambda: LocalPool(min(workers, len(sampled))), progress, stop, compare
-        ):
+        for _ in execute_tasks(tasks.values(), open_pool, progress, stop, compare):
             reporter.update(progress)
-    return progress.finished, list(dict.fromkeys(differences))
+    return differences
 
 
 def _build_studies(result: Mapping[str, Any], path: Path, controller: str | None) -> dict[str, Study]:

@@ -29,9 +29,11 @@ class _PipeLine(Line):
         self._number = 0
 
     def newer(self) -> list[Any]:
+        """Return the questions that have arrived since the service began to work."""
         return [question for _, question in self._questions]
 
     def tell(self, progress: object) -> None:
+        """Send the progress of the current question."""
         self.send(Reply(self._number, progress, is_final=False))
 
     def send(self, message: object) -> None:

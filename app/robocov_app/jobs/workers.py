@@ -26,7 +26,7 @@ class LatestWorker(Generic[_Answer]):
     service : str
         ``package.module:Class``.
     doing : str
-        What it does, in messages, such as ``measures the map``.
+        Its work as a verb phrase for messages, such as ``measures the map``.
     wire : type
         Translates questions and answers.
     patience : float, s

@@ -1,14 +1,15 @@
-"""Base class of learning environments: episodes that are drawn, and pictures of them."""
+"""Base class of learning environments, which starts random episodes and renders them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
 from robocov.scenario import Scenario
 from robocov_app.learning.episode import Episode, SharedRun
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.encoding import Frame
 
 RENDER_MODES = ("rgb_array", "human")
+"""Render modes of gymnasium: images as arrays, and a window."""
 THEMES = ("light", "dark")
 MIN_SIDE_PX = 64
 MAX_SIDE_PX = 8192
@@ -44,7 +46,7 @@ def draw_episode(
         Maps of the task.
     rng : numpy.random.Generator
     options : Mapping, optional
-        What is not left to chance. ``map``: a map, its name or path. ``start``: the name of one of its
+        Values that replace random ones. ``map``: a map, its name or path. ``start``: the name of one of its
         starts. ``start_seed``: the seed of the positions, as in `robocov run`. ``positions``: the positions
         themselves, (n, 2) m. ``conditions_seed``: the seed of the task's conditions.
     shared_run : SharedRun, optional
@@ -65,33 +67,58 @@ def draw_episode(
     environment = sampler.draw(rng)
     if "map" in options:
         environment = build_map(options["map"], int(rng.integers(SEED_LIMIT)))
-    # Seeds are drawn even if an option replaces them, so that the others stay the same.
-    start_names = list(environment.starts) or ["uniform"]
-    random_start = start_names[int(rng.integers(len(start_names)))]
-    start_seed = int(rng.integers(SEED_LIMIT))
-    conditions_seed = int(rng.integers(SEED_LIMIT))
-    start = options.get("start", task.start)
-    if start == "*":
-        start = random_start
-    placement: dict[str, Any] = {
-        "start": environment.start(start).name,
-        "seed": options.get("start_seed", start_seed),
-    }
+    random_values = _RandomValues.draw(rng, environment)
     conditions = task.conditions
     if conditions is not None:
-        conditions = replace(conditions, seed=options.get("conditions_seed", conditions_seed))
-    cost = sampler.get_cost(environment)
+        conditions_seed = options.get("conditions_seed", random_values.conditions_seed)
+        conditions = replace(conditions, seed=conditions_seed)
+    start = options.get("start", task.start)
+    if start == "*":
+        start = random_values.start
+    start_name: str | None = environment.start(start).name
+    start_seed = options.get("start_seed", random_values.start_seed)
+    positions = None
     if "positions" in options:
-        placement = {"starts": _parse_positions(options["positions"]), "start": None, "seed": None}
+        positions = _parse_positions(options["positions"])
+        start_name = None
+        start_seed = None
     scenario = Scenario(
         environment,
         team=task.whole_team,
+        start=start_name,
+        seed=start_seed,
+        starts=positions,
         duration=task.duration,
         dt=task.dt,
         conditions=conditions,
-        **placement,
     )
-    return Episode(task, scenario, cost, shared_run)
+    return Episode(task, scenario, sampler.get_cost(environment), shared_run)
+
+
+class _RandomValues(NamedTuple):
+    """Random values of an episode.
+
+    Attributes
+    ----------
+    start : str
+        Name of a start of the map.
+    start_seed : int
+        Seed of the positions.
+    conditions_seed : int
+    """
+
+    start: str
+    start_seed: int
+    conditions_seed: int
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, environment: Environment) -> Self:
+        """Draw all values, even those that options replace, so that the others stay the same."""
+        start_names = list(environment.starts) or ["uniform"]
+        start = start_names[int(rng.integers(len(start_names)))]
+        start_seed = int(rng.integers(SEED_LIMIT))
+        conditions_seed = int(rng.integers(SEED_LIMIT))
+        return cls(start, start_seed, conditions_seed)
 
 
 def _parse_positions(positions: Any) -> Array:

@@ -248,13 +248,13 @@ class Episode:
         return len(self.trail) - 1
 
     def build_rows(self) -> Rows:
-        """Return the present observations of all robots as rows, (n, size)."""
+        """Return the present observations of learners, one row for each robot, (n, size)."""
         if self.shared is not None:
             return self.shared.build_rows()[self._index]
         return self.task.observation.build_rows(self.simulation.observe(), self.team, self._scans)
 
     def observe(self) -> Observations:
-        """Return what the robots know now."""
+        """Return the present observations of all robots."""
         if isinstance(self.simulation, SimulationBatch):
             assert isinstance(self._index, int)
             return self.simulation.observe_run(self._index)

@@ -65,8 +65,9 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
 
     def __init__(self, task: CoverageTask | None = None, **options: Any) -> None:
         super().__init__(task, **options)
-        low, high = (np.tile(row, (self.task.robots, 1)) for row in self.task.observation.bounds)
-        self.observation_space = Box(low, high, dtype=np.float32)
+        low, high = self.task.observation.bounds
+        copies = (self.task.robots, 1)
+        self.observation_space = Box(np.tile(low, copies), np.tile(high, copies), dtype=np.float32)
         limits = compute_action_limits(self.task.action, self.task.whole_team)
         high_actions = np.tile(limits[:, None], (1, 2)).astype(np.float32)
         self.action_space = Box(-high_actions, high_actions, dtype=np.float32)

@@ -48,8 +48,8 @@ class PolicyMemory:
 class PolicyController:
     """A controller that executes a policy, with the decisions and observations of the training.
 
-    The policy is called for each robot alone, with its own row of the observations, so that it can only use
-    what the robot knows. The command line needs a class that contains the policy::
+    The policy is called for each robot alone, with its own row of the observations, so that it cannot use
+    the knowledge of other robots. The command line needs a class that contains the policy::
 
         # mine.py
         @dataclass(frozen=True)

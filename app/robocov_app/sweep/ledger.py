@@ -197,7 +197,7 @@ class Ledger:
             _require(all(value is None or type(value) in (int, float) for value in figures.values()))
             _require(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
-                versions = _read_versions_of_format_1(folder, figures, error)
+                versions = _read_format_1_versions(folder, figures, error)
                 return Entry(figures, error, versions, has_checksums=False)
             _require(row.pop("check_sum") == _compute_checksum(row))
             if checks_files:
@@ -340,9 +340,7 @@ def is_sweep(folder: Path) -> bool:
     return isinstance(content, dict) and content.get("format") == "robocov-study"
 
 
-def _read_versions_of_format_1(
-    folder: Path, figures: Mapping[str, Any], error: str | None
-) -> Mapping[str, str]:
+def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
     """Read the versions of a run of format 1; raise DamagedRunError if its two files disagree."""
     file_name = "run.json" if error is None else "error.json"
     run = json.loads(_read_file(folder / file_name))

@@ -136,7 +136,7 @@ def parse_map(document: str, name: str) -> Environment:
 
 
 def _to_file_name(part: object) -> str:
-    """Return a part of a file name; characters other than ASCII letters, digits, `_`, `.` become hyphens."""
+    """Return a part of a file name; characters other than A-Z, a-z, 0-9, `_` and `.` become hyphens."""
     name = re.sub(r"[^A-Za-z0-9_.]+", "-", str(part)).strip(".-")
     return name[:_MAX_NAME_CHARS] or "x"
 

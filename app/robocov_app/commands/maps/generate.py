@@ -84,9 +84,10 @@ class Arguments(FigureOptions):
             self._check_study_options()
         if self.count is not None:
             require_number("--count", self.count, 1, MAX_MAPS)
-        if (self.width is None) != (self.height is None):
-            given, missing = ("width", "height") if self.height is None else ("height", "width")
-            raise InputError(f"--{given}: requires --{missing}")
+        if self.width is not None and self.height is None:
+            raise InputError("--width: requires --height")
+        if self.height is not None and self.width is None:
+            raise InputError("--height: requires --width")
         if self.side != _DEFAULT_SIDE_M and self.width is not None:
             raise InputError(f"--side: cannot be combined with --width and --height, got {self.side:g}")
         super().__post_init__()
