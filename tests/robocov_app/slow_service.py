@@ -7,19 +7,19 @@ from robocov.errors import InputError
 
 
 class Doubling:
-    failing = "it could not be doubled"
+    failure_message = "it could not be doubled"
 
     def __init__(self) -> None:
         self.heard = []
 
-    def __call__(self, questions, line):
+    def __call__(self, questions, channel):
         self.heard += questions
         match questions[-1]:
             case "slow":
                 for k in range(1, 1000):
-                    line.tell(k)
+                    channel.report_progress(k)
                     time.sleep(0.01)
-                    if line.newer():
+                    if channel.get_newer_questions():
                         raise InputError("there is a newer one")
             case "sleep":
                 time.sleep(60)

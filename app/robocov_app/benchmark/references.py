@@ -15,7 +15,7 @@ from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
 from robocov_app.evaluation.reference_search import ReferencePlacement, ReferenceQuery, answer_queries
-from robocov_app.jobs.messages import Line
+from robocov_app.jobs.messages import Channel
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress
 
@@ -153,9 +153,9 @@ def _compute_bounds(
 class LowerBoundService:
     """Worker service that computes certified lower bounds of the mean distance."""
 
-    failing = "the bound failed"
+    failure_message = "the bound failed"
 
-    def __call__(self, questions: list[tuple[dict[str, Any], list[list[float]]]], line: Line) -> float:
+    def __call__(self, questions: list[tuple[dict[str, Any], list[list[float]]]], channel: Channel) -> float:
         """Return a lower bound of the mean distance of any placement, m. This may take minutes."""
         from robocov.lower_bound import compute_lower_bound
 

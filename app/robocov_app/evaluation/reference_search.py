@@ -15,7 +15,7 @@ from typing import Any
 
 from robocov.errors import OutputError
 from robocov.mapfile import from_json
-from robocov_app.jobs.messages import Line
+from robocov_app.jobs.messages import Channel
 from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.terminal.interruption import Interruption
 
@@ -80,9 +80,9 @@ class ReferencePlacement:
 class ReferenceSearch:
     """Worker service that answers a `ReferenceQuery` with a `ReferencePlacement`."""
 
-    failing = "the search failed"
+    failure_message = "the search failed"
 
-    def __call__(self, questions: list[ReferenceQuery], line: Line) -> ReferencePlacement:
+    def __call__(self, questions: list[ReferenceQuery], channel: Channel) -> ReferencePlacement:
         """Return the best placement for the last query."""
         from robocov.optimum import find_optimum
 

@@ -18,20 +18,20 @@ class Service(Protocol):
 
     Attributes
     ----------
-    failing : str
+    failure_message : str
         Beginning of the message on an unexpected error, such as ``the map could not be measured``.
     """
 
-    failing: str
+    failure_message: str
 
-    def __call__(self, questions: list[Any], line: Line) -> object:
+    def __call__(self, questions: list[Any], channel: Channel) -> object:
         """Answer the newest question.
 
         Parameters
         ----------
         questions : list
             All questions since the last answer, at least one. Only the last one needs an answer.
-        line : Line
+        channel : Channel
             Channel for newer questions and for progress.
         """
 
@@ -48,14 +48,14 @@ class Wire:
         return answer
 
 
-class Line:
+class Channel:
     """Channel of a service while it works: newer questions in, progress out."""
 
-    def newer(self) -> list[Any]:
+    def get_newer_questions(self) -> list[Any]:
         """Return the questions that have arrived since the service began to work."""
         return []
 
-    def tell(self, progress: object) -> None:
+    def report_progress(self, progress: object) -> None:
         """Report progress."""
 
 
@@ -81,7 +81,7 @@ class Reply:
     is_final: bool = True
 
 
-def answer_questions(service: Service, questions: list[tuple[int, Any]], line: Line) -> Reply:
+def answer_questions(service: Service, questions: list[tuple[int, Any]], channel: Channel) -> Reply:
     """Let a service answer questions.
 
     Parameters
@@ -89,7 +89,7 @@ def answer_questions(service: Service, questions: list[tuple[int, Any]], line: L
     service : Service
     questions : list of (int, object)
         Numbers and questions.
-    line : Line
+    channel : Channel
 
     Returns
     -------
@@ -98,12 +98,12 @@ def answer_questions(service: Service, questions: list[tuple[int, Any]], line: L
     """
     number = questions[-1][0]
     try:
-        return Reply(number, service([question for _, question in questions], line))
+        return Reply(number, service([question for _, question in questions], channel))
     except RobocovError as error:
         return Reply(number, None, str(error))
     except Exception as error:
         traceback.print_exc()
-        return Reply(number, None, f"{service.failing}: {error}")
+        return Reply(number, None, f"{service.failure_message}: {error}")
 
 
 def send(stream: IO[bytes], message: object) -> None:

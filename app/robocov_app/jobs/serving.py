@@ -12,14 +12,14 @@ import threading
 from contextlib import suppress
 from typing import Any, BinaryIO
 
-from robocov_app.jobs.messages import READY, Line, Reply, answer_questions, receive, send
+from robocov_app.jobs.messages import READY, Channel, Reply, answer_questions, receive, send
 
 _SET_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 
 
-class _PipeLine(Line):
-    """The line of a process, over two pipes."""
+class _PipeChannel(Channel):
+    """The channel of a process, over two pipes."""
 
     def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
         self._source = source
@@ -28,11 +28,11 @@ class _PipeLine(Line):
         self._questions: list[tuple[int, Any]] = []
         self._number = 0
 
-    def newer(self) -> list[Any]:
+    def get_newer_questions(self) -> list[Any]:
         """Return the questions that have arrived since the service began to work."""
         return [question for _, question in self._questions]
 
-    def tell(self, progress: object) -> None:
+    def report_progress(self, progress: object) -> None:
         """Send the progress of the current question."""
         self.send(Reply(self._number, progress, is_final=False))
 
@@ -73,14 +73,14 @@ def serve(service: str) -> None:
     """
     _prepare_process()
     source, target = _take_standard_streams()
-    line = _PipeLine(source, target)
-    threading.Thread(target=line.listen, daemon=True).start()
+    channel = _PipeChannel(source, target)
+    threading.Thread(target=channel.listen, daemon=True).start()
     module, _, name = service.partition(":")
     answering_service = getattr(importlib.import_module(module), name)()
-    line.send(READY)
+    channel.send(READY)
     while True:
-        questions = line.wait_for_questions()
-        line.send(answer_questions(answering_service, questions, line))
+        questions = channel.wait_for_questions()
+        channel.send(answer_questions(answering_service, questions, channel))
 
 
 def _prepare_process() -> None:

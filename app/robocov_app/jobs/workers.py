@@ -11,7 +11,7 @@ from contextlib import suppress
 from math import inf
 from typing import Any, Generic, TypeAlias, TypeVar
 
-from robocov_app.jobs.messages import READY, Line, Reply, Service, Wire, answer_questions, receive, send
+from robocov_app.jobs.messages import READY, Channel, Reply, Service, Wire, answer_questions, receive, send
 from robocov_app.jobs.processes import start_process
 from robocov_app.terminal.supervision import describe_status
 
@@ -222,7 +222,7 @@ class DirectWorker(Generic[_Answer]):
 
     def put(self, question: object) -> None:
         """Ask a question, and wait for the answer."""
-        reply = answer_questions(self._service, [(0, self._wire.encode(question))], Line())
+        reply = answer_questions(self._service, [(0, self._wire.encode(question))], Channel())
         self.trouble = reply.trouble
         self._answer = reply.answer
 

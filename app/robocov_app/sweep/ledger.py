@@ -87,6 +87,16 @@ class Survey:
     without_checksums: int = 0
     failed: int = 0
 
+    @property
+    def remaining(self) -> int:
+        """Number of runs that are to be done."""
+        return sum(self.is_left)
+
+    @property
+    def reused(self) -> int:
+        """Number of runs that are used as they are."""
+        return len(self.is_left) - self.remaining
+
     def describe(self, *, keep_versions: bool) -> list[str]:
         """Return remarks on damaged and earlier runs, one per line.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import compress, takewhile
@@ -17,7 +17,7 @@ from robocov_app.sweep.cluster import Cluster
 from robocov_app.sweep.executor import Executor
 from robocov_app.sweep.ledger import Ledger, Survey, describe_version_differences, open_ledger
 from robocov_app.sweep.local_pool import LocalPool, count_processors
-from robocov_app.sweep.progress import SweepProgress, report_progress
+from robocov_app.sweep.progress import ProgressReporter, SweepProgress, report_progress
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.table import Table, build_columns, build_row
 from robocov_app.sweep.tasks import Task, generate_tasks
@@ -118,35 +118,26 @@ def sweep(
     """
     if workers is not None:
         require_number("workers", workers, 1, MAX_WORKERS, whole=True)
-    folder = Path(folder)
     with ExitStack() as stack:
         interruption = stack.enter_context(Interruption()) if stop is None else stop
-        columns = build_columns(study)
-        document = study.to_json() | {"columns": [column._asdict() for column in columns]}
-        ledger = stack.enter_context(open_ledger(folder, document))
-        study_content = format_json(document).encode()
-        table = stack.enter_context(Table(folder, columns, study_content, parquet=parquet))
+        ledger, table = stack.enter_context(_open_results(study, Path(folder), parquet=parquet))
         progress = SweepProgress(len(study))
         reporter = stack.enter_context(report_progress(title, progress, quiet=quiet))
         surveyed_tasks = takewhile(lambda _: not interruption.requested, generate_tasks(study))
         survey = ledger.survey(surveyed_tasks, retry_failed=retry_failed, keep_versions=keep_versions)
-        remaining_runs = sum(survey.is_left)
-        progress.reused = len(survey.is_left) - remaining_runs
+        progress.reused = survey.reused
         for line in survey.describe(keep_versions=keep_versions):
             reporter.print_line(line)
         rows = _RowWriter(ledger, table, zip(survey.is_left, generate_tasks(study), strict=False))
         outcomes = _OutcomeStore(ledger, rows, requires_same_versions=not keep_versions)
-        tasks = compress(generate_tasks(study), survey.is_left)
-        processes = min(workers or count_processors(), remaining_runs)
-        open_executor = partial(_open_executor, scheduler, processes)
-        failure: RobocovError | None = None
-        try:
-            rows.write()
-            for _ in execute_tasks(tasks, open_executor, progress, interruption, outcomes.store):
-                reporter.update(progress)
-        except RobocovError as error:
-            # The finished runs belong in the table all the same.
-            failure = error
+        failure = _execute_remaining(
+            tasks=compress(generate_tasks(study), survey.is_left),
+            open_executor=partial(_open_executor, scheduler, workers, survey.remaining),
+            outcomes=outcomes,
+            reporter=reporter,
+            progress=progress,
+            interruption=interruption,
+        )
         table.is_complete = failure is None and not interruption.requested
         if not table.is_complete:
             rows.write_remaining()
@@ -155,12 +146,44 @@ def sweep(
     return _compute_totals(progress, survey, rows, table)
 
 
-def _open_executor(scheduler: str | None, processes: int) -> Executor:
+@contextmanager
+def _open_results(study: Study, folder: Path, *, parquet: bool) -> Iterator[tuple[Ledger, Table]]:
+    """Open the ledger and the table in the folder of a sweep."""
+    columns = build_columns(study)
+    document = study.to_json() | {"columns": [column._asdict() for column in columns]}
+    study_content = format_json(document).encode()
+    with (
+        open_ledger(folder, document) as ledger,
+        Table(folder, columns, study_content, parquet=parquet) as table,
+    ):
+        yield ledger, table
+
+
+def _execute_remaining(
+    *,
+    tasks: Iterable[Task],
+    open_executor: Callable[[], Executor],
+    outcomes: _OutcomeStore,
+    reporter: ProgressReporter,
+    progress: SweepProgress,
+    interruption: Interruption,
+) -> RobocovError | None:
+    """Execute the remaining tasks; return the error that ended them, because the finished runs get rows."""
+    try:
+        outcomes.rows.write()
+        for _ in execute_tasks(tasks, open_executor, progress, interruption, outcomes.store):
+            reporter.update(progress)
+    except RobocovError as error:
+        return error
+    return None
+
+
+def _open_executor(scheduler: str | None, workers: int | None, runs: int) -> Executor:
     """Connect to a Dask scheduler, or start processes on this machine if there is none."""
     if scheduler is not None:
         return Cluster(scheduler)
     compile_kernels()
-    return LocalPool(processes)
+    return LocalPool(min(workers or count_processors(), runs))
 
 
 def _compute_totals(progress: SweepProgress, survey: Survey, rows: _RowWriter, table: Table) -> Totals:
@@ -305,8 +328,8 @@ class _OutcomeStore:
     """
 
     def __init__(self, ledger: Ledger, rows: _RowWriter, *, requires_same_versions: bool) -> None:
+        self.rows = rows
         self._ledger = ledger
-        self._rows = rows
         self._requires_same_versions = requires_same_versions
 
     def store(self, task: Task, outcome: Outcome) -> None:
@@ -314,5 +337,5 @@ class _OutcomeStore:
         if self._requires_same_versions:
             _require_same_versions(outcome)
         self._ledger.store(task, outcome)
-        self._rows.finished.add(task.name)
-        self._rows.write()
+        self.rows.finished.add(task.name)
+        self.rows.write()

@@ -23,7 +23,7 @@ from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
 from robocov.simulation import Simulation
-from robocov_app.jobs.messages import Line
+from robocov_app.jobs.messages import Channel
 from robocov_app.runs.execution import build_cost_table
 from robocov_app.sweep.controller_files import source_to_json
 from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
@@ -160,9 +160,9 @@ def _build_files(
 class TaskService:
     """Service of a process that executes the tasks of a `LocalPool`."""
 
-    failing = "the run failed"
+    failure_message = "the run failed"
 
-    def __call__(self, questions: list[Task], line: Line) -> Outcome:
+    def __call__(self, questions: list[Task], channel: Channel) -> Outcome:
         """Execute the newest task."""
         return perform(questions[-1])
 

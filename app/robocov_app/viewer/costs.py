@@ -15,7 +15,7 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
-from robocov_app.jobs.messages import Line, Wire
+from robocov_app.jobs.messages import Channel, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_field import Field, FieldLattice
 
@@ -287,7 +287,7 @@ class _CostWire(Wire):
 class CostService:
     """Prepares the latest map, and answers the latest question about it."""
 
-    failing = "the cost could not be computed"
+    failure_message = "the cost could not be computed"
 
     def __init__(self) -> None:
         # If another process is compiling these kernels already, wait for it.
@@ -296,11 +296,11 @@ class CostService:
         self._sent_cost: CoverageCost | None = None  # whose sites were sent last
         self._varying_cost: TimeVaryingCost | None = None
 
-    def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
+    def __call__(self, questions: list[CostQuestion], channel: Channel) -> _Answer:
         """Answer the last of several questions."""
         maps = [question for question in questions if question.environment is not None]
         if maps:
-            self._prepare(maps[-1], line)
+            self._prepare(maps[-1], channel)
         cost = self._cost
         varying_cost = self._varying_cost
         question = questions[-1]
@@ -316,14 +316,14 @@ class CostService:
         self._sent_cost = cost
         return answer._replace(shared=shared)
 
-    def _prepare(self, question: CostQuestion, line: Line) -> None:
+    def _prepare(self, question: CostQuestion, channel: Channel) -> None:
         environment = question.environment
         assert environment is not None
         started_at = time.perf_counter()
         reported_at = started_at
 
         def check_newer_map(fraction: float) -> None:
-            if any(newer.environment is not None for newer in line.newer()):
+            if any(newer.environment is not None for newer in channel.get_newer_questions()):
                 raise RobocovError("there is a newer map")
 
         def report_progress(fraction: float) -> None:
@@ -332,7 +332,7 @@ class CostService:
             now = time.perf_counter()
             if now - reported_at > PROGRESS_INTERVAL_S and fraction > 0.0:
                 reported_at = now
-                line.tell((fraction, (now - started_at) * (1.0 - fraction) / fraction))
+                channel.report_progress((fraction, (now - started_at) * (1.0 - fraction) / fraction))
 
         self._varying_cost = None
         before = self._cost

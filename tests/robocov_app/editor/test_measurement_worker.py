@@ -16,7 +16,7 @@ from robocov_app.editor.model.measurement import (
 )
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.jobs.messages import Line
+from robocov_app.jobs.messages import Channel
 
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""
@@ -73,6 +73,6 @@ def test_what_has_changed_is_enough_to_know_the_whole(data):
         known = {item.key: item for item in sketch.obstacles}
         last, change = sketch, data.draw(changes(sketch))
         sketch = sketch if change is None else change.sketch
-    measuring(questions[:2], Line())
-    answer, wanted = measuring(questions[2:], Line()), measure(last, 0.2)
+    measuring(questions[:2], Channel())
+    answer, wanted = measuring(questions[2:], Channel()), measure(last, 0.2)
     assert (answer.vertices, answer.free_area) == (wanted.vertices, wanted.free_area)

@@ -13,7 +13,7 @@ from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, fin
 from robocov_app.editor.model.geometry import compute_center
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, find_problems, format_position
-from robocov_app.jobs.messages import Line, Wire
+from robocov_app.jobs.messages import Channel, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 
 _WALL_TOLERANCE_M = 1e-5
@@ -234,12 +234,12 @@ class MeasurementWire(Wire):
 class SketchMeasurer:
     """Measures sketches, of which it receives only the changes."""
 
-    failing = "the map could not be measured"
+    failure_message = "the map could not be measured"
 
     def __init__(self) -> None:
         self._known: dict[int, Item] = {}
 
-    def __call__(self, questions: list[Question], line: Line) -> Measurement:
+    def __call__(self, questions: list[Question], channel: Channel) -> Measurement:
         """Apply the changes of all questions, and measure the last sketch."""
         for sketch, order, _ in questions:
             known = self._known | {item.key: item for item in sketch.obstacles}

@@ -20,7 +20,7 @@ from robocov_app.formats import (
     read_map,
 )
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
-from robocov_app.jobs.messages import Line
+from robocov_app.jobs.messages import Channel
 
 OptionKind = Literal["number", "place", "words", "colors", "width", "text", "choice"]
 ImportSettings: TypeAlias = type[ReadOptions] | type[Shaping]
@@ -155,13 +155,13 @@ class _ReadKey(NamedTuple):
 class ImportJob:
     """Imports maps; keeps the latest file, because shaping it again takes less time than reading it."""
 
-    failing = "the map could not be imported"
+    failure_message = "the map could not be imported"
 
     def __init__(self) -> None:
         self._read: tuple[_ReadKey, ForeignMap] | None = None
         self._sheet: tuple[_ReadKey, ColorSheet | None] | None = None
 
-    def __call__(self, questions: list[ImportRequest], line: Line) -> Imported:
+    def __call__(self, questions: list[ImportRequest], channel: Channel) -> Imported:
         """Import the newest request."""
         path, format_name, options, shaping = questions[-1]
         key = _ReadKey(path, format_name, options)
