@@ -1,1 +1,1 @@
-"""The interactive window: what happens in it (no pygame), and how it is shown and touched."""
+"""The interactive window: sessions and actions (without pygame), drawing, and input."""

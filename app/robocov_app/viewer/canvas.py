@@ -1,4 +1,4 @@
-"""The canvas: one painted pane for each controller, one camera for all, and what tools show on top."""
+"""The canvas: one painted pane for each controller, one camera for all, and previews of tools on top."""
 
 from dataclasses import replace
 
@@ -36,15 +36,15 @@ from robocov_app.viewer.view import FADE_S
 MAX_RAYS_PER_SCAN = 120
 MAX_RAYS_PER_PANE = 720
 MIN_RAYS_PER_SCAN = 24  # with fewer, scans are not drawn
-UNLIMITED_SCAN_RANGE_M = 12.0  # of scans if the sensor has no limit
-MAX_COST_LAG_S = 0.25  # a cost that lags behind more is shown with its time
+UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimited
+MAX_COST_LAG_S = 0.25  # an older cost is shown with its time
 MAX_ZOOM_PX_PER_M = 2e4
-MIN_MAP_SIZE_PX = 20.0  # to which the map can be zoomed out
+MIN_MAP_SIZE_PX = 20.0  # size of the map at the smallest zoom
 
 # Lengths in pixels at scale 1.
 REACH_PX = 12.0  # width of a finger
 _HIT_MARGIN_PX = 3.0  # around a robot
-_COLOR_LIMIT_RANGE = (0.55, 1.0)  # fractions of the color scale, between which its end stays
+_COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while it is filled to a fraction between these
 _NO_ROBOT = (-1, -1)
 
 
@@ -112,7 +112,7 @@ class ViewerCanvas:
         self._set_camera(camera.zoom_at(zoom / camera.zoom, (pixel[0] - left, pixel[1] - top)))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the map by a number of pixels; its middle never leaves the panes."""
+        """Move the map by a number of pixels; the center of the panes stays within its bounds."""
         camera = self._painters[0].camera.pan(dx, dy)
         x, y = np.clip(camera.center, *self._get_bounds()).tolist()
         self._set_camera(replace(camera, center=(x, y)))
@@ -235,7 +235,7 @@ class ViewerCanvas:
     def _list_scans(
         self, pane: Pane, setup: PaneSetup, positions: Array, selected: int | None
     ) -> list[tuple[Array, Array]]:
-        """Return the scans of the selected robot, else of all robots unless they are many.
+        """Return the scan of the selected robot; without one, those of all robots unless there are too many.
 
         Returns
         -------
@@ -254,7 +254,7 @@ class ViewerCanvas:
         return [(positions[row], sensor.scan_from(positions[row], rays, reach[row])[1]) for row in rows]
 
     def _describe_cost(self, pane: Pane) -> str:
-        """Return the caption of a pane's cost: of one time in all panes, so that they can be compared."""
+        """Return the caption of a pane's cost. All panes show the cost of the same time."""
         displayed = self.viewer.session.displayed
         time, distances = displayed.get_costs()
         _, travel_times = displayed.get_costs("time")
@@ -294,7 +294,7 @@ class ViewerCanvas:
                 screen.fill(theme.get_controller_color(controller.name), bar)
 
     def count_legend_rows(self) -> int:
-        """Return how many rows the legend needs that the panes share; 0 for a single pane."""
+        """Return the number of rows of the legend that the panes share; 0 for a single pane."""
         if len(self._scenes) < 2:
             return 0
         return self._legend.count_rows(self._list_legend_entries(), self.layout, self._get_layers())

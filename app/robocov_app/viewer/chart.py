@@ -74,7 +74,7 @@ class GhostLine(NamedTuple):
 
 
 class Chart:
-    """Chart and time line of a session. What changes seldom is kept as a page.
+    """Chart and time line of a session. The parts that seldom change are drawn once, on a page.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Chart:
     Attributes
     ----------
     hover : (x, y) or None, px
-        Where the pointer is in the window.
+        Position of the pointer in the window.
     ghosts : list of GhostLine
         Curves of other branches on the page.
     switch_box : Box or None
@@ -103,7 +103,7 @@ class Chart:
         self._page_time = -1.0
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Take the layout and the theme of the window."""
+        """Adopt the layout and the theme of the window."""
         self.layout = layout
         self.theme = theme
         self._page = None
@@ -125,14 +125,14 @@ class Chart:
 
     @property
     def _ghost_curves(self) -> list[GhostCurve]:
-        """Curves of other branches of the quantity that is shown."""
+        """Curves of the plotted quantity in other branches."""
         ghosts = self.viewer.session.timeline.ghosts
         return [ghost for ghost in ghosts if ghost.quantity == self.plotted.name]
 
     def switch_quantity(self) -> str:
         """Show the other quantity, and return the status message."""
         if not self._has_times:
-            return "all robots are equally fast: the mean time goes as the mean distance"
+            return "all robots are equally fast: the mean time is proportional to the mean distance"
         self._quantity = TIME if self.plotted is DISTANCE else DISTANCE
         self._page = None
         title = self._quantity.title
@@ -143,7 +143,7 @@ class Chart:
         return self.switch_box is not None and is_inside(self.switch_box, pixel)
 
     def find_ghost(self, pixel: tuple[int, int]) -> int | None:
-        """Return the node of the branch whose curve is at a pixel of the window; None if none is."""
+        """Return the node of the branch whose curve is at a pixel of the window; None without one."""
         point = np.array([pixel[0], pixel[1] - self.layout.chart[1]])
         nearest_node = None
         nearest_distance = GHOST_REACH_PX * self.layout.scale
@@ -197,11 +197,11 @@ class Chart:
         return True
 
     def _list_curves(self) -> list[Curve]:
-        """Return the curve of each pane of the quantity that is shown."""
+        """Return each pane's curve of the plotted quantity."""
         return [pane.curves[self.plotted.name] for pane in self.viewer.session.timeline.panes]
 
     def _draw_page(self) -> None:
-        """Draw what changes seldom: axes, events, curves and the time line."""
+        """Draw the parts that seldom change: axes, events, curves and the time line."""
         layout = self.layout
         size = (layout.chart[2], layout.chart[3] + layout.track[3])
         self._page = pygame.Surface(size, 0, 32)
@@ -219,7 +219,7 @@ class Chart:
         self._draw_time_line(canvas)
 
     def _draw_title(self, canvas: Canvas) -> None:
-        """Write the name of the quantity, that of the other one, and the state of its computation."""
+        """Write the names of the plotted quantity and of the other one, and the state of the computation."""
         scale = self.layout.scale
         row = 0.5 * TOP_PX * scale
         density = density_label(self.viewer.session.displayed.environment)
@@ -234,7 +234,7 @@ class Chart:
             canvas.text(state, (right, row), color=self.theme.faint, anchor="right")
 
     def _draw_switch(self, canvas: Canvas, left: float) -> None:
-        """Write the name of the other quantity next to the title, if there is one: a click shows it."""
+        """Write the name of the other quantity next to the title, if there is one; a click plots it."""
         self.switch_box = None
         if not self._has_times:
             return
@@ -253,7 +253,7 @@ class Chart:
         )
 
     def _draw_axes(self, canvas: Canvas) -> None:
-        """Draw the grid with its values, and the times below it."""
+        """Draw the grid, its values at the left and the times below it."""
         scale = self.layout.scale
         times = self._scale.times
         size = self.theme.small_text
@@ -273,7 +273,7 @@ class Chart:
             canvas.text(f"{time:g} s", center, size=size, color=faint, anchor="middle")
 
     def _draw_events(self, canvas: Canvas) -> None:
-        """Draw a line for each event, with its text if there is space, else with its sign alone."""
+        """Draw a line for each event, with its text if there is space, otherwise with its sign alone."""
         events = self.viewer.session.timeline.events
         line_color = mix(self.theme.panel, self.theme.ink, 0.3)
         for event in events:
@@ -403,7 +403,7 @@ class Chart:
         surface.fill(color, (round(column), round(top + TOP_PX * scale), 1, round(height)))
 
     def _draw_present(self, screen: pygame.Surface) -> None:
-        """Draw how far the session and the displayed time are on the time line, and its events."""
+        """Draw the end of the session, the displayed time and the events on the time line."""
         theme = self.theme
         scale = self.layout.scale
         timeline = self.viewer.session.timeline
@@ -486,17 +486,18 @@ def format_gap(value: float, best: float) -> str:
 
 def map_curve_colors(panes: Iterable[Pane], theme: Theme) -> dict[int, Color]:
     """Return the color of the curve of each pane by its number."""
-    some_panes = list(panes)
-    colors = choose_curve_colors([pane.controller.name for pane in some_panes], theme)
-    return dict(zip([pane.number for pane in some_panes], colors, strict=True))
+    controllers = {pane.number: pane.controller.name for pane in panes}
+    colors = choose_curve_colors(list(controllers.values()), theme)
+    return dict(zip(controllers, colors, strict=True))
 
 
 def thin_points(points: Array) -> Array:
-    """Return the points of a curve, (k, 2) px, without those that nobody could tell apart.
+    """Drop points of a curve, (k, 2) px, that are too close to the next one to be told apart.
 
     The last point always stays, since the curve grows there.
     """
     if len(points) < MIN_POINTS_TO_THIN:
         return points
     columns = np.rint(points[:, 0] * _SAMPLES_PER_PX)
-    return np.asarray(points[np.append(columns[1:] != columns[:-1], True)])
+    is_last_in_column = np.append(columns[1:] != columns[:-1], True)
+    return np.asarray(points[is_last_in_column])

@@ -118,7 +118,7 @@ class ChartScale:
 
 
 def build_chart_scale(times: TimeScale, layout: Layout, curves: Sequence[Array]) -> ChartScale:
-    """Build the scale of a chart that shows all values of some curves.
+    """Build the scale of a chart so that all values of its curves are visible.
 
     Parameters
     ----------

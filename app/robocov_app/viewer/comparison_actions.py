@@ -39,7 +39,7 @@ class ComparisonActions:
         self._viewer.session.remove_pane(self._viewer.pane)
 
     def activate_next_pane(self) -> None:
-        """Let the next pane be the one whose controller and gains are edited."""
+        """Make the next pane the active one, whose controller and gains are edited."""
         viewer = self._viewer
         viewer.inspection.active_pane = (viewer.active_pane + 1) % len(viewer.session.timeline.panes)
 
@@ -50,7 +50,7 @@ class ComparisonActions:
         viewer.session.set_controller(viewer.pane, ControllerChoice(name))
 
     def set_controller(self, number: int, name: str) -> None:
-        """Use a controller in the pane with an index; its gains stay if it is the present one."""
+        """Use a controller in the pane with an index; its gains stay if it is already used there."""
         session = self._viewer.session
         pane = session.timeline.panes[number]
         if session.displayed.get_setup(pane).controller.name != name:

@@ -1,4 +1,4 @@
-"""Costs of the displayed step: asked for in every frame, added to the curves when they are known."""
+"""Costs of the displayed step: requested in every frame, added to the curves when they arrive."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from robocov.arrays import Array
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.pane import Pane
 
-MAX_INITIAL_GAP_S = 0.3  # a curve that starts later is completed backwards
+MAX_INITIAL_GAP_S = 0.3  # if a curve starts later, earlier costs are requested
 TIME_TOLERANCE_S = 1e-9
 
 
 class CostCurves:
-    """Asks for the costs of the displayed step, and adds the answers to the curves of the panes.
+    """Requests the costs of the displayed step, and adds the answers to the curves of the panes.
 
     Parameters
     ----------
@@ -27,13 +27,13 @@ class CostCurves:
     def __init__(self, viewer: ViewerModel) -> None:
         self.answer_count = 0
         self._viewer = viewer
-        self._serial = -1  # of the session whose costs were asked for last
+        self._past_version = -1  # of the timeline at the last request
 
     def update(self) -> None:
-        """Ask for new costs, and add those that have arrived."""
+        """Request new costs, and add those that have arrived."""
         session = self._viewer.session
-        if session.timeline.past_version != self._serial:
-            self._serial = session.timeline.past_version
+        if session.timeline.past_version != self._past_version:
+            self._past_version = session.timeline.past_version
             self._viewer.costs.forget()
         for pane in session.timeline.panes:
             self._ask_for_pane(pane)
@@ -41,7 +41,7 @@ class CostCurves:
         self._add_answers()
 
     def _ask_for_pane(self, pane: Pane) -> None:
-        """Ask for the cost of a pane, unless it is known and no path to the cursor is shown."""
+        """Request the cost of a pane, unless it is known and no path to the cursor is shown."""
         session = self._viewer.session
         costs = self._viewer.costs
         positions = session.displayed.get_positions(pane)
@@ -70,22 +70,31 @@ class CostCurves:
         return np.array(cursor)
 
     def _ask_for_first_seconds(self) -> None:
-        """Ask for costs of the first seconds, for which there were no answers yet, every other time."""
+        """Request costs of the first seconds, which passed before the map was prepared.
+
+        They are requested backwards from the first known cost; while the run plays, only every other time.
+        """
         session = self._viewer.session
         if session.timeline.head.kind != "begin" or not session.timeline.is_live:
             return
         if session.playback.is_playing and self.answer_count % 2:
             return
+        history = session.timeline.history
         for pane in session.timeline.panes:
-            first = min(pane.distance_curve.times, default=0.0)
-            if first <= MAX_INITIAL_GAP_S:
+            first_time = min(pane.distance_curve.times, default=0.0)
+            if first_time <= MAX_INITIAL_GAP_S:
                 continue
-            target = first - MAX_INITIAL_GAP_S if first > 2 * MAX_INITIAL_GAP_S else 0.0
-            index = session.timeline.history.find_index(target)
-            state = session.timeline.history[index].states[pane.number]
-            time = session.timeline.history.get_time(index)
+            target = 0.0
+            if first_time > 2 * MAX_INITIAL_GAP_S:
+                target = first_time - MAX_INITIAL_GAP_S
+            index = history.find_index(target)
+            state = history[index].states[pane.number]
             self._viewer.costs.ask(
-                pane.number, time, state.positions, speeds=state.setup.speed_limits, is_for_curve=True
+                pane.number,
+                history.get_time(index),
+                state.positions,
+                speeds=state.setup.speed_limits,
+                is_for_curve=True,
             )
 
     def _add_answers(self) -> None:

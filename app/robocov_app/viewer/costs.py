@@ -63,7 +63,7 @@ class _SharedSites(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CostQuestion:
-    """Request for the cost on a map; without positions: prepare the map.
+    """Request for the cost on a map; without positions, a request to prepare the map.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Costs:
         self._map_number = 0
         self._is_prepared = False
         self._waiting: dict[int, CostQuestion] = {}
-        self._asked_pane: int | None = None  # None if the answer is not wanted any more
+        self._asked_pane: int | None = None  # None if the answer is no longer wanted
 
     def set_environment(self, environment: Environment) -> None:
         """Prepare the costs on another map."""
@@ -156,7 +156,7 @@ class Costs:
         *,
         is_for_curve: bool = False,
     ) -> None:
-        """Ask for the cost of a pane. A question about it that still waits is replaced.
+        """Ask for the cost of a pane. A question about it that is still pending is replaced.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class Costs:
         )
 
     def poll(self) -> list[tuple[int, KnownCost]]:
-        """Return the answers since the last call, with the numbers of their panes, and ask what waits."""
+        """Ask the next question; return the answers since the last call, with the numbers of their panes."""
         answers: list[tuple[int, KnownCost]] = []
         while self._asked is not None or self._ask_next():
             answer = self._worker.poll()
@@ -199,7 +199,8 @@ class Costs:
                 self._is_prepared = answer is not None
                 self.state = "" if self._is_prepared else f"no cost: {self._worker.trouble}"
             elif answer is None:
-                # Start the process again after it has died; if it dies of the map, too, it stays so.
+                # Restart the process after it has died, and prepare the map again. If it dies during that,
+                # the branch above reports it.
                 if not self._worker.is_alive:
                     self._prepare_map()
             elif self._asked_pane is not None and isinstance(answer, KnownCost):
@@ -349,7 +350,7 @@ class CostService:
 
 
 def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> _Answer:
-    """Compute the answer to a question, without what all results on a map share."""
+    """Compute the answer to a question, without the data that all results on a map share."""
     result = cost.evaluate_all_robots(question.time, positions)
     if result is None:
         raise InputError("positions: expected at least one at a free position, got none")
@@ -359,7 +360,7 @@ def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -
         with suppress(RobocovError):
             counted = cost.find_counted_robots(question.time, positions)
             path = cost.get_cost(question.time).find_path(positions[counted], question.point)
-    # Small integers are half as long to send.
+    # Integers of 32 bits take half as long to send.
     result = replace(
         result,
         owner=result.owner.astype(np.int32),

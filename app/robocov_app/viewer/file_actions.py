@@ -77,7 +77,7 @@ class FileActions:
 
     @property
     def view(self) -> dict[str, object]:
-        """Entries of a session file on the window."""
+        """Entries of a session file about the window."""
         view = self._viewer.view
         return {"shown": sorted(view.layers), "theme": view.theme, "map": self.map_name}
 
@@ -104,15 +104,15 @@ class FileActions:
         names = self.list_maps()
         index = names.index(self.map_name) if self.map_name in names else 0
         too_small: list[str] = []
+        has_opened = False
         for k in range(1, len(names) + 1):
             name = names[(index + steps * k) % len(names)]
             with suppress(InputError):
                 self.open_map(name)
+                has_opened = True
                 break
             too_small.append(name)
-        else:
-            return
-        if too_small:
+        if has_opened and too_small:
             robots = self._viewer.session.timeline.scenario.robots
             self._viewer.show_message(f"no space for {robots} robots: {', '.join(too_small)}")
 
@@ -134,7 +134,7 @@ class FileActions:
         self._viewer.show_message(f"session saved: {saved}")
 
     def open_file(self, path: Path) -> None:
-        """Open a session or a map, whichever the file is."""
+        """Open a file that contains a session or a map."""
         require_regular_file(path)
         if path.suffix == SUFFIX:
             self.open_session(path)

@@ -29,8 +29,8 @@ from robocov_app.viewer.window import ViewerWindow
 from robocov_app.viewer.window_dialogs import build_lesson_offer
 
 NO_DISPLAY = (
-    "no display: the window needs one (over ssh, try ssh -X); --out DIR with --frames N "
-    "(of a saved run, with --video) renders without, and robocov run needs none"
+    "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR "
+    "with --frames N (for a saved run, with --video); robocov run needs no display."
 )
 HEADLESS_FPS = 30  # frames per second without a display
 
@@ -150,7 +150,7 @@ class Launcher:
         return find_draft_folder(self.folder if self.served else None)
 
     def _offer_help(self, window: ViewerWindow, settings_file: Path | None) -> None:
-        """Offer to recover unsaved work, else the lesson if the user has never opened the window."""
+        """Offer to recover unsaved work, or the lesson to users who have never opened the window."""
         drafts = find_recoverable_drafts(self._draft_folder)
         if drafts:
             window.offer_recovery(drafts)
@@ -208,7 +208,7 @@ class Launcher:
         return size if self._needs_no_display else fit_to_screen(size)
 
     def _read_settings(self, window: ViewerWindow, before: ViewerSettings) -> ViewerSettings:
-        """Return the settings of a window; layers chosen by options of the command line do not count."""
+        """Return the settings of a window, without the layers chosen on the command line."""
         viewer = window.viewer
         view = viewer.view
         usual = _list_usual_layers(before)

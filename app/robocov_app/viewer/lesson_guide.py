@@ -76,9 +76,11 @@ class LessonGuide:
 
     @property
     def visible_state(self) -> object:
-        """All that decides how the lesson is drawn."""
+        """Everything that determines how the lesson is drawn."""
         player = self.player
-        return player and (player.state, player.number, player.progress)
+        if player is None:
+            return None
+        return player.state, player.number, player.progress
 
     def start(self, path: Path = FIRST_LESSON) -> None:
         """Start a lesson.
@@ -86,7 +88,7 @@ class LessonGuide:
         Raises
         ------
         MapError
-            As `load_lesson`.
+            If the lesson cannot be loaded.
         """
         saved = load_lesson(path)
         self.player = LessonPlayer(self._viewer, self._fit_view, saved, is_unattended=self.is_unattended)
@@ -122,7 +124,7 @@ class LessonGuide:
             self.player = None
 
     def handle_command(self, name: str) -> bool:
-        """Give a command of the window to the lesson; return whether it was meant for it."""
+        """Let the lesson handle a command of the window; return whether it did."""
         if self.shown is not None and name in ("back", "forward"):
             self.shown.skip(1 if name == "forward" else -1)
             return True

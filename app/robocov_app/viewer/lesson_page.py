@@ -22,7 +22,7 @@ class ClickArea(NamedTuple):
     Attributes
     ----------
     box : Rect
-        Where it is, px.
+        Position and size, px.
     action : callable
         Called by a click.
     """

@@ -16,7 +16,7 @@ from robocov_app.viewer.tools.tool import Tool
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # comes with robocov
 READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
 READING_S_PER_WORD = 0.25
-MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up a chapter
+MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up on a chapter
 STEPS_PER_SECOND = 60
 BASE_LAYERS = frozenset(
     {
@@ -335,7 +335,7 @@ class LessonPlayer:
 
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:
-    """Go to the start of a chapter, and let its changes happen again as time passes."""
+    """Go to the start of a chapter, and repeat its edits as time passes."""
     target = session.timeline.document.nodes[chapter.touch]
     session.seek(session.timeline.document.get_path(target)[0], 0)
     session.timeline.finish_seek()
@@ -366,7 +366,7 @@ class ChapterResult:
 
 
 def check_lesson(saved: SavedSession) -> list[ChapterResult]:
-    """Play a lesson without a window, and return what each chapter does."""
+    """Play a lesson without a window, and return the outcome of each chapter."""
     assert saved.lesson is not None
     session = _open_at_start(saved)
     results: list[ChapterResult] = []

@@ -132,7 +132,7 @@ class ViewerModel:
     def update_cost_map(self) -> None:
         """Prepare the cost for the map if it has changed."""
         environment = self.session.displayed.environment
-        # While the density is painted the cost would never be ready.
+        # While the density is being painted, the cost would never be ready.
         if environment is not self._cost_map and not self.tool.is_painting:
             self._cost_map = environment
             self.costs.set_environment(environment)
@@ -149,7 +149,7 @@ class ViewerModel:
 
 
 def simplify_message(message: str) -> str:
-    """Return a message without the names of places in files, which mean nothing in a window.
+    """Remove prefixes of a message that only make sense for files.
 
     >>> simplify_message("team.max_speed: expected a number, got 0 m/s")
     'max_speed: expected a number, got 0 m/s'

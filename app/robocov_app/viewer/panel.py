@@ -1,5 +1,6 @@
-"""The panel at the right: frequent settings stay in sight, the rest is on pages."""
+"""The panel at the right: settings that are often used stay visible, the others are on pages."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import chain, zip_longest
@@ -25,7 +26,7 @@ from robocov_app.viewer.session.scenario import MAX_PANES
 TABS = ("parameters", "show", "robot", "file")
 TAB_WIDTHS_PX = (86, 64, 64, 64)
 LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
-"""Layers that are nearly always wanted; they can be switched by their keys all the same."""
+"""Layers that are nearly always visible. Their keys still toggle them."""
 
 _FILE_BUTTONS = (
     ("Screenshot", "screenshot"),
@@ -55,6 +56,10 @@ _REPORT_INDENT_PX = 34.0
 _LABEL_PX = 100
 _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
+# Columns of the rows with the controllers; each has a button that removes its pane, and a gap.
+_SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
+_TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one
+_CONTROLLER_PAIR_PX = (0, 24, 3, 0, 24)  # two of three or four
 
 
 class ViewerPanel(SidePanel):
@@ -95,7 +100,7 @@ class ViewerPanel(SidePanel):
         super().__init__(TABS[0])
 
     def show_tab(self, name: str) -> None:
-        """Show a page of the panel, if there is one of that name."""
+        """Show a page of the panel, if there is one with this name."""
         if name in TABS:
             self.tab = name
             self.viewer.revision += 1
@@ -120,7 +125,7 @@ class ViewerPanel(SidePanel):
             self.ui.needs_redraw = True
 
     def show_content(self, ui: Ui) -> None:
-        """Show the settings that stay in sight, and the page that is chosen."""
+        """Show the settings that stay visible, and the chosen page."""
         ui.inset(12, 8, 12)
         self._show_environment(ui)
         self._show_controllers(ui)
@@ -181,9 +186,10 @@ class ViewerPanel(SidePanel):
         names = {label: name for name, label in labels.items()}
         count = len(choices)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
-        # Two controllers share a row with the button that adds a third; more are two in a row.
-        widths = {1: (0, 0), 2: (0, 24, 3, 0, 24, 3, 28)}.get(count, (0, 24, 3, 0, 24))
-        ui.row(*widths, height=28, gap=2 if count > 1 else 6, below=4)
+        if count == 1:
+            ui.row(*_SINGLE_CONTROLLER_PX, height=28, gap=6, below=4)
+        else:
+            ui.row(*(_TWO_CONTROLLERS_PX if count == 2 else _CONTROLLER_PAIR_PX), height=28, gap=2, below=4)
         for k, choice in enumerate(choices):
             label = ui.dropdown(f"controller:{k}", list(names), labels[choice.name])
             if label is not None:
@@ -270,7 +276,7 @@ class ViewerPanel(SidePanel):
         self._show_reset(ui, parameter, default)
 
     def _show_options(self, ui: Ui, parameter: OptionParameter) -> None:
-        """Show the choices next to each other if they fit, else as a menu."""
+        """Show the choices next to each other if they fit, otherwise as a menu."""
         name = parameter.name
         choices = parameter.choices
         free = ui.width - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
@@ -299,10 +305,10 @@ class ViewerPanel(SidePanel):
     def _show_layers(self, ui: Ui) -> None:
         view = self.viewer.view
         names = [name for name in self.titles if name not in LAYERS_WITHOUT_CHECK_BOX]
-        rows = -(-len(names) // 2)
+        rows = math.ceil(len(names) / 2)
         with ui.scroll("show"):
             ui.row(0, 0, height=21, below=3)
-            # The order runs down the first column, then down the second.
+            # The names continue from the bottom of the first column at the top of the second.
             for name in chain.from_iterable(zip_longest(names[:rows], names[rows:])):
                 if name is None:
                     ui.cell()
@@ -388,7 +394,7 @@ def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[st
     Parameters
     ----------
     names : iterable of str
-        Names of the controllers that are offered; files of users are loaded.
+        Names of the offered controllers. Those in files of users are loaded for their labels.
     shown : mapping of str to str
         Labels of the controllers in use, by name. These are not loaded: they may come from a saved run.
 

@@ -43,7 +43,7 @@ _KINEMATICS_MEANING = (
 
 @dataclass(frozen=True)
 class NumberParameter:
-    """A number that has a slider.
+    """A parameter whose value is a number, with a slider.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class NumberParameter:
 
 @dataclass(frozen=True)
 class OptionParameter:
-    """A value that is one of several words.
+    """A parameter whose value is one of several words.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class OptionParameter:
         return self.value
 
     def parse(self, text: str) -> str:
-        """Return the choice that a typed text is, or starts.
+        """Return the choice that is equal to a typed text, or the only one that starts with it.
 
         Raises
         ------
@@ -220,7 +220,7 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
             high=slider.high,
             is_optional=name.endswith("_range"),
         )
-    kinematics = KINEMATICS[limits.track_width > 0.0]
+    kinematics = KINEMATICS[1] if limits.track_width > 0.0 else KINEMATICS[0]
     yield OptionParameter(
         "team.kinematics", "kinematics", _KINEMATICS_MEANING, kinematics, KINEMATICS[0], KINEMATICS
     )
@@ -231,7 +231,7 @@ def _drop_infinity(value: float) -> float | None:
 
 
 def replace_limit(limits: RobotProperties, name: str, value: float | str | None) -> RobotProperties:
-    """Return limits with another value of one of them, for all robots.
+    """Replace the value of one limit for all robots.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ class PlaybackActions:
         session.show_time(session.timeline.end_time)
 
     def branch(self) -> None:
-        """Continue from the displayed step; what came after it stays as a branch."""
+        """Continue from the displayed step; the later steps stay as a branch."""
         session = self._viewer.session
         if session.branch():
             session.playback.is_playing = True
@@ -98,9 +98,8 @@ class PlaybackActions:
 
     def list_branch_names(self) -> list[str]:
         """Return the numbers of the branches as text, from 1."""
-        return [
-            str(number + 1) for number in range(len(self._viewer.session.timeline.document.list_branches()))
-        ]
+        count = len(self._viewer.session.timeline.document.list_branches())
+        return [str(number) for number in range(1, count + 1)]
 
     def enter_branch(self, name: str) -> None:
         """Go to the end of a branch, by its number as text."""
@@ -134,7 +133,7 @@ class PlaybackActions:
             self._viewer.show_message("nothing to undo")
 
     def redo(self) -> None:
-        """Redo the change undone last."""
+        """Redo the last change that was undone."""
         description = self._viewer.session.redo()
         self._viewer.show_message(f"redone: {description}" if description else "nothing to redo")
 

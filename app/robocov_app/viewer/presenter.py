@@ -65,7 +65,7 @@ class Presenter(ViewerModel):
         self.files = FileActions(self, folder, map_name=map_name, draft_folder=draft_folder, file=file)
 
     def choose_tool(self, name: str) -> None:
-        """Use a tool, and say how."""
+        """Choose a tool, and show a hint on how to use it."""
         self.tool.cancel(self.session)
         self.toolbox.current = self.toolbox.by_name[name]
         self.show_message(f"{self.tool.title}: {self.tool.hint}")
@@ -75,10 +75,10 @@ class Presenter(ViewerModel):
         return self.tool.finish(self.session)
 
     def cancel(self) -> None:
-        """Give up the drawing, else return to the hand."""
+        """Discard the drawing; without a drawing, return to the hand."""
         if not self.tool.cancel(self.session) and self.tool is not self.toolbox.hand:
             self.toolbox.current = self.toolbox.hand
 
     def resize_tool(self, factor: float) -> None:
-        """Make the brush, or else new walls, larger or smaller."""
+        """Resize the tool in use; with a tool without a size, resize new walls."""
         self.show_message(self.toolbox.resizable.resize(self.session, factor))

@@ -41,7 +41,7 @@ class ScreenVideo:
     Raises
     ------
     OutputError
-        If there is no encoder, the folder cannot be made, or the file exists.
+        If there is no encoder, the folder cannot be created, or the file exists.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], *, waits: bool = False) -> None:

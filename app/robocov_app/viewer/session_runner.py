@@ -1,4 +1,4 @@
-"""Lets the session of the window advance with real time, and says why it stops."""
+"""Advances the session of the window with real time, and reports why it stops."""
 
 from robocov.errors import RobocovError
 from robocov_app.viewer.model import ViewerModel, simplify_message
@@ -61,7 +61,7 @@ class SessionRunner:
         return steps
 
     def _report_end(self) -> None:
-        """Say why the simulation has stopped."""
+        """Show why the simulation has stopped."""
         viewer = self._viewer
         timeline = viewer.session.timeline
         if timeline.is_settled:

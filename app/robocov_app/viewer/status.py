@@ -106,7 +106,7 @@ def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Po
 
 
 def suggest_actions(viewer: ViewerModel) -> str:
-    """Return what to try once the team has settled; empty while it moves, or if all was tried."""
+    """Suggest what to try once the team has settled; empty while it moves, or if everything was tried."""
     timeline = viewer.session.timeline
     has_settled = timeline.is_settled or viewer.settled_change is timeline.head
     if not viewer.view.has_suggestions or not has_settled:

@@ -20,13 +20,13 @@ FAILED_RADIUS_PX = 9.0  # within which a failed robot is hit, even if it is draw
 _MARK_PX = 3.0  # half the side of the mark of a point
 _LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
 
-_OBSTACLE_ALPHA = 89  # of an obstacle that would be drawn
-_PREMULTIPLIED_FRACTION = 0.35  # the same as a factor of its color
-_MAX_PIXEL = 1e4  # polygons are drawn up to it
+_OBSTACLE_ALPHA = 89  # opacity of a preview, 0 to 255
+_PREMULTIPLIED_FRACTION = 0.35  # the same opacity as a fraction, by which the color is multiplied
+_MAX_PIXEL = 1e4  # coordinates of polygons are clipped to it
 
 
 def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> None:
-    """Draw a line from a robot that is dragged to where it is dragged."""
+    """Draw a line from the dragged robot to the point to which it is pulled."""
     numbers = list(scene.numbers or ())
     if drag is None or drag[0] not in numbers:
         return
@@ -47,7 +47,7 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
 
 
 def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
-    """Draw a ring around a robot that can be taken hold of."""
+    """Draw a ring around a robot that a press would act on."""
     numbers = list(scene.numbers or ())
     if number not in numbers:
         return

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-FADE_S = 12.0  # length of path that fading trajectories show
+FADE_S = 12.0  # period that fading trajectories show
 
 
 @dataclass
@@ -41,7 +41,7 @@ class ViewState:
         self.theme = "dark" if self.theme == "light" else "light"
 
     def toggle_fading(self) -> str:
-        """Show all of the trajectories, or the last seconds; return a message."""
+        """Switch between whole trajectories and their last seconds; return a message."""
         self.fades_trajectories = not self.fades_trajectories
         if self.fades_trajectories:
             return f"trajectories show the last {FADE_S:g} s"

@@ -1,4 +1,4 @@
-"""The viewer's window: takes events, lets time pass, draws frames."""
+"""The viewer's window: handles events, advances time, draws frames."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -121,7 +121,7 @@ class ViewerWindow(BaseWindow):
         self.draw()
 
     def _build_actions(self) -> ViewerWindowActions:
-        """Return what commands do with the window."""
+        """Return the actions of the window that commands run."""
         return ViewerWindowActions(
             zoom=self.zoom,
             show_next_tab=lambda: self.panel.show_next_tab(),
@@ -147,7 +147,7 @@ class ViewerWindow(BaseWindow):
         self.dialogs.ask(build_recovery_offer(self.viewer, drafts, self.offer_recovery))
 
     def create_save_point(self) -> Callable[[], None]:
-        """Return a function that takes back all changes since now."""
+        """Return a function that reverts all later changes."""
         viewer = self.viewer
         session = viewer.session
         point = session.build_save_point()
@@ -161,7 +161,7 @@ class ViewerWindow(BaseWindow):
         return roll_back
 
     def report_fault(self, message: str, *, in_drawing: bool) -> None:
-        """Show a message on an unexpected exception; close what may be the cause if drawing raised it."""
+        """Show a message on an unexpected exception; if drawing raised it, close what may have caused it."""
         if in_drawing:
             self.is_help_open = False
             self.dialogs.discard()
@@ -181,7 +181,7 @@ class ViewerWindow(BaseWindow):
         self.viewer.costs.close()
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Take the look of where the window is shown."""
+        """Adopt the scale and theme of the page that shows the window; None leaves the panel as it is."""
         self.scale = scale
         view = self.viewer.view
         view.theme = theme
@@ -233,7 +233,7 @@ class ViewerWindow(BaseWindow):
         for message, is_error in self.run_saver.poll():
             viewer.show_message(message, is_error=is_error)
         self.lesson.advance(seconds)
-        # A window that waited for events has let many frames pass at once.
+        # A window that has waited for events makes up for many frames at once.
         slices = max(round(seconds * FPS), 1) if self.is_resting else 1
         self._runner.advance(seconds, slices)
 
@@ -243,7 +243,9 @@ class ViewerWindow(BaseWindow):
         session = self.viewer.session
         size = self.screen.get_size()
         panes = len(session.timeline.panes)
-        legend_rows = max(self.canvas.count_legend_rows(), 1) if panes > 1 and self._arranged else 1
+        legend_rows = 1
+        if panes > 1 and self._arranged is not None:
+            legend_rows = max(self.canvas.count_legend_rows(), 1)
         low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
         frame = (size, self.scale, view.has_panel, view.theme)
@@ -302,7 +304,7 @@ class ViewerWindow(BaseWindow):
         draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
 
     def do(self, name: str) -> None:
-        """Run a command by its name; lesson and help take some of them."""
+        """Run a command by its name, unless the lesson or the help page handles it."""
         if self.lesson.handle_command(name):
             return
         if name == "cancel" and self.is_help_open:
@@ -314,7 +316,7 @@ class ViewerWindow(BaseWindow):
             self.panel.show_tab("robot")
 
     def zoom(self, factor: float) -> None:
-        """Zoom at the mouse if it is over a pane, else at the middle of the first pane."""
+        """Zoom at the mouse if it is over a pane, otherwise at the center of the first pane."""
         left, top, width, height = self.layout.panes[0]
         center: tuple[float, float] = (left + width / 2, top + height / 2)
         if self.canvas.find_pane(self.pointer.at) is not None:
@@ -358,15 +360,15 @@ class ViewerWindow(BaseWindow):
         if event.type == pygame.QUIT:
             self.closed = True
         elif not self.dialogs.handle_event(event):
-            self._take_below_dialogs(event)
+            self._handle_event_below_dialogs(event)
 
-    def _take_below_dialogs(self, event: pygame.event.Event) -> None:
+    def _handle_event_below_dialogs(self, event: pygame.event.Event) -> None:
         if event.type == pygame.DROPFILE:
             self.viewer.attempt(lambda: self.viewer.files.open_file(Path(event.file)))
         elif event.type == pygame.KEYDOWN:
             self._press_key(event)
         elif event.type in MOUSE_EVENTS:
-            self._take_mouse(event)
+            self._handle_mouse(event)
         elif event.type == pygame.WINDOWLEAVE:
             self.viewer.inspection.cursor = None
             self.chart.hover = None
@@ -374,7 +376,7 @@ class ViewerWindow(BaseWindow):
             self.panel.handle_event(event)
 
     def _press_key(self, event: pygame.event.Event) -> None:
-        """Give a key to the lesson's question, else to a text field of the panel, else to a command."""
+        """Offer a key to the lesson's question, then to a text field of the panel, then to the commands."""
         if self.lesson.handle_key(event.unicode) or self.panel.handle_event(event):
             return
         command = self.commands.press_key(event)
@@ -383,7 +385,7 @@ class ViewerWindow(BaseWindow):
         # The text of the key comes as an event of its own, and is not meant for a dialog that has opened.
         self.dialogs.ignore_letter(event.unicode)
 
-    def _take_mouse(self, event: pygame.event.Event) -> None:
+    def _handle_mouse(self, event: pygame.event.Event) -> None:
         if event.type == pygame.MOUSEBUTTONDOWN:
             if self.is_help_open:
                 self.is_help_open = False

@@ -65,7 +65,7 @@ def build_branch_dialog(viewer: Presenter) -> Choice:
 
 
 def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:
-    """Return the dialog that offers the lesson to a new user; the team waits until there is an answer."""
+    """Return the dialog that offers the lesson to a new user; the session pauses until there is an answer."""
     play = _pause(viewer)
 
     def play_lesson() -> None:
@@ -83,7 +83,7 @@ def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Q
 def build_recovery_offer(
     viewer: Presenter, drafts: Sequence[Draft], offer_others: Callable[[Sequence[Draft]], None]
 ) -> Question:
-    """Return the dialog that offers to recover unsaved work; the team waits until there is an answer.
+    """Return the dialog that offers to recover unsaved work; the session pauses until there is an answer.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def build_recovery_offer(
 
 
 def _pause(viewer: Presenter) -> Callable[[], None]:
-    """Pause the session; return what resumes it."""
+    """Pause the session; return a function that resumes it if it was playing."""
     session = viewer.session
     was_playing = session.playback.is_playing
     session.playback.is_playing = False

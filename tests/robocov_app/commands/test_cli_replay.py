@@ -180,7 +180,9 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
     said = complaint(capsys, "replay", str(run))
-    assert said.startswith("no display: the window needs one (over ssh, try ssh -X); --out DIR with")
+    assert said.startswith(
+        "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR"
+    )
 
 
 # what is wrong

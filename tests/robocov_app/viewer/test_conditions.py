@@ -209,5 +209,7 @@ def test_the_cost_is_computed_among_moving_obstacles() -> None:
 def test_the_number_of_robots_with_messages_is_limited() -> None:
     SessionScenario(HALL, robots=MAX_COMMUNICATING_ROBOTS, conditions=CONDITIONS)
     SessionScenario(HALL, robots=500, conditions=Conditions(sensing_noise=0.1))
-    with pytest.raises(ParameterError, match="robots: expected at most 100, got 101 where messages"):
+    with pytest.raises(
+        ParameterError, match="robots: expected at most 100 with lost or delayed messages, got 101"
+    ):
         SessionScenario(HALL, robots=MAX_COMMUNICATING_ROBOTS + 1, conditions=CONDITIONS)

@@ -27,7 +27,7 @@ STEPS = 60
 DT = 1 / 60
 THINNED_ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
 MISSING_MESSAGE = (
-    r"not resumed: Counting is none of .*; to resume it, open it with --controller FILE.py:Counting$"
+    r"not resumed: Counting is not one of .*; to resume the run, open it with --controller FILE.py:Counting$"
 )
 
 

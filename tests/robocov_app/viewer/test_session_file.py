@@ -102,7 +102,7 @@ def test_a_bundled_map_that_has_changed_is_rejected(tmp_path: Path) -> None:
     save(start_session(RAPF, environment=load_map("rooms")), path)
     digest = json.loads(path.read_text())["maps"][0]["digest"]
     path.write_text(path.read_text().replace(digest, "0"))
-    with pytest.raises(MapError, match=r'maps\[0\]\.digest: expected that of the map as it is now, got "0"'):
+    with pytest.raises(MapError, match=r'maps\[0\]\.digest: expected the digest of the present map, got "0"'):
         load_session(path)
 
 
@@ -128,7 +128,11 @@ def test_the_branches_of_a_file_are_described_before_they_are_recomputed(tmp_pat
         (("step",), 999, "step: expected a step of the head, 10 to 30, got 999"),
         (("touches", 1, "parent"), 1, "touches[1].parent: expected null for the first"),
         (("touches", 1, "at"), 999, "touches[1].at: expected a step of touch 0, 0 to 10, got 999"),
-        (("touches", 1, "end"), 9, "touches[1].end: expected a step from those of its changes on, in order"),
+        (
+            ("touches", 1, "end"),
+            9,
+            "touches[1].end: expected a step at or after its changes, whose steps must ascend",
+        ),
         (("touches", 1, "changes", 0, "robot"), "two", 'changes[0].robot: expected an integer, got "two"'),
         (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0].do: expected one of 'drag', "),
         (("touches", 1, "changes"), [], "touches[1].changes: expected at least 1 item, got []"),

@@ -42,7 +42,7 @@ def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
             return [(folder, "")]
         return [_read_part(folder, part) for part in content["parts"]]
     except OSError:
-        # Without the file it is another result. What cannot be read, its reader reports.
+        # Without the file it is another kind of result, whose reader reports what is wrong with it.
         return [(folder, "")]
     except (ValueError, LookupError, TypeError) as error:
         raise InputError(f"{file}: cannot be read: {to_one_line(error)}") from None

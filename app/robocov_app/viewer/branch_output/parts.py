@@ -57,7 +57,7 @@ class SelectedBranch:
         return replay(self.document, self.node, self.last_step)
 
     def is_end(self, run: Lockstep, node: Node) -> bool:
-        """Return whether a run has come to the end of the branch."""
+        """Return whether a run has reached the end of the branch."""
         return node is self.node and run.step >= self.last_step
 
 
@@ -140,7 +140,7 @@ class BranchPart:
             self._add_handled(robot, run.step)
 
     def _add_handled(self, robot: int, step: int) -> None:
-        """Note that a robot is handled at a step; steps that follow each other are one time."""
+        """Extend the period in which a robot is handled by a step, or start a new period."""
         for time in self.handled:
             if time.robot == robot and time.last_step >= step - 1:
                 time.last_step = step + 1
@@ -156,7 +156,7 @@ def split_branch(branch: SelectedBranch) -> list[BranchPart]:
         panes = run.panes
         setups = {pane.number: pane.setup for pane in panes}
         if not parts or parts[-1].setups != setups:
-            # Within an edit that lasts several steps a part would be too short.
+            # While an edit lasts several steps, each step would be a part of its own.
             if parts and parts[-1].node is node and node.scenario is None:
                 parts.pop()
             recorders = {number: _build_recorder(setup, run.scenario.dt) for number, setup in setups.items()}
@@ -245,7 +245,7 @@ def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
 
 
 def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
-    """Return whether the record leads from its start to its end without the user."""
+    """Return whether a simulation from the start of the record, without the user, repeats the record."""
     has_known_memory = part.first_step == 0 or not has_memory(setup.controller.build())
     is_turned = record.steering is not None and bool(record.steering[0].any())
     return has_known_memory and not part.handled and not is_turned
@@ -267,13 +267,16 @@ def build_pane_scene(pane: Pane, costs: list[PartCost] | None = None, name: str 
     costs : list of PartCost, optional
         Costs along the branch, for the caption.
     name : str
-        Name of the pane's controller among them.
+        Name of the pane's controller in `costs`.
     """
-    known: list[float] = []
+    mean_distances: list[float] = []
     for cost in costs or []:
         if cost.controller == name:
             times = cost.start_time + cost.history.time
-            known += cost.history.mean_distance[times <= pane.time + _TIME_TOLERANCE_S].tolist()
-    caption = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
+            is_past = times <= pane.time + _TIME_TOLERANCE_S
+            mean_distances += cost.history.mean_distance[is_past].tolist()
+    caption = ""
+    if mean_distances:
+        caption = cost_label(mean_label(pane.setup.environment), mean_distances[-1], None)
     snapshot = pane.simulation.observe_and_decide()
     return pane.build_scene(pane.setup, snapshot, pane.trail.get_until(pane.time), cost=caption)

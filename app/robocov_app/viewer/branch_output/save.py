@@ -1,4 +1,4 @@
-"""Saving a branch: evaluates the records of its parts, writes their files, and the video of all of it."""
+"""Save a branch: the records of its parts with costs and figures, and a video of the whole branch."""
 
 import re
 from dataclasses import dataclass, replace
@@ -117,13 +117,14 @@ class _BranchWriter:
         return Run(record, history, summarize(record, history))
 
     def _write_cost_table(self, costs: list[PartCost]) -> None:
-        """Write the costs of all parts to one table, in the time of the branch."""
-        header = "controller," + build_cost_table(costs[0].history)[0]
+        """Write the costs of all parts to one table, with times since the start of the branch."""
+        header = ""
         rows: list[tuple[object, ...]] = []
         for cost in costs:
-            for time, *values in build_cost_table(cost.history)[1]:
+            header, part_rows = build_cost_table(cost.history)
+            for time, *values in part_rows:
                 rows.append((cost.controller, cost.start_time + time, *values))
-        write_csv(self.result.staging / "cost.csv", header, rows)
+        write_csv(self.result.staging / "cost.csv", f"controller,{header}", rows)
 
     def _write_video(self, parts: list[BranchPart], costs: list[PartCost]) -> None:
         settings = self.settings.video
@@ -136,7 +137,7 @@ class _BranchWriter:
 
 
 def _build_folder_name(description: str) -> str:
-    """Return a description as the name of a folder.
+    """Turn a description into the name of a folder.
 
     >>> _build_folder_name("robot 3 failed: RAPF, k_rep = 0.5")
     'robot-3-failed-RAPF-k_rep-0.5'

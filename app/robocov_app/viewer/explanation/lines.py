@@ -23,6 +23,8 @@ _MIN_SPEED_M_S = 0.005  # slower robots are written as at rest
 _PAIR_FRACTION = 0.2  # two forces balance if their sum is below this fraction of the larger one
 _STRAIGHT_ALIGNMENT = 0.9  # cosine above which a force points at something
 _NEIGHBOR_RATIO = 1.5  # the second neighbor is named if it is at most this much farther than the first
+_FAST_ACCELERATION = 1.001  # fraction of the maximum acceleration above which the forces are limited
+_FULL_SPEED = (0.995, 1.005)  # fractions of the maximum speed between which a robot is at that speed
 _MAX_LISTED_RANGE_M = 1e100
 
 _FORCE_NAMES = {
@@ -128,7 +130,7 @@ def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: co
 
 
 def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
-    """Return the sentence on a force with a name only."""
+    """Describe a force by its name alone."""
     source = _name_force(kind)
     if kind == UNEXPLAINED_FORCE and len(situation.forces) > 1:
         source = "other forces of its controller"
@@ -155,17 +157,18 @@ def _list_limits(situation: RobotSituation) -> list[str]:
         texts.append("its controller gives a force that is not a number")
     acceleration = abs(situation.resultant) / situation.mass
     limit = situation.max_acceleration
-    if acceleration > 1.001 * limit:
+    if acceleration > _FAST_ACCELERATION * limit:
         texts.append(f"limited: {format_number(limit)} m/s² instead of {format_number(acceleration)} m/s²")
     max_speed = situation.max_speed
-    if situation.speed >= 0.995 * max_speed:
-        relation = "at" if situation.speed < 1.005 * max_speed else "faster than"
+    low, high = _FULL_SPEED
+    if situation.speed >= low * max_speed:
+        relation = "at" if situation.speed < high * max_speed else "faster than"
         texts.append(f"{relation} its maximum speed, {format_number(max_speed)} m/s")
     return texts
 
 
 def _list_rest_reasons(situation: RobotSituation, motion: Motion) -> list[str]:
-    """Return what holds a robot, or which forces balance, if it does not move steadily."""
+    """Return which obstacle holds a robot, or which forces balance, if it does not move steadily."""
     forces = {kind: force for kind, force in situation.forces.items() if abs(force) >= MIN_FORCE_N}
     if motion in (Motion.MOVING, Motion.STARTING) or not forces:
         return []

@@ -13,8 +13,10 @@ MAX_REST_SPEED_M_S = 0.05
 
 _MIN_STEADY_SPEED_M_S = 0.1 * MAX_REST_SPEED_M_S  # of a robot that has covered some distance
 _MIN_SWAY_M = 0.02  # a robot that moves to and fro by less seems to stand still
-_TREMBLING_RATIO = 3.0  # path length by extent, from which on a robot trembles
-_STRAIGHT_RATIO = 1.5  # path length by distance covered, below which a path is straight
+_TREMBLING_RATIO = 3.0  # a robot trembles if its path length is more than this many times its extent
+_STRAIGHT_RATIO = 1.5  # a path is straight if it is less than this many times the distance covered
+_MIN_FORWARD_ALIGNMENT = 0.7  # cosine between the distance covered and the velocity of a robot that sets off
+_MIN_RUN_UP_FRACTION = 0.5  # of the distance in which a robot at maximum acceleration reaches its speed
 
 
 class Motion(Enum):
@@ -64,8 +66,10 @@ def _classify_rest(situation: RobotSituation, path_length: float) -> Motion:
 
 
 def _has_set_off(situation: RobotSituation, covered: complex, path_length: float) -> bool:
-    """Return whether a fast robot has covered so little because it has just started, straight ahead."""
+    """Return whether a fast robot has covered little distance because it has just started, straight ahead."""
     is_straight = path_length < _STRAIGHT_RATIO * abs(covered)
-    if not is_straight or compute_alignment(covered, situation.velocity) <= 0.7:
+    if not is_straight or compute_alignment(covered, situation.velocity) <= _MIN_FORWARD_ALIGNMENT:
         return False
-    return abs(covered) > 0.25 * situation.speed**2 / situation.max_acceleration
+    # From rest, a robot reaches its speed v within v² / (2 a) at the earliest.
+    run_up = 0.5 * situation.speed**2 / situation.max_acceleration
+    return abs(covered) > _MIN_RUN_UP_FRACTION * run_up

@@ -24,7 +24,8 @@ MIN_SHORTFALL_M = 0.3
 
 _BALANCE_FRACTION = 0.1  # a resultant below this fraction of the largest force counts as zero,
 _BALANCE_ACCELERATION = 0.1  # and so does one that accelerates the robot by less, m/s²
-_MAX_VALUE = 1e100  # numbers above this cannot be computed with
+_MIN_PRESSING_ALIGNMENT = 0.1  # cosine above which the resultant presses the robot against an object
+_MAX_VALUE = 1e100  # larger numbers would overflow in products
 _RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant"})
 
 
@@ -41,7 +42,7 @@ class NearbyObject:
     gap : float
         From the robot's rim, m.
     obstruction : str
-        The obstacle between the robot and it, in words; empty for none.
+        Description of the obstacle between the robot and it; empty for none.
     """
 
     name: str
@@ -68,7 +69,7 @@ class NearbyObject:
 
 
 class RobotSituation:
-    """Everything that the report on a robot is about; SI units.
+    """All facts that the report on a robot uses, in SI units.
 
     Parameters
     ----------
@@ -163,12 +164,17 @@ class RobotSituation:
         return abs(self.resultant) <= negligible
 
     def _list_touched(self) -> list[NearbyObject]:
-        nearby = [*([self.obstacle] if self.obstacle is not None else []), *self.neighbors]
+        nearby = list(self.neighbors)
+        if self.obstacle is not None:
+            nearby.insert(0, self.obstacle)
         return [item for item in nearby if item.gap <= MAX_CONTACT_GAP_M]
 
     def _name_pressed_objects(self) -> str:
-        pressed = [item for item in self.touched if compute_alignment(self.resultant, item.offset) > 0.1]
-        return " and ".join(item.name for item in pressed)
+
+        def is_pressed(item: NearbyObject) -> bool:
+            return compute_alignment(self.resultant, item.offset) > _MIN_PRESSING_ALIGNMENT
+
+        return " and ".join(item.name for item in self.touched if is_pressed(item))
 
 
 def compute_alignment(first: complex, second: complex) -> float:
@@ -180,7 +186,7 @@ def compute_alignment(first: complex, second: complex) -> float:
 def _get_vector(values: object, row: int) -> complex | None:
     """Return one row of an array (n, 2); None if there is none, or it is not finite.
 
-    Controllers of users may give anything as a term.
+    User-defined controllers may return anything as a term.
     """
     try:
         x, y = np.asarray(values, dtype=np.float64)[row].tolist()
@@ -236,7 +242,7 @@ def _find_obstruction(environment: Environment, position: complex, goal: complex
 def _build_obstacle(
     environment: Environment, position: complex, sensed_point: complex | None, radius: float
 ) -> NearbyObject | None:
-    """Return the obstacle that a robot senses, else the one that it touches without sensing it."""
+    """Return the obstacle that a robot senses, or one that it touches without sensing it."""
     point = sensed_point
     if point is None:
         center = shapely.Point(position.real, position.imag)

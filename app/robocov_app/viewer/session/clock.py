@@ -73,24 +73,25 @@ class Clock:
             Number of steps that were taken.
         """
         started = perf_counter()
+        uses_whole_budget = math.isinf(self.speed) and not math.isinf(self.budget)
         due_s = self._due_s
-        is_endless = math.isinf(self.speed) and not math.isinf(self.budget)
-        step_limit = math.inf
-        if not is_endless:
+        due_steps = math.inf
+        if not uses_whole_budget:
             speed = MAX_SPEED_WITHOUT_BUDGET if math.isinf(self.speed) else self.speed
             due_s += min(seconds, MAX_FRAME_S) * speed
-            step_limit = math.floor(due_s / self.dt + _STEP_TOLERANCE)
+            due_steps = math.floor(due_s / self.dt + _STEP_TOLERANCE)
+        # Nothing stays due if a step ends the playback or raises.
         self._due_s = 0.0
         self.is_behind = False
         taken = 0
-        while taken < step_limit:
+        while taken < due_steps:
             taken += 1
             if not take_step():
                 return taken
             if perf_counter() - started > self.budget:
-                self.is_behind = not is_endless and taken < step_limit
+                self.is_behind = not uses_whole_budget and taken < due_steps
                 break
-        if is_endless:
+        if uses_whole_budget:
             self._due_s = due_s
         elif not self.is_behind:
             self._due_s = max(due_s - taken * self.dt, 0.0)

@@ -108,7 +108,7 @@ def _format_gain(value: Value) -> str:
 
 
 def _require_known_controller(choice: ControllerChoice, info: Any) -> ControllerChoice:
-    """Return the controller of a session file under the name that the user has typed.
+    """Return the controller of a session file, by the name that the user has typed.
 
     A controller in a file of the user's own is never run because a session file names it.
     """
@@ -118,7 +118,7 @@ def _require_known_controller(choice: ControllerChoice, info: Any) -> Controller
         same_class = [name for name in user_names if name.rpartition(":")[2] == class_name]
         if not same_class:
             advice = f"to run it, open the session with --controller {choice.name}"
-            raise build_refusal(f"{choice.name!r} is none of robocov's controllers; {advice}")
+            raise build_refusal(f"{choice.name!r} is not one of robocov's controllers; {advice}")
         choice = replace(choice, name=same_class[0])
     try:
         choice.build()

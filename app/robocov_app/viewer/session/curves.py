@@ -1,5 +1,6 @@
 """Cost curves of the time line, curves of other branches, and events."""
 
+import math
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -60,7 +61,7 @@ class Curve:
         return self._times[-1] if self._times else -np.inf
 
     def add(self, time: float, value: float) -> None:
-        """Add a sample at any time, which replaces one of the same time, unless it is not finite."""
+        """Add a sample, or replace the one at the same time. Samples that are not finite are ignored."""
         if not np.isfinite([time, value]).all():
             return
         index = bisect_left(self._times, time - _SAME_TIME_S)
@@ -86,7 +87,7 @@ class Curve:
         list of list of float
             Times, s, and values. The newest sample is always among them.
         """
-        stride = max(-(-len(self) // maximum), 1)
+        stride = max(math.ceil(len(self) / maximum), 1)
         times = self._times[::-stride][::-1]
         values = self._values[::-stride][::-1]
         return [
@@ -124,7 +125,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class GhostCurve:
-    """The part of the curve of another branch that is not on the branch of the present.
+    """The part of another branch's curve that is not on the present branch.
 
     Attributes
     ----------

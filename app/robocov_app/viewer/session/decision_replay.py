@@ -87,7 +87,7 @@ def _complete_recorded_decision(state: PaneState) -> Decision:
 
 
 def _decide(seen: Observations, state: PaneState) -> Decision:
-    """Ask the controller again; without a usable answer there are no forces."""
+    """Let the controller decide again; without a usable decision there are no forces."""
     no_forces = Decision(np.zeros_like(seen.positions))
     controller = _build_controller(state.setup)
     if controller is None:
@@ -116,10 +116,10 @@ def _is_usable(decision: object, shape: tuple[int, ...]) -> bool:
     return bool(np.isfinite(decision.forces).all())
 
 
-# There is one setup for each pane; after an edit those from before are still asked for.
+# Each pane has one setup; after an edit, the earlier setups are still used.
 @lru_cache(maxsize=8)
 def _build_controller(setup: PaneSetup) -> Controller | None:
-    """Build the controller of a pane; None if the controller of a record does not exist any more."""
+    """Build the controller of a pane; None if the controller of a record no longer exists."""
     with suppress(ParameterError):
         return inform_controller(setup.controller.build(), setup.sensed_environment.static)
     return None

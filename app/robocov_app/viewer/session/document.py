@@ -26,20 +26,20 @@ MAX_CACHED_STATES = 160
 
 @dataclass(eq=False)
 class Node:
-    """An edit, or several that belong together, and the time that passes until the next one.
+    """An edit, or several that belong together, and the time span until the next one.
 
     Attributes
     ----------
     number : int
         Index in the document.
     parent : Node or None
-        The node in whose time the edit was made.
+        The node whose time span contains the edit.
     branch_step : int
-        Step of the parent's time at which the edit was made.
+        Step in the time span of the parent at which the edit was made.
     kind : str
         Kind of the edit, as in `SessionEvent`.
     description : str
-        The edit in words.
+        Description of the edit.
     edits : list of SessionEdit
         The edits in the order in which they were made.
     last_step : int
@@ -47,9 +47,9 @@ class Node:
     name : str
         Name of the branch that ends here; empty if it has none.
     redo : Node or None
-        The child that was left by undo.
+        The child that the last undo left.
     cached_states : list of RunState
-        States in the time of the node; they are not in files, because they can be recomputed.
+        States in the time span of the node; they are not in files, because they can be recomputed.
     curves : dict
         Cost curves by pane and quantity.
     controllers : dict
@@ -85,7 +85,7 @@ class Node:
 
     @property
     def first_step(self) -> int:
-        """The first step in the time of the node."""
+        """The first step in the time span of the node."""
         return self.branch_step if self.scenario is None else 0
 
     def apply_edits(self, run: Lockstep) -> None:
@@ -115,7 +115,7 @@ class Branch(NamedTuple):
     last_step : int
         Its last step.
     description : str
-        Its name, or the last edit in words.
+        Its name, or the description of the last edit.
     """
 
     node: Node
@@ -179,13 +179,13 @@ class SessionDocument:
         Parameters
         ----------
         parent : Node or None
-            The node in whose time the edit is made.
+            The node whose time span contains the edit.
         branch_step : int
             Step at which the edit is made.
         kind : str
             Kind of the edit, as in `SessionEvent`.
         description : str
-            The edit in words.
+            Description of the edit.
         edit : SessionEdit
             The edit.
 
@@ -235,7 +235,7 @@ class SessionDocument:
         raise ParameterError(f"branch: expected one of {known}, got {name!r}")
 
     def list_events(self, node: Node, step: int, dt: float) -> list[SessionEvent]:
-        """Return what happened on the path to a step of a node, in the order of time.
+        """Return the events on the path to a step of a node, in the order of time.
 
         Parameters
         ----------
@@ -253,14 +253,13 @@ class SessionDocument:
         last_steps = self.get_last_steps(node, step)
         events = []
         for ancestor in self.get_path(node):
-            happened = sorted(ancestor.automatic_events)
-            if ancestor.scenario is None:
-                edit_event = AutomaticEvent(ancestor.branch_step, ancestor.kind, ancestor.description)
-                happened.insert(0, edit_event)
             last_step = last_steps[ancestor.number]
+            if ancestor.scenario is None and ancestor.branch_step <= last_step:
+                time = ancestor.branch_step * dt
+                events.append(SessionEvent(time, ancestor.kind, ancestor.description))
             events += [
                 SessionEvent(event.step * dt, event.kind, event.text)
-                for event in happened
+                for event in sorted(ancestor.automatic_events)
                 if event.step <= last_step
             ]
         return sorted(events, key=attrgetter("time"))
@@ -286,14 +285,14 @@ def replay(
     run : Lockstep or None
         The run at a step of the node `since`; by default it starts at time 0.
     since : Node or None
-        The node in whose time the run is.
+        The node whose time span contains the step of the run.
 
     Yields
     ------
     run : Lockstep
         The run at each step, before it advances.
     node : Node
-        The node in whose time it is.
+        The node whose time span contains that step.
 
     Raises
     ------

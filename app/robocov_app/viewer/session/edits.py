@@ -393,7 +393,7 @@ def _find_free_position(pane: Pane, number: int, point: Point) -> Point:
 def _change_robot(
     pane: Pane, number: int, working_at: Point | None = None, failed_at: Point | None = None
 ) -> Continuation:
-    """Return the state of a pane with a robot at rest at a position, or failed at one, or without it."""
+    """Return the state of a pane with a robot at rest or failed at a position; without one, it is removed."""
     setup = pane.setup
     positions = dict(zip(pane.numbers, pane.simulation.positions, strict=True))
     velocities = dict(zip(pane.numbers, pane.simulation.velocities, strict=True))

@@ -1,7 +1,7 @@
 """Session files, ``NAME.robocov``: the document of a session as versioned JSON of a few kilobytes.
 
-Bundled maps are stored by name and digest, others whole, each once. A controller in a file of the user's own
-is stored by its path, and never run because a session file names it.
+Bundled maps are stored by name and digest, other maps in full, each of them once. A controller in a file of
+the user's own is stored by its path, and never run just because a session file names it.
 """
 
 import json
@@ -139,7 +139,7 @@ def _build_node_content(node: Node, context: FileContext) -> dict[str, Any]:
 
 
 def _build_edits_content(edits: list[SessionEdit], context: FileContext) -> list[dict[str, Any]]:
-    """Return the edits as they are in a file, where consecutive points of a drag are one path."""
+    """Build the content of edits, with consecutive points of a drag as one path."""
     contents: list[dict[str, Any]] = []
     for edit in edits:
         if not isinstance(edit, DragRobot):
@@ -242,7 +242,7 @@ class _NodeReader:
     where : str
         Name of the file, for messages.
     nodes : list of Node
-        The nodes before.
+        The earlier nodes.
     """
 
     def __init__(self, where: str, nodes: list[Node]) -> None:
@@ -276,7 +276,7 @@ class _NodeReader:
         is_root = model.parent is None
         is_unknown = model.parent is not None and model.parent >= len(self._nodes)
         if is_root != is_first or is_unknown:
-            self._refuse(("parent",), model.parent, "null for the first, else an earlier number")
+            self._refuse(("parent",), model.parent, "null for the first, or the number of an earlier touch")
 
     def _check_steps(self, model: NodeModel, node: Node) -> None:
         parent = node.parent
@@ -286,7 +286,7 @@ class _NodeReader:
         edit_steps = [edit.step for edit in node.edits]
         is_ordered = edit_steps == sorted(edit_steps) and edit_steps[0] == node.first_step
         if not is_ordered or node.last_step < edit_steps[-1]:
-            self._refuse(("end",), model.end, "a step from those of its changes on, in order")
+            self._refuse(("end",), model.end, "a step at or after its changes, whose steps must ascend")
 
     def _read_curves(self, model: NodeModel, node: Node) -> None:
         for name, samples in model.curves.items():

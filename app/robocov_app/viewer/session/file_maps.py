@@ -1,4 +1,4 @@
-"""The maps of a session file: bundled ones by name and digest, others whole, each once."""
+"""The maps of a session file: bundled ones by name and digest, others in full, each of them once."""
 
 import hashlib
 import json
@@ -57,7 +57,7 @@ class FileContext:
         self._environments: dict[int, Environment] = {}
 
     def get_number(self, environment: Environment) -> int:
-        """Return the number of a map, which is added to the maps if it is new."""
+        """Return the number of a map. A new map is added to `maps`."""
         content = _build_map_content(environment)
         if content not in self.maps:
             self.maps.append(content)
@@ -95,7 +95,7 @@ class FileContext:
         environment = load_map(content.bundled)
         if _compute_digest(to_json(environment)) != content.digest:
             path = ("maps", number, "digest")
-            refuse_value(self.where, path, content.digest, "that of the map as it is now")
+            refuse_value(self.where, path, content.digest, "the digest of the present map")
         return environment
 
 

@@ -54,7 +54,7 @@ class _Model(BaseModel):
 
 
 class NodeModel(_Model):
-    """One edit, and the time that passes after it."""
+    """One edit, and the time span until the next one."""
 
     parent: Annotated[int | None, Field(ge=0, description="Number of the edit before; null for the first")]
     at: Step
@@ -65,7 +65,7 @@ class NodeModel(_Model):
     changes: Annotated[list[_FileEdit], Field(min_length=1)]
     curves: dict[str, list[list[Coordinate]]] = Field(
         {},
-        description='Samples of the curves in this time: [times, values] of "pane distance" and "pane time"',
+        description='Samples of the curves in this span: [times, values] of "pane distance" and "pane time"',
     )
 
     def to_edits(self) -> list[SessionEdit]:
@@ -100,7 +100,7 @@ class ConditionModel(_Model):
 
 
 class QuestionModel(_Model):
-    """A prediction that is asked for before a chapter continues."""
+    """A question for a prediction, before a chapter continues."""
 
     text: Text
     answers: Annotated[list[Text], Field(min_length=2, max_length=MAX_ANSWERS)]
@@ -138,7 +138,7 @@ class LessonModel(_Model):
 
 
 def _note_maps(maps: list[BundledMapModel | dict[str, Any]], info: Any) -> list[Any]:
-    """Make the maps known to the fields that refer to them, which are validated later."""
+    """Make the maps available to the fields that refer to them, which are validated later."""
     info.context.maps = maps
     return maps
 
@@ -152,7 +152,7 @@ class SessionModel(_Model, title="robocov session"):
     robocov: Text = ""
     maps: Annotated[list[BundledMapModel | dict[str, Any]], Field(min_length=1), AfterValidator(_note_maps)]
     touches: Annotated[list[NodeModel], Field(min_length=1)]
-    head: Annotated[int, Field(ge=0, description="Number of the edit in whose time the present is")]
+    head: Annotated[int, Field(ge=0, description="Number of the edit whose time span contains the present")]
     step: Step
     view: dict[str, Any] = Field({}, description="Displayed layers and theme")
     lesson: LessonModel | None = None

@@ -20,7 +20,7 @@ def build_ghost_curves(
     document : SessionDocument
         The document.
     head : Node
-        The node in whose time the present is.
+        The node whose time span contains the present.
     step : int
         The present step.
     dt : float, s
@@ -39,7 +39,8 @@ def build_ghost_curves(
     for branch in document.list_branches():
         if document.get_path(branch.node)[0] is root:
             ghosts += _build_branch_curves(document, branch, last_steps, dt)
-    return ghosts[-len(QUANTITIES) * MAX_GHOST_BRANCHES * panes :]
+    max_curves = len(QUANTITIES) * MAX_GHOST_BRANCHES * panes
+    return ghosts[-max_curves:]
 
 
 def _build_branch_curves(

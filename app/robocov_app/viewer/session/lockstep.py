@@ -34,12 +34,12 @@ DRAG_STIFFNESS_PER_KG = 60.0
 MAX_DRAG_ACCELERATION_M_S2 = 80.0
 """Maximum pull of the spring, divided by the mass of the robot."""
 MIN_REPORTED_OFFSET_M = 5e-4
-"""Distance from the requested position from which on it is reported where a robot has joined."""
+"""A robot that joins farther than this from the requested position is reported with the distance."""
 _TINY = 1e-12
 
 
 class AutomaticEvent(NamedTuple):
-    """Something that happens by itself: a robot that fails or joins, as the conditions say.
+    """An event that no user causes: a robot that fails or joins according to the conditions.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Lockstep:
         Parameters
         ----------
         node : int
-            Number of the node of the undo tree in whose time it is.
+            Number of the node of the undo tree whose time span contains the present.
 
         Returns
         -------
@@ -139,7 +139,7 @@ class Lockstep:
 
     def advance(self) -> list[AutomaticEvent]:
         """Simulate one step, and return the robots that have failed or joined by themselves."""
-        # A controller that raises does so before any pane has moved.
+        # If a controller raises, it does so before any pane has moved.
         for pane in self.panes:
             pane.simulation.observe_and_decide()
         for pane in self.panes:
@@ -148,7 +148,7 @@ class Lockstep:
         return [*self._add_joining_robots(), *self._stop_failing_robots()]
 
     def apply(self, edit: RunEdit) -> None:
-        """Apply an edit. If it raises, nothing has changed.
+        """Apply an edit. If it raises, nothing changes.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Lockstep:
         return forces
 
     def _find_changing_robots(self, change_times: Array) -> list[int]:
-        """Return the numbers of the robots whose time of a change, (n,) s, was in the last step."""
+        """Return the numbers of the robots whose change times, (n,) s, lie in the last step."""
         now = self.time + TIME_TOLERANCE_S
         before = self.time - self.scenario.dt + TIME_TOLERANCE_S
         is_changing = (change_times > before) & (change_times <= now)
@@ -268,7 +268,7 @@ class Lockstep:
         return events
 
     def _describe_offset(self, number: int, requested: Point) -> str:
-        """Describe the distance from the requested position to that where a robot joined, if there is one."""
+        """Describe how far from the requested position a robot has joined; empty if it is there."""
         pane = self.panes[0]
         row = pane.get_row(number)
         offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))

@@ -1,4 +1,4 @@
-"""Controllers of records that do not exist any more, or are not loaded."""
+"""Controllers of records that no longer exist, or are not loaded."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ class MissingController(ControllerChoice):
 
     @property
     def available_gains(self) -> Mapping[str, Gain | Option]:
-        """The gains cannot be known."""
+        """No gains, because they are not known."""
         return {}
 
     def build(self) -> Controller:
@@ -80,8 +80,9 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
     if name not in (*CONTROLLERS, *same_class):
         if not same_class:
             suggestion = f"FILE.py:{class_name}" if class_name != name else class_name
-            reason = f"is none of robocov's controllers; to resume it, open it with --controller {suggestion}"
-            return MissingController(name, gains, record.label, f"{record.label} {reason}")
+            advice = f"to resume the run, open it with --controller {suggestion}"
+            reason = f"{record.label} is not one of robocov's controllers; {advice}"
+            return MissingController(name, gains, record.label, reason)
         name = same_class[0]
     choice = ControllerChoice(name, gains)
     try:
@@ -92,7 +93,7 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
 
 
 def use_placeholder(choice: ControllerChoice) -> ControllerChoice:
-    """Return a choice that can be built, which is a placeholder for a missing controller."""
+    """Replace a missing controller by a placeholder that can be built."""
     if isinstance(choice, MissingController):
         return replace(choice, is_placeholder=True)
     return choice

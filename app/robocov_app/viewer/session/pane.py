@@ -20,9 +20,9 @@ from robocov_app.viewer.session.states import PaneSetup, PaneState
 from robocov_app.viewer.session.trails import Trail, select_robots
 
 STEPS_BETWEEN_SENSED_POINTS = 3
-"""Number of steps between two notes of the points that robots sense."""
+"""Number of steps between two records of the points that robots sense."""
 _MOVED_M = 1e-3
-"""Distance from which on a robot counts as moved when it is pushed out of an obstacle."""
+"""A robot that is pushed out of an obstacle by more than this comes to rest."""
 
 
 class Continuation(NamedTuple):
@@ -199,7 +199,7 @@ class Pane:
         return changed
 
     def _differs_only_in_density(self, continuation: Continuation) -> bool:
-        """Return whether an edit changes nothing but the density of the map, or nothing at all."""
+        """Return whether an edit changes at most the density of the map."""
         old = self.setup
         new = continuation.setup
         return (

@@ -7,9 +7,9 @@ from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.timeline import Timeline
 
 SEEK_SLICE_S = 0.03
-"""Time of a frame for building another state of the session."""
+"""Computing time in each frame for building another state of the session."""
 FIRST_SEEK_SLICES = 4
-"""Number of slices that are spent at once when another state is asked for."""
+"""Number of such slices that are spent at once when another state is requested."""
 
 
 class Playback:

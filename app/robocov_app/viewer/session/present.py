@@ -1,5 +1,6 @@
 """The present of a timeline, and how it is built for any step of a document."""
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ class Present:
     Attributes
     ----------
     head : Node
-        The node of the document in whose time the present is.
+        The node of the document whose time span contains the present.
     run : Lockstep
         The panes at the present step.
     history : RunHistory
@@ -138,7 +139,9 @@ def build_present(
 
 
 def cache_present(document: SessionDocument, present: Present) -> None:
-    """Keep states, curves and controllers in the nodes on the path to the present, for the time after it.
+    """Store the states, curves and controllers of the present in the nodes on the path to it.
+
+    They are used when the timeline returns to this branch from another one.
 
     Parameters
     ----------
@@ -147,18 +150,13 @@ def cache_present(document: SessionDocument, present: Present) -> None:
     present : Present
         The present.
     """
-    recorded = defaultdict[int, list[RunState]](list)
+    states_by_node = defaultdict[int, list[RunState]](list)
     for state in present.history.states:
-        recorded[state.node].append(state)
+        states_by_node[state.node].append(state)
     path = document.get_path(present.head)
     dt = present.run.scenario.dt
     for node, following in zip(path, [*path[1:], None], strict=True):
-        states = list(recorded[node.number])
-        last_recorded_step = states[-1].step if states else -1
-        states += [state for state in node.cached_states if state.step > last_recorded_step]
-        # The last state is always among the cached ones.
-        stride = max(-(-len(states) // MAX_CACHED_STATES), 1)
-        node.cached_states = states[::-stride][::-1]
+        node.cached_states = _select_cached_states(states_by_node[node.number], node.cached_states)
         end_time = np.inf if following is None else following.branch_step * dt
         for pane in present.run.panes:
             node.controllers[pane.number] = pane.controller
@@ -166,6 +164,15 @@ def cache_present(document: SessionDocument, present: Present) -> None:
                 merged = curve.extract(node.first_step * dt, end_time)
                 merged.extend(node.curves[pane.number, quantity])
                 node.curves[pane.number, quantity] = merged
+
+
+def _select_cached_states(recorded: list[RunState], cached: list[RunState]) -> list[RunState]:
+    """Return the recorded states and the later ones of the cached states, evenly thinned to the maximum."""
+    last_recorded_step = recorded[-1].step if recorded else -1
+    states = [*recorded, *(state for state in cached if state.step > last_recorded_step)]
+    stride = max(math.ceil(len(states) / MAX_CACHED_STATES), 1)
+    # Counted from the end, so that the last state is always among them.
+    return states[::-stride][::-1]
 
 
 def restore_trails(run: Lockstep, history: RunHistory) -> None:

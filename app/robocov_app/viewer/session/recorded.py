@@ -27,7 +27,7 @@ from robocov_app.viewer.session.states import PaneSetup, PaneState, RunState
 from robocov_app.viewer.session.timeline import Timeline
 
 MAX_RECORD_BYTES = 400_000_000
-"""Memory for the states of records, without their arrays; of longer records older states are thinned."""
+"""Memory for the states of records, without their arrays; in longer records, older states are thinned."""
 STATE_BYTES = 1500
 """Approximate memory for the state of one pane, without the arrays of the record."""
 _PERIOD_TOLERANCE = 1e-6
@@ -37,7 +37,7 @@ _FORCE_TOLERANCE = 1e-9
 def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] = ()) -> Session:
     """Build a session whose past is a saved run, or the runs of a comparison side by side.
 
-    Time 0 is displayed, and it plays.
+    It displays time 0, and plays.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
 
 
 def _describe_run(record: Record) -> Mapping[str, object]:
-    """Return what must be the same for runs side by side."""
+    """Return the properties that must be the same for runs side by side."""
     return {
         "dt_s": record.dt,
         "moments": len(record),
@@ -223,9 +223,9 @@ def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
 
 
 def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
-    """Return the memory of the controller at each state, by asking it again.
+    """Return the memory of the controller at each state, by letting it decide again.
 
-    It is None where the controller is missing or without memory, and after it has decided otherwise than in
+    It is None if the controller is missing or has no memory, and after the first decision that differs from
     the record.
     """
     memories: list[Any] = []

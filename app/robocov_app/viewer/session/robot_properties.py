@@ -106,7 +106,7 @@ turning_rate : float
 
 
 def _drop_defaults(properties: RobotProperties, serialize: Any) -> dict[str, Any]:
-    """Write properties without those keys that files omit for the default."""
+    """Write properties, without the optional keys that have their default values."""
     optional: dict[str, object] = {
         "different": {},
         "communication_range": None,

@@ -58,14 +58,14 @@ class RunSaver:
         self._messages: list[tuple[str, bool]] = []
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
-        """Start to save the branch of a session up to its present in a new folder.
+        """Start saving the branch of a session up to its present, in a new folder.
 
         Parameters
         ----------
         session : Session
             The session.
         folder : Path
-            Folder in which the folder of the run is made.
+            Folder in which the folder of the run is created.
         map_name : str
             Name or path of the map, for the name of the folder.
 
@@ -79,7 +79,7 @@ class RunSaver:
         ParameterError
             If the session cannot be recomputed from its edits.
         OutputError
-            If the folder cannot be made, or the process cannot be started.
+            If the folder cannot be created, or the process cannot be started.
         """
         timeline = session.timeline
         timeline.require_reproducible()
@@ -171,16 +171,17 @@ def _list_user_controllers(document: SessionDocument) -> list[str]:
 
 
 def _make_new_folder(folder: Path, stem: str) -> Path:
-    """Make a folder that did not exist before; an OutputError if it cannot be made."""
+    """Create a folder that did not exist before, or raise an OutputError."""
     while True:
         target = find_free_path(folder, stem, "")
         try:
             target.mkdir(parents=True)
         except FileExistsError:
-            # Another program may have made it meanwhile. A file in the place of a parent stays in the way.
+            # If another program has created it meanwhile, try the next name. If not, a file is in the place
+            # of a parent.
             if not target.exists():
-                raise OutputError(f"{target}: cannot be made") from None
+                raise OutputError(f"{target}: cannot be created") from None
         except OSError as error:
-            raise OutputError(f"{target}: cannot be made: {error.strerror or error}") from error
+            raise OutputError(f"{target}: cannot be created: {error.strerror or error}") from error
         else:
             return target

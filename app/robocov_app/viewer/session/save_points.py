@@ -25,7 +25,7 @@ class SavePoint:
     head_edits : tuple of SessionEdit
         Its edits.
     head_kind, head_description : str
-        Its texts.
+        Its kind and description.
     node_count : int
         Number of nodes of the document.
     revision : int
@@ -62,7 +62,7 @@ class SavePoint:
 
 
 def build_save_point(timeline: Timeline) -> SavePoint:
-    """Note the state of a timeline."""
+    """Build a save point of the present state of a timeline."""
     return SavePoint(
         head=timeline.head,
         head_edits=tuple(timeline.head.edits),
@@ -106,7 +106,7 @@ def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
     _restore_document(timeline, point)
     point.history.rewind(point.last)
     run = point.run
-    # A record whose controller does not exist any more cannot be resumed, but it was not changed either.
+    # A record whose controller no longer exists cannot be resumed, but it was not changed either.
     with suppress(RobocovError):
         run = Lockstep.resume(point.last)
     restore_trails(run, point.history)

@@ -19,7 +19,7 @@ from robocov_app.viewer.session.robot_properties import FileProperties, RobotPro
 MAX_ROBOTS = 1000
 """Maximum number of robots in the window."""
 MAX_COMMUNICATING_ROBOTS = 100
-"""Maximum number of robots where each keeps messages of its own of every other robot."""
+"""Maximum number of robots if each of them stores the messages of every other robot."""
 MAX_PANES = 4
 """Maximum number of controllers that are compared side by side."""
 DEFAULT_PROPERTIES = RobotProperties()
@@ -95,15 +95,15 @@ class SessionScenario:
             raise ParameterError(f"robots: {expected}, got {quote(self.robots)}")
         uses_messages = self.conditions is not None and self.conditions.uses_messages
         if uses_messages and self.robots > MAX_COMMUNICATING_ROBOTS:
-            reason = "where messages may be lost or late: the window remembers all of them, of all moments"
-            expected = f"expected at most {MAX_COMMUNICATING_ROBOTS}"
-            raise ParameterError(f"robots: {expected}, got {self.robots} {reason}")
+            expected = f"expected at most {MAX_COMMUNICATING_ROBOTS} with lost or delayed messages"
+            reason = "The window stores the messages of every step."
+            raise ParameterError(f"robots: {expected}, got {self.robots}. {reason}")
         if not 1 <= len(self.controllers) <= MAX_PANES:
             raise ParameterError(f"controllers: expected 1 to {MAX_PANES}, got {len(self.controllers)}")
 
     @property
     def start_name(self) -> str:
-        """Name of the start, also if the map does not contain it any more."""
+        """Name of the start, even if the map no longer contains it."""
         if self.start is not None and self.start not in self.environment.starts:
             return self.start
         return self.environment.start(self.start).name

@@ -43,7 +43,7 @@ from robocov_app.viewer.session.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 MIN_PUSH_M = 5e-3
-"""Distance from which on a robot counts as pushed by an obstacle; one that leans on it moves in any case."""
+"""A robot counts as pushed if an obstacle moves it by more; robots in contact always move a little."""
 GESTURE_WINDOW_S = 1.0
 """Simulated time within which changes of the same value, for example by a slider, count as one edit."""
 _DRAG_DECIMALS = 4
@@ -135,14 +135,14 @@ class Session:
         kind : str
             Kind of the edit, as in `SessionEvent`.
         description : str
-            The edit in words.
+            Description of the edit.
         gesture : object
-            Edits with an equal gesture, other than None, that follow each other closely count as one.
+            Consecutive edits with an equal gesture, other than None, count as one.
 
         Raises
         ------
         StartError, ParameterError, MapError
-            If the edit is not possible. Nothing has changed then.
+            If the edit is not possible. Nothing changes then.
         """
         timeline = self.timeline
         timeline.finish_seek()
@@ -151,16 +151,7 @@ class Session:
         if timeline.is_live:
             timeline.run.apply(edit)
         else:
-            shown = timeline.history[timeline.displayed_index]
-            # A robot that was dragged at that step is released, unless it is dragged further.
-            releases_robot = shown.drag is not None and not isinstance(edit, DragRobot | ReleaseRobot)
-
-            def apply_to(run: Lockstep) -> None:
-                if releases_robot:
-                    run.drag = None
-                run.apply(edit)
-
-            timeline.seek(timeline.document.nodes[shown.node], shown.step, edit=apply_to)
+            releases_robot = self._apply_in_past(edit)
         if self._gesture is not None and self._gesture.continues(gesture, kind, timeline):
             node = timeline.head
             _extend_node(node, replace(edit, step=timeline.step), kind, description)
@@ -173,6 +164,26 @@ class Session:
             self._gesture = _Gesture(gesture, timeline.end_time, timeline.past_version)
         timeline.document.revision += 1
         timeline.note_edit(node)
+
+    def _apply_in_past(self, edit: RunEdit) -> bool:
+        """Make the displayed step the present, and apply an edit there.
+
+        Returns
+        -------
+        bool
+            Whether a robot was released that was dragged at that step.
+        """
+        timeline = self.timeline
+        shown = timeline.history[timeline.displayed_index]
+        releases_robot = shown.drag is not None and not isinstance(edit, DragRobot | ReleaseRobot)
+
+        def apply_to(run: Lockstep) -> None:
+            if releases_robot:
+                run.drag = None
+            run.apply(edit)
+
+        timeline.seek(timeline.document.nodes[shown.node], shown.step, edit=apply_to)
+        return releases_robot
 
     def restart(
         self,
@@ -250,7 +261,7 @@ class Session:
         Returns
         -------
         str or None
-            The edit in words; None if there is none.
+            Description of the edit; None if there is none.
         """
         node = self.timeline.head
         if node.parent is None:
@@ -260,12 +271,12 @@ class Session:
         return node.description
 
     def redo(self) -> str | None:
-        """Return to the end of the branch that was left by undo.
+        """Return to the end of the branch that the last undo left.
 
         Returns
         -------
         str or None
-            The edit in words; None if there is none.
+            Description of the edit; None if there is none.
         """
         node = self.timeline.head.redo
         if node is None:
@@ -288,7 +299,7 @@ class Session:
         return build_save_point(self.timeline)
 
     def restore(self, point: SavePoint, *, in_step: bool) -> None:
-        """Return to an earlier state after an unexpected error, paused; nothing happens if it is the same.
+        """Return to an earlier state after an unexpected error, and pause; do nothing if it is the same.
 
         Parameters
         ----------
@@ -338,7 +349,7 @@ class Session:
         environment : Environment
             The edited map.
         description : str
-            The edit in words.
+            Description of the edit.
 
         Returns
         -------
@@ -381,7 +392,7 @@ class Session:
         self.apply(PaintDensity(dabs, radius, lowers), "density", description, ("stroke", stroke))
 
     def drag_robot(self, number: int, point: Point) -> None:
-        """Drag a robot to a point by a spring; place it there if it has failed, or if time does not pass."""
+        """Drag a robot to a point by a spring; place it there if it has failed or the session is paused."""
         if self.playback.is_playing and number in self.displayed.numbers:
             to = round(float(point[0]), _DRAG_DECIMALS), round(float(point[1]), _DRAG_DECIMALS)
             self.apply(DragRobot(number, to), "hand", f"robot {number} was dragged", ("hand", number))
@@ -421,7 +432,7 @@ class Session:
 
 
 def toggle_failure(session: Session, number: int) -> str:
-    """Let a robot fail, or work again if it has failed, and return the edit in words."""
+    """Let a robot fail, or work again if it has failed; return the description of the edit."""
     if number in session.displayed.get_setup(session.timeline.panes[0]).failed:
         session.revive_robot(number)
     else:
@@ -430,7 +441,7 @@ def toggle_failure(session: Session, number: int) -> str:
 
 
 def _extend_node(node: Node, edit: RunEdit, kind: str, description: str) -> None:
-    """Add an edit to a node to which it belongs."""
+    """Add an edit to the node of its gesture."""
     last = node.edits[-1]
     is_same_drag = isinstance(edit, DragRobot) and isinstance(last, DragRobot) and last.step == edit.step
     # Only the last point of a drag matters within a step; other edits add up.

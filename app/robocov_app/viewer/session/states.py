@@ -120,7 +120,7 @@ class RunState(NamedTuple):
     drag : tuple or None
         Number of the dragged robot, and the point to which it is pulled, m.
     node : int
-        Number of the node of the undo tree in whose time the step is.
+        Number of the node of the undo tree whose time span contains the step.
     """
 
     step: int

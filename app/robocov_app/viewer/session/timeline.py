@@ -41,7 +41,7 @@ class Timeline:
     Attributes
     ----------
     head : Node
-        The node of the document in whose time the present is.
+        The node of the document whose time span contains the present.
     run : Lockstep
         The panes at the present step.
     history : RunHistory
@@ -120,12 +120,12 @@ class Timeline:
 
     @property
     def is_at_record_end(self) -> bool:
-        """Whether the present is the end of a record from which nothing was simulated yet."""
+        """Whether the present is the end of a record, and nothing was simulated after it."""
         return self.record_end_time is not None and self.end_time <= self.record_end_time + _TIME_TOLERANCE_S
 
     @property
     def is_seeking(self) -> bool:
-        """Whether a call of `seek` was not completed yet."""
+        """Whether a seek is in progress."""
         return self._seeking is not None
 
     @property
@@ -157,7 +157,7 @@ class Timeline:
     def show_next(self) -> None:
         """Display the next recorded state, after as many calls as there are steps between the two.
 
-        Thus the past plays at the same speed where it was thinned.
+        Thus the past plays at the same speed even where it was thinned.
         """
         assert self.shown_index is not None
         shown = self.history[self.shown_index]
@@ -178,7 +178,7 @@ class Timeline:
             self.is_settled = Present(self.head, self.run, self.history).has_settled()
 
     def follow(self, node: Node | None) -> None:
-        """Repeat the edits on the path to a node when their time comes; None ends that."""
+        """Repeat the edits on the path to a node when their time comes; stop repeating them if it is None."""
         self._followed_path = [] if node is None else self.document.get_path(node)
 
     def _repeat_followed_edits(self) -> None:
@@ -193,7 +193,7 @@ class Timeline:
             self.note_edit(node)
 
     def note_edit(self, node: Node) -> None:
-        """Take note that the edits of a node were applied to the run at the present step.
+        """Record that the edits of a node were applied to the run at the present step.
 
         Parameters
         ----------
@@ -215,7 +215,7 @@ class Timeline:
         edit: Callable[[Lockstep], None] | None = None,
         seconds: float = np.inf,
     ) -> None:
-        """Make a step of a node the present. If an error is raised, nothing has changed.
+        """Make a step of a node the present. If an error is raised, nothing changes.
 
         Parameters
         ----------
@@ -241,11 +241,11 @@ class Timeline:
         self.continue_seek(seconds)
 
     def finish_seek(self) -> None:
-        """Complete a call of `seek` that was not completed."""
+        """Complete the seek that is in progress, if there is one."""
         self.continue_seek(np.inf)
 
     def continue_seek(self, seconds: float) -> None:
-        """Continue a call of `seek` that was not completed, for some time, s."""
+        """Continue the seek that is in progress, if there is one, for some time, s."""
         seeking = self._seeking
         if seeking is None:
             return
@@ -263,7 +263,7 @@ class Timeline:
                 return
 
     def replace_present(self, present: Present) -> None:
-        """Replace the present, which is displayed from now on, as the last step of `seek`."""
+        """Replace the present, and display the new one, as the last step of `seek`."""
         if present.head.number == len(self.document.nodes):
             self.document.nodes.append(present.head)
         self._seeking = None

@@ -12,7 +12,7 @@ from robocov_app.viewer.session.session import Session
 
 DRAFT_KIND = "robocov-session-draft"
 DRAFT_PAUSE_S = 0.9
-"""Time between two drafts of a session in which time passes."""
+"""Time between two drafts of a session that plays."""
 _NEVER_SAVED = -1
 
 
@@ -61,7 +61,7 @@ class SessionWorkspace:
         view : mapping
             Displayed layers and theme.
         at_once : bool
-            Whether to save it also if the last draft is recent.
+            Whether to save it even if the last draft is recent.
         """
         timeline = self.session.timeline
         state = (timeline.document.revision, timeline.step)
@@ -118,7 +118,7 @@ class SessionWorkspace:
 
 
 def find_recoverable_drafts(folder: Path | None) -> tuple[autosave.Draft, ...]:
-    """Return the drafts that ended programs have left, the newest first."""
+    """Return the drafts left by programs that have ended, the newest first."""
     return autosave.find_drafts(folder, DRAFT_KIND, _check_draft)
 
 

@@ -15,7 +15,7 @@ DEFAULT_RADIUS_FRACTION = 0.1  # of the map's diameter
 MIN_RADIUS_FRACTION = 1 / 200
 MAX_RADIUS_FRACTION = 1 / 2
 DAB_SPACING_FRACTION = 0.25  # of the radius, from one dab to the next
-APPLY_INTERVAL_S = 0.08  # robots get to know a stroke in steps of this length
+APPLY_INTERVAL_S = 0.08  # between two updates of the density during a stroke
 _RING_POINTS = 48  # of the circle that shows the brush
 
 
@@ -26,7 +26,7 @@ class BrushTool(Tool):
     Attributes
     ----------
     radius : float or None
-        Radius, m; None until it is first needed: then a tenth of the map's diameter.
+        Radius, m; None until it is first needed, when it becomes a tenth of the map's diameter.
     lowers : bool
         Whether a stroke lowers the density.
     clock : callable
@@ -54,7 +54,7 @@ class BrushTool(Tool):
     _applied_at: float = -1e9
 
     def choose_button(self, *, is_right: bool) -> None:
-        """Lower the density with the right button, else raise it."""
+        """Lower the density with the right button, otherwise raise it."""
         self.lowers = is_right
 
     def get_radius(self, session: Session) -> float:
@@ -138,7 +138,7 @@ class BrushTool(Tool):
         return Preview(ring, label=f"φ {value:.2g}", has_marks=False)
 
     def _apply(self, session: Session) -> None:
-        """Paint the dabs that wait."""
+        """Paint the dabs that were not applied yet."""
         dabs = tuple(self._dabs)
         self._dabs = []
         session.paint(dabs, self.get_radius(session), lowers=self.lowers, stroke=self._stroke)

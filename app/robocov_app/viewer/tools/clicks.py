@@ -18,7 +18,7 @@ class EraserTool(Tool):
     takes_robots = True
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Delete the robot, else the obstacle under the cursor."""
+        """Delete the robot under the cursor; if there is none, delete the obstacle."""
         if number is not None:
             session.remove_robot(number)
             return f"robot {number} removed"

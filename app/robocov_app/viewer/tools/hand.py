@@ -88,7 +88,7 @@ class HandTool(Tool):
         return change_map(session, environment, f"{map_edits.describe_obstacle(moved)} moved")
 
     def cancel(self, session: Session) -> bool:
-        """Let go of the robot or the obstacle, else clear the selection."""
+        """Let go of the robot or the obstacle; if none is held, clear the selection."""
         if not self.is_holding:
             had_selection = self.inspection.selected is not None
             self.inspection.selected = None

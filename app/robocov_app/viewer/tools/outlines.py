@@ -87,7 +87,7 @@ class OutlineTool(Tool):
     drawing: SnappedOutline = field(repr=False)
 
     def build_obstacle(self, points: list[Point]) -> Obstacle:
-        """Build the obstacle with these points, m; raise RobocovError if they are none of its kind."""
+        """Build the obstacle with these points, m; raise RobocovError if they do not form one."""
         raise NotImplementedError
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
