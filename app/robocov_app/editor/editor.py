@@ -14,6 +14,7 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem, translate_message
 from robocov_app.editor.settings import LAYERS, EditorSettings
+from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.door import DoorTool
 from robocov_app.editor.tools.draw import (
@@ -30,7 +31,7 @@ from robocov_app.editor.tools.motion_path import MotionPathTool
 from robocov_app.editor.tools.reference_image import ReferenceImageTool
 from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.snapping import SNAPS, count_vertices
-from robocov_app.editor.tools.tool import Tool, Workspace
+from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.jobs.workers import Worker
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
 from robocov_app.toolkit.faults import describe_os_error
@@ -43,7 +44,7 @@ MAX_ROBOTS = 1000
 MAX_LENGTHS_M = {"grid": 100.0, "wall_width": 100.0, "radius": 10.0}
 
 
-class Editor(Workspace):
+class Editor(EditorContext):
     """State of the editor, and the actions of the user on it.
 
     Parameters
@@ -61,9 +62,9 @@ class Editor(Workspace):
     ----------
     selector : SelectTool
         The selection tool.
-    tools : dict of str to Tool
+    tools : dict of str to EditorTool
         All tools by their names, in the order in which they are shown.
-    tool : Tool
+    tool : EditorTool
         The tool in use.
     theme : str
         Colors: "light" or "dark".
@@ -108,8 +109,8 @@ class Editor(Workspace):
         self.selector = SelectTool()
         self.tape = MeasureTool()
         self.density_tool = DensityTool()
-        self.tools: dict[str, Tool] = {tool.name: tool for tool in self._list_tools()}
-        self.tool: Tool = self.selector
+        self.tools: dict[str, EditorTool] = {tool.name: tool for tool in self._list_tools()}
+        self.tool: EditorTool = self.selector
         self.theme: str = settings.theme
         self.panel = True
         self.shown = set(settings.shown) & set(LAYERS)
@@ -130,7 +131,7 @@ class Editor(Workspace):
         self.moves_since: float | None = None
         self._measured: tuple[Sketch, float] | None = None  # sketch and radius last sent to the worker
 
-    def _list_tools(self) -> list[Tool]:
+    def _list_tools(self) -> list[EditorTool]:
         return [
             self.selector,
             PanTool(),

@@ -4,6 +4,19 @@ from contextlib import suppress
 
 import pygame
 
+from robocov_app.toolkit.tool import CursorShape
+
+_SYSTEM_CURSORS: dict[CursorShape, int] = {
+    "arrow": pygame.SYSTEM_CURSOR_ARROW,
+    "cross": pygame.SYSTEM_CURSOR_CROSSHAIR,
+    "hand": pygame.SYSTEM_CURSOR_HAND,
+    "move": pygame.SYSTEM_CURSOR_SIZEALL,
+    "sideways": pygame.SYSTEM_CURSOR_SIZEWE,
+    "updown": pygame.SYSTEM_CURSOR_SIZENS,
+    "rising": pygame.SYSTEM_CURSOR_SIZENESW,
+    "falling": pygame.SYSTEM_CURSOR_SIZENWSE,
+}
+
 
 class MouseCursor:
     """The mouse cursor of a window.
@@ -18,8 +31,9 @@ class MouseCursor:
     def __init__(self) -> None:
         self.shape = pygame.SYSTEM_CURSOR_ARROW
 
-    def show(self, shape: int) -> None:
+    def show(self, name: CursorShape) -> None:
         """Give the cursor another shape."""
+        shape = _SYSTEM_CURSORS[name]
         if shape == self.shape:
             return
         self.shape = shape

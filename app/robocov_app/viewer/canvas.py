@@ -29,7 +29,7 @@ from robocov_app.viewer.tool_overlay import (
     draw_drag,
     draw_failed_selection,
     draw_hovered_robot,
-    draw_preview,
+    draw_tool_state,
 )
 from robocov_app.viewer.view import FADE_S
 
@@ -277,9 +277,7 @@ class ViewerCanvas:
         draw_failed_selection(canvas, scene, self.viewer.selected_robot)
         if pane == self.hovered[0]:
             draw_hovered_robot(canvas, scene, self.hovered[1])
-        preview = self.viewer.tool.build_preview(session)
-        if preview is not None:
-            draw_preview(canvas, preview)
+        draw_tool_state(canvas, self.viewer.tool.build_draw_state(session))
         surface.set_clip(None)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:

@@ -11,7 +11,7 @@ from robocov_app.viewer.session.file import SavedSession, load_session
 from robocov_app.viewer.session.file_models import ChapterModel, ConditionModel, QuestionModel, TaskModel
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import SessionWorkspace
-from robocov_app.viewer.tools.tool import Tool
+from robocov_app.viewer.tools.tool import ViewerTool
 
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # comes with robocov
 READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
@@ -100,7 +100,7 @@ class _ViewerBefore:
     workspace: SessionWorkspace
     map_name: str
     layers: set[str]
-    tool: Tool
+    tool: ViewerTool
     active_pane: int
     selected: int | None
 

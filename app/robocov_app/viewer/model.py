@@ -11,7 +11,7 @@ from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import Tool
+from robocov_app.viewer.tools.tool import ViewerTool
 from robocov_app.viewer.tools.toolbox import Toolbox
 from robocov_app.viewer.view import ViewState
 
@@ -73,7 +73,7 @@ class ViewerModel:
         self.update_cost_map()
 
     @property
-    def tool(self) -> Tool:
+    def tool(self) -> ViewerTool:
         """The tool in use."""
         return self.toolbox.current
 

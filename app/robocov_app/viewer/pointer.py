@@ -5,7 +5,6 @@ from math import dist
 
 import pygame
 
-from robocov.environment import Point
 from robocov_app.toolkit.input import (
     DOUBLE_CLICK_S,
     MAX_CLICK_MOVE_PX,
@@ -14,10 +13,13 @@ from robocov_app.toolkit.input import (
 )
 from robocov_app.toolkit.layout import is_inside
 from robocov_app.toolkit.mouse_cursor import MouseCursor
+from robocov_app.toolkit.tool import CursorShape
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.tools.snapping import SNAP_REACH_FRACTION, snap_point
+from robocov_app.viewer.tools.tool import ViewerPointerEvent
 
 LEFT_BUTTON = 1
 RIGHT_BUTTON = 3
@@ -69,17 +71,46 @@ class ToolGesture(DragGesture):
     def move(self, event: pygame.event.Event) -> None:
         """Move the tool."""
         viewer = self._viewer
-        viewer.attempt(lambda: viewer.tool.move(viewer.session, self._find_point(event.pos)))
+        pointer = self._build_event(event)
+        viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
 
     def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
         """Release the tool."""
         viewer = self._viewer
-        viewer.attempt(lambda: viewer.tool.release(viewer.session, self._find_point(event.pos)))
+        pointer = self._build_event(event)
+        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
 
-    def _find_point(self, pixel: tuple[int, int]) -> Point:
+    def _build_event(self, event: pygame.event.Event) -> ViewerPointerEvent:
         # Panes may have been removed since the press.
         pane = min(self._pane, len(self._canvas.layout.panes) - 1)
-        return self._canvas.to_world(pixel, pane)
+        return build_pointer_event(self._viewer, self._canvas, event.pos, pane)
+
+
+def build_pointer_event(
+    viewer: Presenter, canvas: ViewerCanvas, pixel: tuple[int, int], pane: int, *, is_right: bool = False
+) -> ViewerPointerEvent:
+    """Return the pointer at a pixel of a pane, snapped to the map if the tool wants that.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    canvas : ViewerCanvas
+        The panes.
+    pixel : tuple of int
+        Position, px.
+    pane : int
+        Index of the pane.
+    is_right : bool
+        Whether the right button is pressed.
+    """
+    raw = canvas.to_world(pixel, pane)
+    reach = canvas.get_reach(pane)
+    point = raw
+    if viewer.tool.snaps:
+        point = snap_point(viewer.session.displayed.environment, raw, SNAP_REACH_FRACTION * reach)
+    robot = canvas.find_robot(pixel, pane) if viewer.tool.takes_robots else None
+    return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
 
 
 class TimeGesture(DragGesture):
@@ -171,15 +202,15 @@ class ViewerPointer:
             canvas.hovered = (pane, number)
         cursor.show(self._choose_cursor(pane, number))
 
-    def _choose_cursor(self, pane: int | None, number: int | None) -> int:
+    def _choose_cursor(self, pane: int | None, number: int | None) -> CursorShape:
         viewer = self._viewer
         if number is not None:
-            return pygame.SYSTEM_CURSOR_HAND
-        if pane is not None and viewer.tool is not viewer.toolbox.hand:
-            return pygame.SYSTEM_CURSOR_CROSSHAIR
+            return "hand"
+        if pane is not None:
+            return viewer.tool.choose_cursor(viewer.session)
         if not self._is_over_time():
-            return pygame.SYSTEM_CURSOR_ARROW
-        return pygame.SYSTEM_CURSOR_HAND if self._chart.is_on_switch(self.at) else pygame.SYSTEM_CURSOR_SIZEWE
+            return "arrow"
+        return "hand" if self._chart.is_on_switch(self.at) else "sideways"
 
     def _is_over_time(self) -> bool:
         layout = self._canvas.layout
@@ -210,8 +241,7 @@ class ViewerPointer:
         tool = self._viewer.tool
         is_right = event.button == RIGHT_BUTTON
         if event.button == LEFT_BUTTON or (is_right and tool.uses_right_button):
-            tool.choose_button(is_right=is_right)
-            self._press_tool(event.pos, pane, now)
+            self._press_tool(event.pos, pane, now, is_right=is_right)
         else:
             self._gesture = PanGesture(self._viewer, self._canvas)
 
@@ -229,7 +259,7 @@ class ViewerPointer:
         self._gesture = TimeGesture(viewer, chart)
         viewer.attempt(lambda: viewer.playback.look_at(chart.to_time(pixel[0])))
 
-    def _press_tool(self, pixel: tuple[int, int], pane: int, now: float) -> None:
+    def _press_tool(self, pixel: tuple[int, int], pane: int, now: float, *, is_right: bool) -> None:
         viewer = self._viewer
         canvas = self._canvas
         hand = viewer.toolbox.hand
@@ -243,14 +273,10 @@ class ViewerPointer:
         is_double = is_quick and dist(self._last_click_at, pixel) < MAX_CLICK_MOVE_PX
         self._last_click_s = now
         self._last_click_at = pixel
-        if is_double and viewer.tool.ends_on_double_click:
-            viewer.attempt(viewer.finish_drawing)
-            return
-        point = canvas.to_world(pixel, pane)
-        number = canvas.find_robot(pixel, pane)
-        reach = canvas.get_reach(pane)
-        viewer.attempt(lambda: viewer.tool.press(viewer.session, point, reach, number))
-        if viewer.tool is hand and number is not None:
+        pointer = build_pointer_event(viewer, canvas, pixel, pane, is_right=is_right)
+        handle = viewer.tool.double_click if is_double else viewer.tool.press
+        viewer.attempt(lambda: handle(viewer.session, pointer))
+        if viewer.tool is hand and pointer.robot is not None:
             self._panel.show_tab("robot")
         if viewer.tool is hand and not hand.is_holding:
             self._gesture = PanGesture(viewer, canvas)
@@ -269,7 +295,8 @@ class ViewerPointer:
         if self._gesture is not None:
             self._gesture.move(event)
         elif inspection.cursor is not None:
-            viewer.tool.move(viewer.session, inspection.cursor)
+            pointer = build_pointer_event(viewer, self._canvas, event.pos, inspection.cursor_pane)
+            viewer.tool.move(viewer.session, pointer)
 
     def _release(self, event: pygame.event.Event) -> None:
         # Another button than the one that is held does nothing.

@@ -13,7 +13,7 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_tag
-from robocov_app.viewer.tools.tool import Preview
+from robocov_app.viewer.tools.tool import ViewerDrawState
 
 # Lengths in pixels at scale 1.
 FAILED_RADIUS_PX = 9.0  # within which a failed robot is hit, even if it is drawn smaller
@@ -59,21 +59,21 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
     canvas.stamp(partial(sprites.ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
 
 
-def draw_preview(canvas: Canvas, preview: Preview) -> None:
-    """Draw the preview of a tool."""
-    if preview.obstacle is not None:
-        _draw_obstacle(canvas, preview.obstacle)
-    if not preview.line:
+def draw_tool_state(canvas: Canvas, state: ViewerDrawState) -> None:
+    """Draw what a tool shows in a pane."""
+    if state.obstacle is not None:
+        _draw_obstacle(canvas, state.obstacle)
+    if not state.line:
         return
-    points = canvas.camera.to_pixels(np.array(preview.line))
-    _draw_line(canvas, points, is_closed=preview.is_closed)
-    if preview.has_marks:
+    points = canvas.camera.to_pixels(np.array(state.line))
+    _draw_line(canvas, points, is_closed=state.is_closed)
+    if state.has_marks:
         _draw_marks(canvas, points)
-    if preview.label:
+    if state.label:
         x, y = points[-1].tolist()
         dx, dy = _LABEL_OFFSET_PX
         position = (x + dx * canvas.scale, y + dy * canvas.scale)
-        draw_tag(canvas.surface, preview.label, position, canvas.theme, canvas.scale)
+        draw_tag(canvas.surface, state.label, position, canvas.theme, canvas.scale)
 
 
 def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:

@@ -8,7 +8,7 @@ from driven_editor import Hands, opened_editor, sheet
 from PIL import Image
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.tools.tool import DrawState
+from robocov_app.editor.tools.draw_state import EditorDrawState
 
 
 @pytest.fixture
@@ -242,7 +242,7 @@ def test_measuring_tells_and_changes_nothing(hands: Hands) -> None:
     hands.key("return")
     assert "7.00 m in all" in hands.editor.tool.build_draw_state(hands.editor).label
     hands.key("escape")
-    assert hands.editor.tool.build_draw_state(hands.editor) == DrawState() and hands.sketch is before
+    assert hands.editor.tool.build_draw_state(hands.editor) == EditorDrawState() and hands.sketch is before
 
 
 def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp_path: Path) -> None:
@@ -285,4 +285,4 @@ def test_a_map_is_made_level_along_a_line_that_was_measured(hands: Hands) -> Non
     assert hands.said == "map turned by -20.56°"
     (_, ay), (bx, by) = hands.shapes[0].points
     assert ay == by == 1 and bx == pytest.approx(1 + 18.25**0.5, abs=1e-4)
-    assert hands.editor.tool.build_draw_state(hands.editor) == DrawState()
+    assert hands.editor.tool.build_draw_state(hands.editor) == EditorDrawState()

@@ -10,7 +10,7 @@ from driven_editor import Hands, opened_editor, sheet
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
-from robocov_app.editor.tools.tool import find_handle, list_handles, list_vertex_owners
+from robocov_app.editor.tools.handles import find_handle, list_handles, list_vertex_owners
 
 SQUARE = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)

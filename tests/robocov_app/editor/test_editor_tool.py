@@ -18,7 +18,8 @@ from robocov_app.editor.model.geometry import (
 )
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import format_position, translate_message
-from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)
@@ -39,9 +40,9 @@ def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, p
 
 
 def test_shift_holds_the_angle_and_nothing_else_does() -> None:
-    aim = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1)
+    aim = EditorPointerEvent((3.0, 0.2), (3.0, 0.1), 0.1)
     assert aim.constrain((0.0, 0.0)) == (3.0, 0.2)
-    shifted = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
+    shifted = EditorPointerEvent((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
     assert shifted.constrain((0.0, 0.0)) == (3.0, 0.0)
     assert shifted.constrain(None) == (3.0, 0.2)
 
@@ -73,7 +74,7 @@ def test_points_and_angles_are_exact_where_they_are_round() -> None:
 
 
 def test_a_plain_tool_does_nothing() -> None:
-    tool = Tool()
+    tool = EditorTool()
     assert not tool.is_busy and tool.origin is None and tool.snap_points == ()
-    assert not tool.finish(None) and not tool.remove_last(None) and not tool.cancel(None)
-    assert tool.build_draw_state(None) == DrawState()
+    assert tool.finish(None) is None and not tool.remove_last(None) and not tool.cancel(None)
+    assert tool.build_draw_state(None) == EditorDrawState()

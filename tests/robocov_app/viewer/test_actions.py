@@ -10,6 +10,7 @@ import pytest
 from driven_window import KEYS, Driver, do, key_event, opened
 from hypothesis import given
 from hypothesis import strategies as st
+from pointer_events import build_event
 
 import robocov_app.viewer as package
 from robocov.controllers import CONTROLLERS, get_gains
@@ -156,7 +157,7 @@ def state_of(driver: Driver) -> list[object]:
         camera,
     ]
     told += [
-        viewer.tool.build_preview(session),
+        viewer.tool.build_draw_state(session),
         session.displayed.get_setup(session.timeline.panes[0]),
         its.is_help_open,
         its.dialogs.is_open,
@@ -214,10 +215,10 @@ def prepared(driver: Driver) -> Driver:
     session.undo()
     session.playback.is_playing = False
     do(viewer, "tool:polygon")
-    viewer.tool.press(session, (6.0, 6.0), 0.1, None)
-    viewer.tool.press(session, (7.0, 6.0), 0.1, None)
-    viewer.tool.press(session, (7.0, 7.0), 0.1, None)
-    viewer.tool.move(session, (6.5, 7.5))
+    viewer.tool.press(session, build_event((6.0, 6.0)))
+    viewer.tool.press(session, build_event((7.0, 6.0)))
+    viewer.tool.press(session, build_event((7.0, 7.0)))
+    viewer.tool.move(session, build_event((6.5, 7.5)))
     session.playback.step()
     session.show_time(0.7)
     its.canvas.fit()

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from driven_window import opened
+from pointer_events import build_event
 from sample_sessions import HALL, LLOYD, RAPF, advance_session, describe_state, get_positions, start_session
 
 from robocov.cost import CoverageCost
@@ -22,8 +23,7 @@ from robocov_app.viewer.session.map_edits import (
     build_paintable_raster,
 )
 from robocov_app.viewer.tools.brush import BrushTool
-
-REACH_M = 0.1
+from robocov_app.viewer.tools.tool import ViewerDrawState
 
 
 class Clock:
@@ -38,11 +38,10 @@ class Clock:
 
 def paint_stroke(brush, session, *points, lowers=False) -> str | None:
     """Paint a stroke, and return the message."""
-    brush.lowers = lowers
-    brush.press(session, points[0], REACH_M, None)
+    brush.press(session, build_event(points[0], is_right=lowers))
     for point in points[1:]:
-        brush.move(session, point)
-    return brush.release(session, points[-1])
+        brush.move(session, build_event(point))
+    return brush.release(session, build_event(points[-1]), clicked=False)
 
 
 def get_density(session, point) -> float:
@@ -98,17 +97,17 @@ def test_robots_know_the_density_while_it_is_painted():
     clock = Clock()
     brush = BrushTool(radius=1.0, clock=clock)
     session = start_session(RAPF, LLOYD)
-    brush.press(session, (5.0, 3.0), REACH_M, None)
+    brush.press(session, build_event((5.0, 3.0)))
     for move in range(20):
         clock.now += 0.1
-        brush.move(session, (5.0 - 0.02 * move, 3.0))
+        brush.move(session, build_event((5.0 - 0.02 * move, 3.0)))
         advance_session(session, 1)
         for pane in session.timeline.panes:
             seen = pane.simulation.observe_and_decide().seen
             assert seen.density is session.displayed.environment.density
     assert session.displayed.environment.density is not None
     assert brush.is_painting
-    brush.release(session, (4.6, 3.0))
+    brush.release(session, build_event((4.6, 3.0)), clicked=False)
     assert not brush.is_painting
     assert session.timeline.head.parent is not None
 
@@ -118,10 +117,10 @@ def test_the_density_changes_no_more_often_than_it_is_displayed():
     brush = BrushTool(radius=1.0, clock=clock)
     session = start_session()
     densities = []
-    brush.press(session, (1.0, 1.0), REACH_M, None)
+    brush.press(session, build_event((1.0, 1.0)))
     for move in range(200):
         clock.now += 0.01
-        brush.move(session, (1.0 + 0.02 * move, 1.0))
+        brush.move(session, build_event((1.0 + 0.02 * move, 1.0)))
         densities.append(session.displayed.environment.density)
     assert 15 <= len(set(map(id, densities))) <= 30
 
@@ -130,13 +129,13 @@ def test_a_stroke_can_be_cancelled():
     brush = BrushTool(radius=1.0)
     session = start_session()
     before = session.displayed.environment
-    brush.press(session, (1.0, 1.0), REACH_M, None)
+    brush.press(session, build_event((1.0, 1.0)))
     assert session.displayed.environment != before
     assert brush.cancel(session)
     assert session.displayed.environment == before
     assert session.timeline.head.parent is None
-    assert brush.release(session, (1.0, 1.0)) is None
-    assert brush.build_preview(session) is None
+    assert brush.release(session, build_event((1.0, 1.0)), clicked=False) is None
+    assert brush.build_draw_state(session) == ViewerDrawState()
 
 
 def test_a_stroke_moves_no_robots():
@@ -166,10 +165,10 @@ def test_another_map_ends_a_stroke():
     brush = BrushTool(radius=0.5)
     session = start_session()
     square = load_map("square")
-    brush.press(session, (1.0, 1.0), REACH_M, None)
+    brush.press(session, build_event((1.0, 1.0)))
     session.restart(environment=square)
-    brush.move(session, (2.0, 1.0))
-    assert brush.release(session, (2.0, 1.0)) is None
+    brush.move(session, build_event((2.0, 1.0)))
+    assert brush.release(session, build_event((2.0, 1.0)), clicked=False) is None
     assert session.displayed.environment.boundary == square.boundary
 
 
@@ -199,19 +198,18 @@ def test_the_size_of_the_brush_is_relative_to_the_map():
 def test_the_density_under_the_brush_is_displayed():
     brush = BrushTool()
     session = start_session()
-    brush.move(session, (1.0, 1.0))
-    preview = brush.build_preview(session)
-    assert preview is not None
-    assert preview.label == "φ 1"
-    assert not preview.has_marks
+    brush.move(session, build_event((1.0, 1.0)))
+    state = brush.build_draw_state(session)
+    assert state.label == "φ 1"
+    assert not state.has_marks
 
 
 def test_nothing_is_painted_before_a_press():
     brush = BrushTool()
     session = start_session()
     before = describe_state(session)
-    brush.move(session, (1.0, 1.0))
-    assert brush.release(session, (1.0, 1.0)) is None
+    brush.move(session, build_event((1.0, 1.0)))
+    assert brush.release(session, build_event((1.0, 1.0)), clicked=False) is None
     assert not brush.cancel(session)
     assert describe_state(session) == before
 

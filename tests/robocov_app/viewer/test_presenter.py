@@ -8,11 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import do, typed
+from pointer_events import build_event
 from sample_sessions import HALL, LLOYD, RAPF, RPF, build_presenter, describe_state
 
 from robocov.mapfile import list_bundled_maps, load_map
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import MAX_ROBOTS
+from robocov_app.viewer.tools.tool import ViewerDrawState
+
+
+def draw_circle(viewer: Presenter, center: tuple[float, float], rim: tuple[float, float]) -> None:
+    """Drag a circle from its center to its rim, m."""
+    tool = viewer.toolbox.by_name["circle"]
+    release = build_event(rim)
+    tool.press(viewer.session, build_event(center))
+    viewer.attempt(lambda: tool.release(viewer.session, release, clicked=False))
+
 
 # playing
 
@@ -82,8 +94,7 @@ def test_another_seed_gives_other_starts_and_another_start_too() -> None:
 
 def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_on() -> None:
     viewer = build_presenter(start="far")
-    viewer.toolbox.by_name["circle"].press(viewer.session, (5.2, 3.2), 0.1, None)
-    viewer.attempt(lambda: viewer.toolbox.by_name["circle"].release(viewer.session, (5.2, 3.75)))
+    draw_circle(viewer, (5.2, 3.2), (5.2, 3.75))
     assert viewer.message.endswith("it covers the start far") and "far" not in viewer.playback.list_starts()
     assert viewer.session.timeline.scenario.start_name == "far"
     do(viewer, "start:next")
@@ -143,8 +154,7 @@ def test_an_own_map_is_offered_beside_the_bundled_ones() -> None:
 
 def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path)
-    viewer.toolbox.by_name["circle"].press(viewer.session, (1.0, 3.0), 0.1, None)
-    viewer.attempt(lambda: viewer.toolbox.by_name["circle"].release(viewer.session, (1.3, 3.0)))
+    draw_circle(viewer, (1.0, 3.0), (1.3, 3.0))
     assert viewer.message.startswith("circle drawn")
     do(viewer, "save:map")
     first = tmp_path / "hall-1.json"
@@ -318,10 +328,10 @@ def test_another_tool_gives_up_what_was_begun_and_says_how_it_works() -> None:
     viewer = build_presenter()
     do(viewer, "tool:polygon")
     assert viewer.message == f"Polygon: {viewer.tool.hint}"
-    viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
-    assert viewer.tool.build_preview(viewer.session) is not None
+    viewer.tool.press(viewer.session, build_event((1.0, 3.0)))
+    assert viewer.tool.build_draw_state(viewer.session).line
     do(viewer, "tool:wall")
-    assert viewer.toolbox.by_name["polygon"].build_preview(viewer.session) is None
+    assert viewer.toolbox.by_name["polygon"].build_draw_state(viewer.session) == ViewerDrawState()
     do(viewer, "cancel")
     assert viewer.tool is viewer.toolbox.hand
 
@@ -329,9 +339,9 @@ def test_another_tool_gives_up_what_was_begun_and_says_how_it_works() -> None:
 def test_cancelling_first_gives_up_then_puts_the_tool_away() -> None:
     viewer = build_presenter()
     do(viewer, "tool:wall")
-    viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
+    viewer.tool.press(viewer.session, build_event((1.0, 3.0)))
     do(viewer, "cancel")
-    assert viewer.tool.name == "wall" and viewer.tool.build_preview(viewer.session) is None
+    assert viewer.tool.name == "wall" and viewer.tool.build_draw_state(viewer.session) == ViewerDrawState()
     do(viewer, "cancel")
     assert viewer.tool is viewer.toolbox.hand
 

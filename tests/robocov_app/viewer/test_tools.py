@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pointer_events import build_event
 from sample_sessions import (
     HALL,
     LLOYD,
@@ -22,35 +23,31 @@ from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.tools.hand import HandTool
 from robocov_app.viewer.tools.outlines import DEFAULT_WALL_WIDTH_M, AddPolygonTool, AddWallTool
 from robocov_app.viewer.tools.segments import AddCircleTool, RulerTool
-from robocov_app.viewer.tools.tool import Tool
+from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerTool
 from robocov_app.viewer.tools.toolbox import Toolbox
 
 
-def build_tools() -> dict[str, Tool]:
+def build_tools() -> dict[str, ViewerTool]:
     """Return the tools by their names."""
     return Toolbox(Inspection()).by_name
-
-
-REACH = 0.1
-"""Meters that a finger is wide."""
 
 
 def clicked(tool, session, *points, number=None) -> str | None:
     """Click at places one after the other; return what was told last."""
     said = None
     for point in points:
-        tool.move(session, point)
-        said = tool.press(session, point, REACH, number)
-        said = tool.release(session, point) or said
+        tool.move(session, build_event(point))
+        said = tool.press(session, build_event(point, robot=number))
+        said = tool.release(session, build_event(point), clicked=True) or said
     return said
 
 
 def dragged(tool, session, start, *points, number=None) -> str | None:
     """Drag from one place to others; return what was told."""
-    said = tool.press(session, start, REACH, number)
+    said = tool.press(session, build_event(start, robot=number))
     for point in points:
-        tool.move(session, point)
-    return tool.release(session, points[-1]) or said
+        tool.move(session, build_event(point))
+    return tool.release(session, build_event(points[-1]), clicked=False) or said
 
 
 def place_of(session, number) -> list[float]:
@@ -71,13 +68,13 @@ def test_the_box_has_every_tool_once():
 
 @pytest.mark.parametrize("name", [*build_tools(), ""])
 def test_a_tool_that_was_not_used_does_nothing(name):
-    tool, session = build_tools().get(name, Tool()), start_session()
+    tool, session = build_tools().get(name, ViewerTool()), start_session()
     before = describe_state(session)
-    tool.move(session, (1.0, 1.0))
-    assert tool.release(session, (1.0, 1.0)) is None
+    tool.move(session, build_event((1.0, 1.0)))
+    assert tool.release(session, build_event((1.0, 1.0)), clicked=False) is None
     assert tool.finish(session) is None
     assert not tool.cancel(session)
-    assert tool.build_preview(session) is None
+    assert tool.build_draw_state(session) == ViewerDrawState()
     assert describe_state(session) == before
 
 
@@ -97,37 +94,37 @@ class TestHand:
     def test_it_drags_robots(self):
         hand, session = HandTool(Inspection()), start_session()
         x, y = place_of(session, 2)
-        hand.press(session, (x, y), REACH, 2)
+        hand.press(session, build_event((x, y), robot=2))
         assert hand.is_holding
-        hand.move(session, (3.0, 3.0))
+        hand.move(session, build_event((3.0, 3.0)))
         assert place_of(session, 2) == [3.0, 3.0]
         # back to where it was taken
-        hand.move(session, (x, y))
+        hand.move(session, build_event((x, y)))
         assert place_of(session, 2) == [x, y]
-        assert hand.release(session, (x, y)) is None
+        assert hand.release(session, build_event((x, y)), clicked=False) is None
 
     def test_it_throws_robots(self):
         hand, session = HandTool(Inspection()), start_session()
         session.playback.is_playing = True
-        hand.press(session, tuple(place_of(session, 2)), REACH, 2)
-        hand.move(session, (3.0, 3.2))
+        hand.press(session, build_event(tuple(place_of(session, 2)), robot=2))
+        hand.move(session, build_event((3.0, 3.2)))
         assert session.timeline.drag == (2, (3.0, 3.2))
         session.playback.advance(0.1)
-        hand.move(session, (3.1, 3.2))
+        hand.move(session, build_event((3.1, 3.2)))
         assert session.timeline.drag == (2, (3.1, 3.2))
-        hand.release(session, (3.1, 3.2))
+        hand.release(session, build_event((3.1, 3.2)), clicked=False)
         assert session.timeline.drag is None
         assert session.timeline.events[-1].text == "robot 2 was dragged"
 
     def test_who_gives_up_lets_go(self):
         hand, session = HandTool(Inspection()), start_session()
         session.playback.is_playing = True
-        hand.press(session, tuple(place_of(session, 2)), REACH, 2)
-        hand.move(session, (3.0, 3.2))
+        hand.press(session, build_event(tuple(place_of(session, 2)), robot=2))
+        hand.move(session, build_event((3.0, 3.2)))
         assert hand.cancel(session)
         assert session.timeline.drag is None
         assert not hand.is_holding
-        hand.move(session, (1.0, 1.0))
+        hand.move(session, build_event((1.0, 1.0)))
         assert session.timeline.drag is None
 
     def test_it_drags_robots_that_failed(self):
@@ -141,26 +138,26 @@ class TestHand:
     def test_a_robot_that_is_gone_meanwhile(self):
         hand, session = HandTool(Inspection()), start_session()
         session.playback.is_playing = True
-        hand.press(session, tuple(place_of(session, 2)), REACH, 2)
-        hand.move(session, (3.0, 3.2))
+        hand.press(session, build_event(tuple(place_of(session, 2)), robot=2))
+        hand.move(session, build_event((3.0, 3.2)))
         session.remove_robot(2)
-        hand.move(session, (3.0, 3.5))
-        assert hand.release(session, (3.0, 3.5)) is None
+        hand.move(session, build_event((3.0, 3.5)))
+        assert hand.release(session, build_event((3.0, 3.5)), clicked=False) is None
         assert session.timeline.drag is None
 
     def test_it_moves_obstacles(self):
         hand, session = HandTool(Inspection()), start_session()
-        hand.press(session, (4.2, 1.2), REACH, None)
+        hand.press(session, build_event((4.2, 1.2)))
         assert hand.obstacle == 0
-        assert hand.build_preview(session) is None
-        hand.move(session, (4.5, 2.2))
-        preview = hand.build_preview(session)
-        assert preview.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
-        assert (preview.line, preview.label) == (((4.2, 1.2), (4.5, 2.2)), "1.04 m")
+        assert hand.build_draw_state(session) == ViewerDrawState()
+        hand.move(session, build_event((4.5, 2.2)))
+        state = hand.build_draw_state(session)
+        assert state.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
+        assert (state.line, state.label) == (((4.2, 1.2), (4.5, 2.2)), "1.04 m")
         assert session.displayed.environment is HALL
-        assert hand.release(session, (4.5, 2.2)) == "circle “pillar” moved"
-        assert session.displayed.environment.obstacles == (preview.obstacle, HALL.obstacles[1])
-        assert hand.build_preview(session) is None
+        assert hand.release(session, build_event((4.5, 2.2)), clicked=False) == "circle “pillar” moved"
+        assert session.displayed.environment.obstacles == (state.obstacle, HALL.obstacles[1])
+        assert hand.build_draw_state(session) == ViewerDrawState()
         assert session.undo() == "circle “pillar” moved"
         assert session.displayed.environment == HALL
 
@@ -168,22 +165,22 @@ class TestHand:
         hand, session = HandTool(Inspection()), start_session()
         before = describe_state(session)
         assert clicked(hand, session, (4.2, 1.2), (5.5, 3.5)) is None
-        hand.press(session, (5.5, 3.5), REACH, None)
+        hand.press(session, build_event((5.5, 3.5)))
         assert not hand.is_holding
         assert describe_state(session) == before
 
     def test_another_map_meanwhile(self):
         hand, session = HandTool(Inspection()), start_session()
-        hand.press(session, (4.2, 1.2), REACH, None)
-        hand.move(session, (4.5, 2.2))
+        hand.press(session, build_event((4.2, 1.2)))
+        hand.move(session, build_event((4.5, 2.2)))
         session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "turned round")
-        assert hand.build_preview(session) is None
-        assert hand.release(session, (4.5, 2.2)) is None
-        hand.press(session, (4.2, 1.2), REACH, None)
-        hand.move(session, (4.5, 2.2))
+        assert hand.build_draw_state(session) == ViewerDrawState()
+        assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
+        hand.press(session, build_event((4.2, 1.2)))
+        hand.move(session, build_event((4.5, 2.2)))
         session.edit_map(replace(HALL, obstacles=()), "emptied")
-        assert hand.build_preview(session) is None
-        assert hand.release(session, (4.5, 2.2)) is None
+        assert hand.build_draw_state(session) == ViewerDrawState()
+        assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
         assert session.displayed.environment.obstacles == ()
 
     def test_from_the_past(self):
@@ -205,7 +202,7 @@ class TestPolygon:
         assert session.displayed.environment is HALL
         assert tool.finish(session) == "polygon drawn"
         assert session.displayed.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
-        assert tool.build_preview(session) is None
+        assert tool.build_draw_state(session) == ViewerDrawState()
         assert tool.finish(session) is None
 
     def test_a_click_on_the_first_corner_closes_it(self):
@@ -216,14 +213,14 @@ class TestPolygon:
     def test_it_shows_what_it_would_be(self):
         tool, session = AddPolygonTool(), start_session()
         clicked(tool, session, self.CORNERS[0])
-        tool.move(session, (3.2, 3.7))
-        preview = tool.build_preview(session)
-        assert (preview.line, preview.is_closed, preview.label) == (((3.2, 3.2), (3.2, 3.7)), False, "0.50 m")
+        tool.move(session, build_event((3.2, 3.7)))
+        state = tool.build_draw_state(session)
+        assert (state.line, state.is_closed, state.label) == (((3.2, 3.2), (3.2, 3.7)), False, "0.50 m")
         clicked(tool, session, self.CORNERS[1])
-        assert tool.build_preview(session).is_closed
+        assert tool.build_draw_state(session).is_closed
         assert tool.cancel(session)
         assert not tool.cancel(session)
-        assert tool.build_preview(session) is None
+        assert tool.build_draw_state(session) == ViewerDrawState()
 
     def test_a_double_click_closes_it_and_is_one_corner(self):
         tool, session = AddPolygonTool(), start_session()
@@ -246,10 +243,10 @@ class TestWall:
     def test_enter_ends_it(self):
         tool, session = AddWallTool(), start_session()
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
-        tool.move(session, (3.8, 3.8))
-        preview = tool.build_preview(session)
-        assert preview.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M)
-        assert preview.label == "0.60 m, 0.1 m wide"
+        tool.move(session, build_event((3.8, 3.8)))
+        state = tool.build_draw_state(session)
+        assert state.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M)
+        assert state.label == "0.60 m, 0.1 m wide"
         assert tool.finish(session) == "wall drawn"
         assert session.displayed.environment.obstacles[-1] == WallObstacle(
             ((3.2, 3.2), (3.2, 3.8)), DEFAULT_WALL_WIDTH_M
@@ -283,7 +280,7 @@ class TestWall:
     def test_a_point_is_no_wall(self):
         tool, session = AddWallTool(), start_session()
         clicked(tool, session, (3.2, 3.2))
-        assert tool.build_preview(session).obstacle is None
+        assert tool.build_draw_state(session).obstacle is None
         with pytest.raises(MapError, match="two points that are apart"):
             tool.finish(session)
         assert session.displayed.environment is HALL
@@ -292,22 +289,22 @@ class TestWall:
 class TestCircle:
     def test_it_is_drawn_from_its_middle(self):
         tool, session = AddCircleTool(), start_session()
-        tool.press(session, (3.5, 3.2), REACH, None)
-        assert tool.build_preview(session).obstacle is None
-        tool.move(session, (3.5, 3.5))
-        assert tool.build_preview(session).label == "radius 0.30 m"
-        assert tool.build_preview(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
-        assert tool.release(session, (3.5, 3.5)) == "circle drawn"
+        tool.press(session, build_event((3.5, 3.2)))
+        assert tool.build_draw_state(session).obstacle is None
+        tool.move(session, build_event((3.5, 3.5)))
+        assert tool.build_draw_state(session).label == "radius 0.30 m"
+        assert tool.build_draw_state(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
+        assert tool.release(session, build_event((3.5, 3.5)), clicked=False) == "circle drawn"
         assert session.displayed.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
-        assert tool.release(session, (3.5, 3.5)) is None
+        assert tool.release(session, build_event((3.5, 3.5)), clicked=False) is None
 
     def test_a_click_is_no_circle(self):
         tool, session = AddCircleTool(), start_session()
         with pytest.raises(MapError, match="drag from its middle"):
             clicked(tool, session, (3.5, 3.2))
-        tool.press(session, (3.5, 3.2), REACH, None)
+        tool.press(session, build_event((3.5, 3.2)))
         assert tool.cancel(session)
-        assert tool.release(session, (3.5, 3.9)) is None
+        assert tool.release(session, build_event((3.5, 3.9)), clicked=False) is None
         assert session.displayed.environment is HALL
 
 
@@ -358,16 +355,16 @@ class TestRuler:
     def test_it_measures(self):
         tool, session = RulerTool(), start_session()
         before = describe_state(session)
-        tool.press(session, (1.0, 1.0), REACH, None)
-        tool.move(session, (4.0, 5.0))
-        assert tool.build_preview(session).line == ((1.0, 1.0), (4.0, 5.0))
-        assert tool.build_preview(session).label == "5.00 m  (Δx 3.00, Δy 4.00)"
-        tool.release(session, (4.0, 5.0))
+        tool.press(session, build_event((1.0, 1.0)))
+        tool.move(session, build_event((4.0, 5.0)))
+        assert tool.build_draw_state(session).line == ((1.0, 1.0), (4.0, 5.0))
+        assert tool.build_draw_state(session).label == "5.00 m  (Δx 3.00, Δy 4.00)"
+        tool.release(session, build_event((4.0, 5.0)), clicked=False)
         # and stays there
-        tool.move(session, (2.0, 2.0))
-        assert tool.build_preview(session).line == ((1.0, 1.0), (4.0, 5.0))
+        tool.move(session, build_event((2.0, 2.0)))
+        assert tool.build_draw_state(session).line == ((1.0, 1.0), (4.0, 5.0))
         assert tool.cancel(session)
-        assert tool.build_preview(session) is None
+        assert tool.build_draw_state(session) == ViewerDrawState()
         assert not tool.cancel(session)
         assert describe_state(session) == before
 
@@ -403,9 +400,9 @@ def test_however_tools_are_used_nothing_breaks(actions):
         number = number if number in (*working, *failed) else None
         try:
             if action == "press":
-                said = tool.press(session, point, REACH, number)
+                said = tool.press(session, build_event(point, robot=number))
             elif action == "move":
-                said = tool.move(session, point)
+                said = tool.move(session, build_event(point))
             elif action == "undo":
                 said = session.undo()
             elif action == "step":
@@ -413,11 +410,14 @@ def test_however_tools_are_used_nothing_breaks(actions):
             elif action == "cancel":
                 said = None if isinstance(tool.cancel(session), bool) else "?"
             else:
-                said = tool.release(session, point) if action == "release" else tool.finish(session)
+                said = (
+                    tool.release(session, build_event(point), clicked=False)
+                    if action == "release"
+                    else tool.finish(session)
+                )
         except RobocovError as error:
             said = str(error)
         assert said is None or said == " ".join(said.split()) != ""
         for each in tools.values():
-            preview = each.build_preview(session)
-            assert preview is None or len(preview.line) >= 2
+            assert len(each.build_draw_state(session).line) != 1
     assert compute_penetration(session) < 2e-3

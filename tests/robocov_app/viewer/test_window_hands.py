@@ -198,8 +198,8 @@ def test_an_obstacle_over_all_of_the_floor_is_refused(driver: Driver) -> None:
 def test_the_ruler_measures(driver: Driver) -> None:
     driver.key("m")
     driver.drag_at((1.0, 3.0), (3.0, 3.0))
-    preview = driver.viewer.tool.build_preview(driver.session)
-    assert preview is not None and preview.label.startswith("2.0")
+    state = driver.viewer.tool.build_draw_state(driver.session)
+    assert state.label.startswith("2.0")
 
 
 def test_what_is_drawn_is_in_the_pane_under_the_mouse(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ import pytest
 from driven_window import MIDDLE, Driver, opened
 from sample_sessions import RAPF, RPF
 
+from robocov_app.viewer.tools.tool import ViewerDrawState
+
 # time line
 
 
@@ -108,7 +110,7 @@ def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Drive
     before = driver.pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (260, 180), button=button)
     assert np.allclose(driver.pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
-    assert driver.viewer.tool.build_preview(driver.session) is None
+    assert driver.viewer.tool.build_draw_state(driver.session) == ViewerDrawState()
 
 
 def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:

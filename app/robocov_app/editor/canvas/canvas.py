@@ -21,7 +21,7 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
-from robocov_app.editor.tools.tool import DrawState
+from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.look.theme import Theme
 from robocov_app.render import annotations, heatmaps
 from robocov_app.render.camera import Camera
@@ -309,7 +309,7 @@ class EditorCanvas:
         canvas.text(text, (box.width - annotations.EDGE * scale, height / 2), anchor="right")
 
 
-def _find_lifted(saved: Sketch, displayed: Sketch, state: DrawState) -> frozenset[int]:
+def _find_lifted(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:
     """Return the keys of obstacles that are not drawn on the sheet: they are dragged, changed or gone."""
     if state.carried is not None:
         return frozenset() if state.carried.are_copies else state.carried.selection.items

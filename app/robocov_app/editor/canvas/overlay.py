@@ -17,8 +17,9 @@ from robocov_app.editor.canvas.view import View, compute_pixel_box
 from robocov_app.editor.model.geometry import distance, format_length
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.handles import KNOB_HEIGHT_PX, Handle
 from robocov_app.editor.tools.snapping import Guide
-from robocov_app.editor.tools.tool import KNOB_HEIGHT_PX, DrawState, Handle
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
@@ -266,7 +267,7 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
         canvas.outline(corners, accent, canvas.width(1.5))
 
 
-def draw_preview(canvas: Canvas, state: DrawState, cursor: Point | None) -> None:
+def draw_preview(canvas: Canvas, state: EditorDrawState, cursor: Point | None) -> None:
     """Draw what a tool is about to do; `cursor` is the position of the cursor, px."""
     floor = canvas.theme.background
     accent = canvas.theme.final
@@ -292,7 +293,7 @@ def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
     return cursor[0] + dx * canvas.scale, cursor[1] + dy * canvas.scale
 
 
-def _draw_preview_line(canvas: Canvas, state: DrawState) -> None:
+def _draw_preview_line(canvas: Canvas, state: EditorDrawState) -> None:
     accent = canvas.theme.final
     line = to_pixels(canvas, state.line)
     if len(line) > 1:

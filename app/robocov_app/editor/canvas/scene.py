@@ -12,7 +12,7 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
-from robocov_app.editor.tools.tool import DrawState
+from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.render.canvas import Canvas
 
 
@@ -30,7 +30,7 @@ class Scene:
         The view of the sheet.
     editor : Editor
         The editor.
-    state : DrawState
+    state : EditorDrawState
         What the tool shows.
     saved : Sketch
         The map without what is being dragged.
@@ -52,7 +52,7 @@ class Scene:
     canvas: Canvas
     view: View
     editor: Editor
-    state: DrawState
+    state: EditorDrawState
     saved: Sketch
     sketch: Sketch
     selection: Selection

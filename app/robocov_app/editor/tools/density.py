@@ -11,7 +11,10 @@ from robocov.environment import Point, Ring
 from robocov_app.editor.edits import density
 from robocov_app.editor.model.geometry import build_rectangle, distance, format_length
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
+from robocov_app.editor.tools.context import EditorContext
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.toolkit.tool import CursorShape
 
 DEFAULT_WEIGHT = 4.0  # of a new feature, until another weight is typed
 MIN_SIGMA_M = 0.02
@@ -26,7 +29,7 @@ class _Hit(NamedTuple):
     corner: int | None = None  # of an area; 0 for the rim of a hot spot
 
 
-class DensityTool(Tool):
+class DensityTool(EditorTool):
     """Adds, moves, resizes, weights and removes hot spots, and areas where a map has areas.
 
     Attributes
@@ -38,6 +41,7 @@ class DensityTool(Tool):
     """
 
     name = "density"
+    title = "Density"
     key = "d"
     hint = "drag from a hot spot's middle outwards; drag middles and rims; click a middle, type its weight"
 
@@ -52,19 +56,19 @@ class DensityTool(Tool):
         """Whether something is dragged or chosen."""
         return self.pressed is not None or self.chosen is not None
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Choose what is under the pointer."""
         super().press(context, event)
         self._hit = _find_feature(density.list_features(context.sketch), event)
         if self._hit.feature is not None and self._hit.corner is None:
             self.chosen = self._hit.feature
 
-    def move(self, context: Workspace, event: PointerEvent) -> None:
+    def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Drag a feature, its rim or corner, or draw a new feature."""
         if self.pressed is not None and event.has_moved_from(self.pressed.point):
             self.change = self._build_change(context, self.pressed.point, event.point)
 
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Apply what was dragged; a click chooses a feature."""
         pressed = self.pressed
         change = self.change
@@ -82,13 +86,11 @@ class DensityTool(Tool):
         if self.chosen is not None:
             context.show_message("type what it weighs, then Enter; Backspace takes it away")
 
-    def finish(self, context: Workspace) -> bool:
+    def finish(self, context: EditorContext) -> None:
         """Choose nothing."""
-        had_chosen = self.chosen is not None
         self.chosen = None
-        return had_chosen
 
-    def remove_last(self, context: Workspace) -> bool:
+    def remove_last(self, context: EditorContext) -> bool:
         """Remove the chosen feature."""
         chosen = self.chosen
         self.chosen = None
@@ -97,33 +99,35 @@ class DensityTool(Tool):
         context.apply(density.remove_feature(context.sketch, chosen))
         return True
 
-    def cancel(self, context: Workspace) -> bool:
+    def cancel(self, context: EditorContext) -> bool:
         """Drop what is dragged, and choose nothing."""
         was_busy = super().cancel(context)
         self.chosen = None
         return was_busy
 
-    def enter_text(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: EditorContext, text: str) -> None:
         """Set the weight of the chosen and of new features."""
         weight = density.parse_weight(text)
         if self.chosen is not None:
             context.apply(density.set_weight(context.sketch, self.chosen, weight))
         self.weight = weight
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return outlines, centers and corners of all features, and the weight of the chosen one."""
         sketch = context.sketch if self.change is None else self.change.sketch
         pending = None if self.change is None else sketch
         features = density.list_features(sketch)
         label = self._build_label(features)
         if not features and not label:
-            return DrawState(pending=pending)
+            return EditorDrawState(pending=pending)
         dots = [_find_center(feature) for feature in features]
         for feature in features:
             if isinstance(feature, WeightedArea):
                 dots += feature.vertices
         rings = tuple(_build_outline(feature) for feature in features)
-        return DrawState(pending=pending, label=label, rings=rings, dots=tuple(dots), chosen=self.chosen)
+        return EditorDrawState(
+            pending=pending, label=label, rings=rings, dots=tuple(dots), chosen=self.chosen
+        )
 
     def _build_label(self, features: tuple[density.Feature, ...]) -> str:
         number = self.chosen
@@ -139,11 +143,11 @@ class DensityTool(Tool):
             label = f"σ {format_length(density.compute_spread(feature))}, {label}"
         return label
 
-    def choose_cursor(self, context: Workspace) -> str:
+    def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
         return "move" if self._hit.feature is not None and self.pressed is not None else "cross"
 
-    def _build_change(self, context: Workspace, start: Point, end: Point) -> Change | None:
+    def _build_change(self, context: EditorContext, start: Point, end: Point) -> Change | None:
         """Return the change of a drag between two points, m."""
         sketch = context.sketch
         number, corner = self._hit
@@ -165,7 +169,7 @@ class DensityTool(Tool):
         return density.move_feature(sketch, number, end[0] - start[0], end[1] - start[1])
 
 
-def _find_feature(features: tuple[density.Feature, ...], event: PointerEvent) -> _Hit:
+def _find_feature(features: tuple[density.Feature, ...], event: EditorPointerEvent) -> _Hit:
     """Return what is under the pointer: centers before rims and corners, then the inside of areas."""
     centers = [(distance(_find_center(feature), event.raw), k) for k, feature in enumerate(features)]
     if centers and min(centers)[0] < event.reach:

@@ -4,14 +4,16 @@ from robocov_app.editor.edits import create
 from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import parse_length
 from robocov_app.editor.model.geometry import distance, format_length
-from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
+from robocov_app.editor.tools.context import EditorContext
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 
 DEFAULT_DOOR_WIDTH_M = 0.9
 WALL_REACH_FRACTION = 0.6  # of the pointer's reach, within which a wall is taken
 MIN_DRAG_FRACTION = 0.1  # of a door's width, from which on a drag gives the opening
 
 
-class DoorTool(Tool):
+class DoorTool(EditorTool):
     """Opens a door in a wall; the pieces stay walls.
 
     Attributes
@@ -21,6 +23,7 @@ class DoorTool(Tool):
     """
 
     name = "door"
+    title = "Door"
     key = "k"
     hint = "click a wall where its door is to be, or drag along it; type the door's width in meters"
     starts_with_text = True
@@ -30,20 +33,20 @@ class DoorTool(Tool):
         self.width = DEFAULT_DOOR_WIDTH_M
         self._wall: int | None = None  # key of the wall under the cursor, or that was pressed
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Choose the wall under the pointer."""
         self.pressed = event
         self.cursor = event.point
         self._wall = create.find_wall(context.sketch, event.raw, WALL_REACH_FRACTION * event.reach)
         require(self._wall is not None, "click a wall: doors are opened in walls")
 
-    def move(self, context: Workspace, event: PointerEvent) -> None:
+    def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Move the preview of the door."""
         self.cursor = event.point
         if self.pressed is None:
             self._wall = create.find_wall(context.sketch, event.raw, WALL_REACH_FRACTION * event.reach)
 
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Open the wall: around a click, or between both ends of a drag."""
         pressed = self.pressed
         wall = self._wall
@@ -57,20 +60,20 @@ class DoorTool(Tool):
             change = create.open_wall(context.sketch, wall, pressed.point, event.point)
         context.apply(change)
 
-    def enter_text(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: EditorContext, text: str) -> None:
         """Set the width of doors."""
         self.width = create.check_door_width(parse_length(text))
         context.show_message(f"doors are {format_length(self.width)} wide")
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the opening with its width."""
         sketch = context.sketch
         wall = self._wall
         if wall is None or wall not in sketch.index_by_key:
-            return DrawState()
+            return EditorDrawState()
         start, end = create.compute_door_ends(sketch, wall, self.cursor, self.width)
         pressed = self.pressed
         if pressed is not None and distance(pressed.point, self.cursor) > MIN_DRAG_FRACTION * self.width:
             start = create.project_on_wall(sketch, wall, pressed.point)
             end = create.project_on_wall(sketch, wall, self.cursor)
-        return DrawState(line=(start, end), label=f"door, {format_length(distance(start, end))}")
+        return EditorDrawState(line=(start, end), label=f"door, {format_length(distance(start, end))}")

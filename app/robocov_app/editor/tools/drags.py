@@ -10,15 +10,12 @@ from robocov_app.editor.model import geometry, require
 from robocov_app.editor.model.coordinates import parse_angle, parse_length, parse_next_point
 from robocov_app.editor.model.hit_test import find_in_box, find_vertices_in_box
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position, list_vertices
+from robocov_app.editor.tools.context import EditorContext
+from robocov_app.editor.tools.draw_state import CarriedItems, EditorDrawState
+from robocov_app.editor.tools.handles import Handle, compute_side_position
 from robocov_app.editor.tools.snapping import Guide, Snap, SnapTargets, snap_angle, snap_move
-from robocov_app.editor.tools.tool import (
-    CarriedItems,
-    DrawState,
-    Handle,
-    PointerEvent,
-    Workspace,
-    compute_side_position,
-)
+from robocov_app.editor.tools.tool import EditorPointerEvent
+from robocov_app.toolkit.tool import CursorShape
 
 MANY_POINTS = 1000  # of more vertices, a picture is moved instead of the obstacles
 MAX_SNAPPING_POINTS = 60  # of the vertices that are moved, about so many can snap
@@ -33,7 +30,7 @@ class Drag:
 
     Parameters
     ----------
-    context : Workspace
+    context : EditorContext
         The editor.
     selection : Selection
         What is dragged.
@@ -48,13 +45,13 @@ class Drag:
         Guides of the latest snap.
     label : str
         Text next to the cursor.
-    cursor_shape : str
-        Shape of the cursor; empty for that of the handle.
+    cursor_shape : str or None
+        Shape of the cursor; None for that of the handle.
     """
 
-    cursor_shape = ""
+    cursor_shape: CursorShape | None = None
 
-    def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
+    def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
         self.context = context
         self.selection = selection
         self.change: Change | None = None
@@ -68,23 +65,23 @@ class Drag:
         """Obstacles that are dragged as a picture."""
         return None
 
-    def follow(self, event: PointerEvent) -> None:
+    def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
 
     def enter_text(self, text: str) -> None:
         """Drag by a typed value; raise MapError if it means nothing."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
-    def build_draw_state(self) -> DrawState:
+    def build_draw_state(self) -> EditorDrawState:
         """Return what the drag shows on the sheet."""
-        return DrawState(label=self.label, carried=self.carried, shows_handles=True)
+        return EditorDrawState(label=self.label, carried=self.carried, shows_handles=True)
 
     def end(self) -> None:
         """Apply the change."""
         if self.change is not None:
             self.context.apply(self.change)
 
-    def _snap(self, event: PointerEvent, position: Point, origin: Point | None = None) -> Point:
+    def _snap(self, event: EditorPointerEvent, position: Point, origin: Point | None = None) -> Point:
         """Snap a position to anything but what is dragged, unless Ctrl is held down."""
         snap = Snap(position)
         if not event.ctrl:
@@ -97,9 +94,9 @@ class Drag:
 class MoveDrag(Drag):
     """Moves objects: with Alt copies, with Shift at round angles, with Ctrl without snapping."""
 
-    cursor_shape = "move"
+    cursor_shape: CursorShape | None = "move"
 
-    def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
+    def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
         super().__init__(context, selection, start)
         points: list[Point] = []
         for owner in selection.owners:
@@ -116,7 +113,7 @@ class MoveDrag(Drag):
             return None
         return CarriedItems(self.selection, self._offset, self._copies)
 
-    def follow(self, event: PointerEvent) -> None:
+    def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
         self._copies = event.alt
         self.guides = ()
@@ -130,7 +127,7 @@ class MoveDrag(Drag):
         self._move(dx, dy)
 
     def _snap_offset(
-        self, event: PointerEvent, offset: tuple[float, float], targets: SnapTargets
+        self, event: EditorPointerEvent, offset: tuple[float, float], targets: SnapTargets
     ) -> tuple[float, float]:
         """Snap the displacement; along axes without another snap, the first point snaps to the grid."""
         context = self.context
@@ -179,7 +176,7 @@ class MoveDrag(Drag):
 class VertexDrag(Drag):
     """Moves a vertex with the selected ones; with Shift at a round angle from the vertex before it."""
 
-    def __init__(self, context: Workspace, vertex: Vertex, selection: Selection) -> None:
+    def __init__(self, context: EditorContext, vertex: Vertex, selection: Selection) -> None:
         dragged = Selection(vertices=selection.vertices | {vertex})
         super().__init__(context, dragged, find_position(context.sketch, vertex))
         self._origin = self._find_origin(vertex)
@@ -194,7 +191,7 @@ class VertexDrag(Drag):
             return points[min(1, len(points) - 1)]
         return points[vertex.index - 1]
 
-    def follow(self, event: PointerEvent) -> None:
+    def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
         if event.shift and self._origin is not None:
             self.guides = ()
@@ -221,13 +218,13 @@ class VertexDrag(Drag):
 class TurnDrag(Drag):
     """Turns objects about the center of their box; with Shift in steps, with Ctrl without snapping."""
 
-    def __init__(self, context: Workspace, selection: Selection, start: Point) -> None:
+    def __init__(self, context: EditorContext, selection: Selection, start: Point) -> None:
         super().__init__(context, selection, start)
         bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
         self._center = geometry.compute_center(bounds)
         self._start_angle = geometry.compute_bearing(self._center, start)
 
-    def follow(self, event: PointerEvent) -> None:
+    def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
         bearing = geometry.compute_bearing(self._center, event.raw)
         degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
@@ -251,7 +248,7 @@ class TurnDrag(Drag):
 class ScaleDrag(Drag):
     """Scales objects by a handle of their frame; with Shift in proportion, with Alt about its center."""
 
-    def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
+    def __init__(self, context: EditorContext, selection: Selection, handle: Handle) -> None:
         super().__init__(context, selection, handle.at)
         self._side = handle.side
         self._bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
@@ -263,7 +260,7 @@ class ScaleDrag(Drag):
         shapes = {type(item.shape) for item in selection.list_items(context.sketch)}
         self._keeps_proportion = bool(selection.starts) or shapes == {CircleObstacle}
 
-    def follow(self, event: PointerEvent) -> None:
+    def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
         pointer = (event.raw[0] - self._margin[0], event.raw[1] - self._margin[1])
         position = self._snap(event, pointer)
@@ -315,7 +312,7 @@ def _limit_factor(factor: float, length: float) -> float:
 class BoxDrag(Drag):
     """Selects what lies in a box; drawn to the left, also what the box touches."""
 
-    def __init__(self, context: Workspace, start: Point, *, adds: bool) -> None:
+    def __init__(self, context: EditorContext, start: Point, *, adds: bool) -> None:
         super().__init__(context, Selection(), start)
         self._adds = adds
         self._previous = context.selection if adds else Selection()
@@ -324,7 +321,7 @@ class BoxDrag(Drag):
     def _selects_touched(self) -> bool:
         return self._end[0] < self._start[0]
 
-    def follow(self, event: PointerEvent) -> None:
+    def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
         self._end = event.raw
 
@@ -347,7 +344,7 @@ class BoxDrag(Drag):
         if self._start != self._end:
             self.context.select(self._previous.union(self.find_selection()))
 
-    def build_draw_state(self) -> DrawState:
+    def build_draw_state(self) -> EditorDrawState:
         """Return the box."""
         box = (self._start, self._end)
-        return DrawState(box=box, box_selects_touched=self._selects_touched, shows_handles=True)
+        return EditorDrawState(box=box, box_selects_touched=self._selects_touched, shows_handles=True)

@@ -12,13 +12,15 @@ from robocov_app.editor.edits import create
 from robocov_app.editor.model.coordinates import parse_length, parse_next_point, parse_size
 from robocov_app.editor.model.geometry import build_rectangle, distance, format_bearing, format_length
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
+from robocov_app.editor.tools.context import EditorContext
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.drawn_outline import SAME_POINT_M, DrawnOutline
 
 CLOSING_FRACTION = 0.7  # of the pointer's reach, within which a click on the first point closes the outline
 
 
-class DrawTool(Tool):
+class DrawTool(EditorTool):
     """Draws point by point, or with a single drag; subclasses build something from the points.
 
     Attributes
@@ -43,19 +45,19 @@ class DrawTool(Tool):
         super().__init__()
         self.outline = DrawnOutline(self.min_points, self.max_points, self.closes, self.drags)
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds what was drawn with these points, m."""
         raise NotImplementedError
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return what is shown while drawing; the last of the points, m, is the cursor."""
         is_closed = self.closes and len(points) > 2
         label = format_bearing(points[-2], points[-1])
         if is_closed:
             label += f"   {shapely.Polygon(points).area:.2f} m²"
-        return DrawState(line=points, is_closed=is_closed, shows_lengths=True, label=label)
+        return EditorDrawState(line=points, is_closed=is_closed, shows_lengths=True, label=label)
 
-    def choose_point(self, event: PointerEvent) -> Point:
+    def choose_point(self, event: EditorPointerEvent) -> Point:
         """Return the position of the next point, m."""
         return event.constrain(self.origin)
 
@@ -83,12 +85,12 @@ class DrawTool(Tool):
         """Points drawn so far to which the pointer snaps, m."""
         return tuple(self.points if self.max_points == 2 else self.points[:-1])
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Add a point."""
         if self.outline.press(self.choose_point(event), event.raw, CLOSING_FRACTION * event.reach):
             self.finish(context)
 
-    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+    def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Complete the drawing."""
         if self.max_points == 2:
             self.press(context, event)
@@ -96,38 +98,37 @@ class DrawTool(Tool):
             # The first of the two clicks has added its point already.
             self.finish(context)
 
-    def move(self, context: Workspace, event: PointerEvent) -> None:
+    def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Move the end of the drawing to the pointer."""
         self.outline.cursor = self.choose_point(event)
 
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Complete a drag."""
         if self.outline.release(self.choose_point(event), event.raw, event.reach, clicked=clicked):
             self._finish_drag(context, self.outline.cursor)
 
-    def finish(self, context: Workspace) -> bool:
-        """Add what was drawn to the map."""
+    def finish(self, context: EditorContext) -> None:
+        """Add the drawn points to the map as an object."""
         points = self.outline.take_points()
         if not points:
-            return False
+            return
         if len(points) < self.min_points:
             name = self.title.lower()
             raise MapError(f"{name}: {len(points)} of at least {self.min_points} points were drawn")
         context.apply(self.build_change(context, points))
-        return True
 
-    def remove_last(self, context: Workspace) -> bool:
+    def remove_last(self, context: EditorContext) -> bool:
         """Remove the last point."""
         if not self.points:
             return False
         self.points.pop()
         return True
 
-    def cancel(self, context: Workspace) -> bool:
+    def cancel(self, context: EditorContext) -> bool:
         """Remove all points."""
         return self.outline.cancel()
 
-    def enter_text(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: EditorContext, text: str) -> None:
         """Add a point by typed coordinates or a length, or complete a drag by a typed size."""
         if len(self.points) == 1:
             end = self.find_drag_end(text)
@@ -139,13 +140,13 @@ class DrawTool(Tool):
         self.outline.points.append(self.outline.cursor)
         self.outline.is_dragging = False
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return what is shown while drawing."""
         if not self.points:
-            return DrawState()
+            return EditorDrawState()
         return self.build_preview(context, (*self.points, self.outline.cursor))
 
-    def _finish_drag(self, context: Workspace, end: Point) -> None:
+    def _finish_drag(self, context: EditorContext, end: Point) -> None:
         start = self.points[0]
         self.outline.points = list(build_rectangle(start, end)) if self.closes else [start, end]
         self.finish(context)
@@ -164,12 +165,13 @@ class PolygonTool(DrawTool):
     """Draws a polygon corner by corner."""
 
     name = "polygon"
+    title = "Polygon"
     key = "p"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     min_points = 3
     closes = True
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the polygon."""
         return create.add_polygon(context.sketch, points)
 
@@ -178,26 +180,28 @@ class WallTool(DrawTool):
     """Draws a wall along a line."""
 
     name = "wall"
+    title = "Wall"
     key = "w"
     hint = "click its points, Enter or a double click ends it; or drag; [ and ] change its width"
     drags = True
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the wall."""
         return create.add_wall(context.sketch, points, context.wall_width)
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the line, with the wall as thick as it will be."""
         line = points if distance(points[-2], points[-1]) > SAME_POINT_M else points[:-1]
         shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         label = f"{format_bearing(points[-2], points[-1])}   {format_length(context.wall_width)} wide"
-        return DrawState(line=points, shows_lengths=True, shapes=shapes, label=label)
+        return EditorDrawState(line=points, shows_lengths=True, shapes=shapes, label=label)
 
 
 class MeasureTool(DrawTool):
     """Measures along a line; the measured line stays until another is drawn."""
 
     name = "measure"
+    title = "Measure"
     key = "m"
     hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
     drags = True
@@ -207,29 +211,28 @@ class MeasureTool(DrawTool):
         """Points of the line that is being measured or was measured last, m."""
         return tuple(self.points or self.clicked)
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Add a point."""
         self.clicked = []
         super().press(context, event)
 
-    def finish(self, context: Workspace) -> bool:
+    def finish(self, context: EditorContext) -> None:
         """Keep the line."""
         points = self.outline.take_points()
         if points:
             self.clicked = points
-        return bool(points)
 
-    def cancel(self, context: Workspace) -> bool:
+    def cancel(self, context: EditorContext) -> bool:
         """Remove the line."""
         had_line = bool(self.clicked)
         self.clicked = []
         return super().cancel(context) or had_line
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the line with its length, and the area that it encloses."""
         points = [*self.points, self.outline.cursor] if self.points else self.clicked
         if len(points) < 2:
-            return DrawState()
+            return EditorDrawState()
         start, end = points[-2], points[-1]
         dx = end[0] - start[0]
         dy = end[1] - start[1]
@@ -237,7 +240,7 @@ class MeasureTool(DrawTool):
         if len(points) > 2:
             total = sum(distance(a, b) for a, b in pairwise(points))
             label += f"   {format_length(total)} in all, {shapely.Polygon(points).area:.2f} m²"
-        return DrawState(line=tuple(points), shows_lengths=True, label=label)
+        return EditorDrawState(line=tuple(points), shows_lengths=True, label=label)
 
 
 class PlacesTool(DrawTool):
@@ -249,31 +252,32 @@ class PlacesTool(DrawTool):
     hint = "click a place for each robot; Enter ends it"
     min_points = 1
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the start."""
         return create.add_points_start(context.sketch, points)
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the start with the positions clicked so far."""
         label = f"{format_count(len(points) - 1, 'robot')}; Enter ends it"
-        return DrawState(start=PointsStart(points[:-1]), label=label)
+        return EditorDrawState(start=PointsStart(points[:-1]), label=label)
 
 
 class BoundaryTool(DrawTool):
     """Draws the boundary: a rectangle by dragging, other outlines corner by corner."""
 
     name = "boundary"
+    title = "Boundary"
     key = "b"
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
     min_points = 3
     closes = True
     drags = True
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that replaces the boundary."""
         return create.set_boundary(context.sketch, points)
 
-    def choose_point(self, event: PointerEvent) -> Point:
+    def choose_point(self, event: EditorPointerEvent) -> Point:
         """Return the position of the next point, m; angles count only between clicked corners."""
         return event.point if self.outline.is_dragging else super().choose_point(event)
 
@@ -282,25 +286,26 @@ class BoundaryTool(DrawTool):
         is_size = any(sign in text for sign in "x×*")
         return self._find_far_corner(text) if is_size else None
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the outline; in a drag, the rectangle."""
         if not self.outline.is_dragging:
             return super().build_preview(context, points)
         (ax, ay), (bx, by) = points
         label = f"{format_length(abs(bx - ax))} x {format_length(abs(by - ay))}"
-        return DrawState(line=build_rectangle(*points), is_closed=True, label=label)
+        return EditorDrawState(line=build_rectangle(*points), is_closed=True, label=label)
 
 
 class RectangleTool(DrawTool):
     """Draws a rectangle from corner to corner, with Shift a square."""
 
     name = "rectangle"
+    title = "Rectangle"
     key = "r"
     hint = "drag from corner to corner, or click both; type 3 x 2 for meters; Shift makes a square"
     max_points = 2
     drags = True
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the rectangle."""
         return create.add_rectangle(context.sketch, points)
 
@@ -308,7 +313,7 @@ class RectangleTool(DrawTool):
         """Return the corner opposite to the first for a typed size."""
         return self._find_far_corner(text)
 
-    def choose_point(self, event: PointerEvent) -> Point:
+    def choose_point(self, event: EditorPointerEvent) -> Point:
         """Return the corner at the pointer, with Shift that of a square."""
         if not event.shift or not self.points:
             return event.point
@@ -317,7 +322,7 @@ class RectangleTool(DrawTool):
         side = max(abs(to_x - x), abs(to_y - y))
         return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the rectangle with its size and area."""
         (ax, ay), (bx, by) = points
         width = abs(bx - ax)
@@ -325,19 +330,20 @@ class RectangleTool(DrawTool):
         ring = build_rectangle(*points)
         shapes = (PolygonObstacle(ring),) if min(width, height) > SAME_POINT_M else ()
         label = f"{format_length(width)} x {format_length(height)}   {width * height:.2f} m²"
-        return DrawState(line=ring, is_closed=True, shapes=shapes, label=label)
+        return EditorDrawState(line=ring, is_closed=True, shapes=shapes, label=label)
 
 
 class CircleTool(DrawTool):
     """Draws a circle from its center."""
 
     name = "circle"
+    title = "Circle"
     key = "c"
     hint = "drag from the middle to the rim, or click both; type the radius for meters"
     max_points = 2
     drags = True
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the circle."""
         return create.add_circle(context.sketch, points[0], distance(*points))
 
@@ -345,11 +351,11 @@ class CircleTool(DrawTool):
         """Return the point on the rim to the right of the center for a typed radius."""
         return self.points[0][0] + parse_length(text), self.points[0][1]
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the circle with its radius."""
         radius = distance(*points)
         shapes = (CircleObstacle(points[0], radius),) if radius > SAME_POINT_M else ()
-        return DrawState(line=points, shapes=shapes, label=f"radius {format_length(radius)}")
+        return EditorDrawState(line=points, shapes=shapes, label=f"radius {format_length(radius)}")
 
 
 class DiscTool(CircleTool):
@@ -360,12 +366,12 @@ class DiscTool(CircleTool):
     key = "s"
     hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for meters"
 
-    def build_change(self, context: Workspace, points: Sequence[Point]) -> Change:
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the start."""
         return create.add_disc_start(context.sketch, points[0], distance(*points))
 
-    def build_preview(self, context: Workspace, points: tuple[Point, ...]) -> DrawState:
+    def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the disc with its radius."""
         radius = distance(*points)
         start = DiscStart(points[0], radius) if radius > SAME_POINT_M else None
-        return DrawState(line=points, start=start, label=f"radius {format_length(radius)}")
+        return EditorDrawState(line=points, start=start, label=f"radius {format_length(radius)}")

@@ -7,7 +7,10 @@ from robocov_app.editor.edits import paths
 from robocov_app.editor.model.geometry import format_bearing
 from robocov_app.editor.model.hit_test import find_obstacles
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
+from robocov_app.editor.tools.context import EditorContext
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.toolkit.tool import CursorShape
 
 WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach, within which a waypoint is taken
 LEG_REACH_FRACTION = 0.5  # of the pointer's reach, within which a click inserts into a leg
@@ -21,7 +24,7 @@ class _Subject(NamedTuple):
     path: ObstaclePath | None = None
 
 
-class MotionPathTool(Tool):
+class MotionPathTool(EditorTool):
     """Gives the selected obstacle a path, and edits it.
 
     Attributes
@@ -33,6 +36,7 @@ class MotionPathTool(Tool):
     """
 
     name = "path"
+    title = "Path"
     key = "o"
     hint = "click an obstacle, then where it goes; drag way points, Backspace takes one; type its speed"
 
@@ -54,7 +58,7 @@ class MotionPathTool(Tool):
         path = self._subject.path
         return path.points[-1] if path is not None else None
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Take a waypoint, select an obstacle, or add a waypoint."""
         subject, path = _find_subject(context)
         self.change = None
@@ -78,7 +82,7 @@ class MotionPathTool(Tool):
         self._subject = _find_subject(context)
 
     def _add_waypoint(
-        self, context: Workspace, event: PointerEvent, subject: int, path: ObstaclePath | None
+        self, context: EditorContext, event: EditorPointerEvent, subject: int, path: ObstaclePath | None
     ) -> None:
         """Insert a waypoint into the leg under the pointer, or append it."""
         index = None
@@ -91,11 +95,11 @@ class MotionPathTool(Tool):
         self.chosen = index
         self._dragged = index
 
-    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+    def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Finish the path."""
         self.finish(context)
 
-    def move(self, context: Workspace, event: PointerEvent) -> None:
+    def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Drag a waypoint."""
         self.cursor = event.point
         self._subject = _find_subject(context)
@@ -110,7 +114,7 @@ class MotionPathTool(Tool):
             position = event.constrain(origin)
             self.change = paths.move_waypoint(context.sketch, subject, dragged, position)
 
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Apply the drag of a waypoint."""
         change = self.change
         self._dragged = None
@@ -119,15 +123,13 @@ class MotionPathTool(Tool):
             context.apply(change)
         self._subject = _find_subject(context)
 
-    def finish(self, context: Workspace) -> bool:
+    def finish(self, context: EditorContext) -> None:
         """Select nothing."""
-        had_subject = _find_subject(context).key is not None
-        if had_subject:
+        if _find_subject(context).key is not None:
             context.select(Selection())
         self.cancel(context)
-        return had_subject
 
-    def remove_last(self, context: Workspace) -> bool:
+    def remove_last(self, context: EditorContext) -> bool:
         """Remove the chosen waypoint, or the last one."""
         subject, path = _find_subject(context)
         if subject is None or path is None:
@@ -139,7 +141,7 @@ class MotionPathTool(Tool):
         self._subject = _find_subject(context)
         return True
 
-    def cancel(self, context: Workspace) -> bool:
+    def cancel(self, context: EditorContext) -> bool:
         """Drop what is dragged."""
         was_dragging = self._dragged is not None
         self._subject = _Subject()
@@ -148,7 +150,7 @@ class MotionPathTool(Tool):
         self.chosen = None
         return was_dragging
 
-    def enter_text(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: EditorContext, text: str) -> None:
         """Set the speed of the path and of new paths."""
         speed = paths.parse_speed(text)
         subject, path = _find_subject(context)
@@ -156,23 +158,23 @@ class MotionPathTool(Tool):
             context.apply(paths.set_speed(context.sketch, Selection.of(subject), speed))
         self.speed = speed
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the waypoints with the speed and length of the path."""
         pending = None if self.change is None else self.change.sketch
         subject, path = _find_subject(context)
         if subject is None:
-            return DrawState(pending=pending)
+            return EditorDrawState(pending=pending)
         if pending is not None:
             path = pending.get_item(subject).shape.path
         if path is None:
-            return DrawState(pending=pending, label=f"where it goes, {self.speed:g} m/s")
+            return EditorDrawState(pending=pending, label=f"where it goes, {self.speed:g} m/s")
         label = paths.describe_path(path)
         if self._dragged:
             leg = format_bearing(path.points[self._dragged - 1], path.points[self._dragged])
             label = f"{leg}; {label}"
-        return DrawState(pending=pending, label=label, dots=path.points, chosen=self.chosen)
+        return EditorDrawState(pending=pending, label=label, dots=path.points, chosen=self.chosen)
 
-    def choose_cursor(self, context: Workspace) -> str:
+    def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
         path = _find_subject(context).path
         is_over_waypoint = False
@@ -182,7 +184,7 @@ class MotionPathTool(Tool):
         return "move" if is_over_waypoint or self._dragged is not None else "cross"
 
 
-def _find_subject(context: Workspace) -> _Subject:
+def _find_subject(context: EditorContext) -> _Subject:
     """Return the single selected obstacle with its path."""
     selection = context.selection.restrict_to(context.sketch)
     if len(selection.items) != 1 or selection.starts or selection.boundary:

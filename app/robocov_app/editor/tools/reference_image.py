@@ -8,12 +8,14 @@ from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background, level_background, scale_to_length
 from robocov_app.editor.model.coordinates import parse_length
 from robocov_app.editor.model.geometry import distance, format_length
-from robocov_app.editor.tools.tool import DrawState, PointerEvent, Tool, Workspace
+from robocov_app.editor.tools.context import EditorContext
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 
 CORNER_DECIMALS = 4  # of the position of a picture, m
 
 
-class ReferenceImageTool(Tool):
+class ReferenceImageTool(EditorTool):
     """Scales, levels and moves the reference image.
 
     Attributes
@@ -23,6 +25,7 @@ class ReferenceImageTool(Tool):
     """
 
     name = "picture"
+    title = "Picture"
     key = "i"
     hint = "click two points; type how far apart they are, or Enter to make their line level; drag moves it"
     snaps = False
@@ -31,15 +34,15 @@ class ReferenceImageTool(Tool):
         super().__init__()
         self.moved: Background | None = None
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Start a click or a drag."""
         require(context.sketch.background is not None, "there is no picture under the map: Ctrl B takes one")
         self.pressed = event
 
-    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+    def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Ignore a double click: two points in one place have no distance."""
 
-    def move(self, context: Workspace, event: PointerEvent) -> None:
+    def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Drag the image."""
         self.cursor = event.raw
         background = context.sketch.background
@@ -50,7 +53,7 @@ class ReferenceImageTool(Tool):
         corner = (background.corner[0] + dx, background.corner[1] + dy)
         self.moved = replace(background, corner=corner)
 
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """Apply the drag, or add a point."""
         pressed = self.pressed
         moved = self.moved
@@ -69,17 +72,16 @@ class ReferenceImageTool(Tool):
                 "type how many meters apart the points are; Enter alone makes their line level"
             )
 
-    def finish(self, context: Workspace) -> bool:
+    def finish(self, context: EditorContext) -> None:
         """Turn the image so that the line between the two points is level or upright."""
         if len(self.clicked) != 2 or context.sketch.background is None:
-            return False
+            return
         start, end = self.clicked
         self.clicked = []
         background = level_background(context.sketch.background, start, end)
         context.apply(set_background(context.sketch, background))
-        return True
 
-    def enter_text(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: EditorContext, text: str) -> None:
         """Scale the image so that the two points have a typed distance."""
         if len(self.clicked) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
@@ -88,17 +90,17 @@ class ReferenceImageTool(Tool):
         self.clicked = []
         context.apply(set_background(context.sketch, background))
 
-    def cancel(self, context: Workspace) -> bool:
+    def cancel(self, context: EditorContext) -> bool:
         """Drop what is dragged, and the points."""
         self.moved = None
         return super().cancel(context)
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the dragged image, and the line between the points."""
         if not self.clicked:
-            return DrawState(background=self.moved)
+            return EditorDrawState(background=self.moved)
         line = (*self.clicked, self.cursor)[:2]
         label = f"now {format_length(distance(*line))}"
         if len(self.clicked) == 2:
             label += "; type how far apart they are, or Enter makes them level"
-        return DrawState(background=self.moved, line=line, label=label)
+        return EditorDrawState(background=self.moved, line=line, label=label)

@@ -6,13 +6,17 @@ from robocov_app.editor.edits import vertices
 from robocov_app.editor.model.hit_test import find_edge, find_owners
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Owner
+from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.drags import BoxDrag, Drag, MoveDrag, ScaleDrag, TurnDrag, VertexDrag
-from robocov_app.editor.tools.tool import DrawState, Handle, PointerEvent, Tool, Workspace, find_handle
+from robocov_app.editor.tools.draw_state import EditorDrawState
+from robocov_app.editor.tools.handles import Handle, find_handle
+from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
+from robocov_app.toolkit.tool import CursorShape
 
 HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach, within which a handle or an edge is taken
 OBJECT_REACH_FRACTION = 0.5  # of the pointer's reach, within which an object is taken
 EDGE_TOLERANCE_M = 1e-5  # a point closer to an edge lies on it
-_SIDE_CURSORS = {
+_SIDE_CURSORS: dict[tuple[int, int], CursorShape] = {
     (1, 0): "sideways",
     (-1, 0): "sideways",
     (0, 1): "updown",
@@ -24,7 +28,7 @@ _SIDE_CURSORS = {
 }
 
 
-class SelectTool(Tool):
+class SelectTool(EditorTool):
     """Selects, and drags the selection: objects, their vertices, or their frame.
 
     Attributes
@@ -38,6 +42,7 @@ class SelectTool(Tool):
     """
 
     name = "select"
+    title = "Select"
     key = "v"
     hint = "click or drag a box; drag to move, Alt-drag to copy; double click on an edge inserts a vertex"
     snaps = False
@@ -55,7 +60,7 @@ class SelectTool(Tool):
         """Whether something is dragged."""
         return self.drag is not None
 
-    def press(self, context: Workspace, event: PointerEvent) -> None:
+    def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Select what is under the pointer."""
         self.pressed = event
         self.drag = None
@@ -66,7 +71,7 @@ class SelectTool(Tool):
         elif self._handle.vertex is not None:
             self._press_vertex(context, event, self._handle)
 
-    def _press_vertex(self, context: Workspace, event: PointerEvent, handle: Handle) -> None:
+    def _press_vertex(self, context: EditorContext, event: EditorPointerEvent, handle: Handle) -> None:
         vertex = handle.vertex
         assert vertex is not None
         pressed = Selection(vertices=frozenset({vertex}))
@@ -75,7 +80,7 @@ class SelectTool(Tool):
         elif vertex not in context.selection.vertices:
             context.select(pressed)
 
-    def _press_object(self, context: Workspace, event: PointerEvent) -> None:
+    def _press_object(self, context: EditorContext, event: EditorPointerEvent) -> None:
         owners = _find_owners(context, event)
         if not owners:
             return
@@ -90,7 +95,7 @@ class SelectTool(Tool):
         else:
             self._narrows = True
 
-    def move(self, context: Workspace, event: PointerEvent) -> None:
+    def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Find what is under the pointer, or drag."""
         if self.pressed is None:
             self.near = self._find_handle(context, event)
@@ -104,7 +109,7 @@ class SelectTool(Tool):
             self.drag.follow(event)
             self.guides = self.drag.guides
 
-    def _start_drag(self, context: Workspace, pressed: PointerEvent) -> Drag:
+    def _start_drag(self, context: EditorContext, pressed: EditorPointerEvent) -> Drag:
         handle = self._handle
         objects = context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:
@@ -117,7 +122,7 @@ class SelectTool(Tool):
             return MoveDrag(context, objects, pressed.raw)
         return BoxDrag(context, pressed.raw, adds=pressed.shift)
 
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
         """End a drag; a click narrows the selection, the next click selects what lies below."""
         pressed = self.pressed
         drag = self.drag
@@ -128,7 +133,7 @@ class SelectTool(Tool):
         elif pressed is not None and self._handle is None and not event.shift:
             self._click(context, pressed)
 
-    def _click(self, context: Workspace, pressed: PointerEvent) -> None:
+    def _click(self, context: EditorContext, pressed: EditorPointerEvent) -> None:
         owners = _find_owners(context, pressed)
         selected = context.selection.owners
         if not owners:
@@ -140,7 +145,7 @@ class SelectTool(Tool):
             below = (owners.index(owner) + 1) % len(owners)
             context.select(Selection.of(owners[below]))
 
-    def double_click(self, context: Workspace, event: PointerEvent) -> None:
+    def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Insert a vertex into the edge under the pointer; away from edges it is another press."""
         owners = context.vertex_owners or _find_owners(context, event)[:1]
         edge = find_edge(context.sketch, event.raw, HANDLE_REACH_FRACTION * event.reach, owners)
@@ -155,7 +160,7 @@ class SelectTool(Tool):
             edge = find_edge(context.sketch, position, EDGE_TOLERANCE_M, [edge.owner]) or edge
         context.apply(vertices.insert_vertex(context.sketch, edge))
 
-    def enter_text(self, context: Workspace, text: str) -> None:
+    def enter_text(self, context: EditorContext, text: str) -> None:
         """End a drag by a typed value."""
         drag = self.drag
         if drag is None:
@@ -165,7 +170,7 @@ class SelectTool(Tool):
         self._stop()
         drag.end()
 
-    def cancel(self, context: Workspace) -> bool:
+    def cancel(self, context: EditorContext) -> bool:
         """Drop a drag, else select owners instead of vertices, else select nothing."""
         had_something = bool(self.drag or context.selection)
         if self.drag is not None:
@@ -180,15 +185,15 @@ class SelectTool(Tool):
         self.drag = None
         self.guides = ()
 
-    def build_draw_state(self, context: Workspace) -> DrawState:
+    def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return what is dragged, or what is under the cursor."""
         if self.drag is not None:
             return replace(self.drag.build_draw_state(), near=self.near)
-        return DrawState(hovered=self.hovered, near=self.near, shows_handles=True, labels_cursor=False)
+        return EditorDrawState(hovered=self.hovered, near=self.near, shows_handles=True, labels_cursor=False)
 
-    def choose_cursor(self, context: Workspace) -> str:
+    def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
-        if self.drag is not None and self.drag.cursor_shape:
+        if self.drag is not None and self.drag.cursor_shape is not None:
             return self.drag.cursor_shape
         handle = self._handle if self.drag is not None else self.near
         if handle is not None:
@@ -197,23 +202,24 @@ class SelectTool(Tool):
             return "move" if self.hovered in context.selection.owners else "hand"
         return "arrow"
 
-    def _find_handle(self, context: Workspace, event: PointerEvent) -> Handle | None:
+    def _find_handle(self, context: EditorContext, event: EditorPointerEvent) -> Handle | None:
         return find_handle(context.handles, event.raw, HANDLE_REACH_FRACTION * event.reach)
 
 
-def _find_owners(context: Workspace, event: PointerEvent) -> tuple[Owner, ...]:
+def _find_owners(context: EditorContext, event: EditorPointerEvent) -> tuple[Owner, ...]:
     return find_owners(context.sketch, event.raw, OBJECT_REACH_FRACTION * event.reach)
 
 
-class PanTool(Tool):
+class PanTool(EditorTool):
     """Moves the view; the window does it, because it owns the camera."""
 
     name = "pan"
+    title = "Pan"
     key = "g"
     hint = "drag the sheet; the right button does so with every tool, and Space while it is held down"
     snaps = False
     accepts_text = False
 
-    def choose_cursor(self, context: Workspace) -> str:
+    def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
         return "move"

@@ -10,7 +10,7 @@ from robocov_app.editor.canvas.canvas import REACH_PX, EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Snap
-from robocov_app.editor.tools.tool import PointerEvent
+from robocov_app.editor.tools.tool import EditorPointerEvent
 from robocov_app.toolkit.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX, ZOOM_PER_NOTCH, get_wheel_notches
 
 BUTTONS = (1, 2, 3)  # left, middle, right
@@ -171,7 +171,7 @@ class Pointer:
         if self.canvas.contains(pixel):
             self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), pixel)
 
-    def _build_event(self, pixel: tuple[int, int]) -> PointerEvent:
+    def _build_event(self, pixel: tuple[int, int]) -> EditorPointerEvent:
         """Return the pointer at a pixel, snapped unless the tool or Ctrl prevents it."""
         editor = self.editor
         tool = editor.tool
@@ -186,7 +186,7 @@ class Pointer:
                 snap = editor.snap(raw, reach, tool.origin, tool.snap_points)
             point = snap.point
             tool.guides = snap.guides
-        return PointerEvent(
+        return EditorPointerEvent(
             point=point,
             raw=raw,
             reach=reach,

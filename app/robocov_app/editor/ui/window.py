@@ -29,18 +29,9 @@ from robocov_app.toolkit.layout import build_layout
 from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import create_palette
+from robocov_app.toolkit.tool import CursorShape
 from robocov_app.toolkit.window import BaseWindow
 
-_CURSORS = {
-    "arrow": pygame.SYSTEM_CURSOR_ARROW,
-    "cross": pygame.SYSTEM_CURSOR_CROSSHAIR,
-    "hand": pygame.SYSTEM_CURSOR_HAND,
-    "move": pygame.SYSTEM_CURSOR_SIZEALL,
-    "sideways": pygame.SYSTEM_CURSOR_SIZEWE,
-    "updown": pygame.SYSTEM_CURSOR_SIZENS,
-    "rising": pygame.SYSTEM_CURSOR_SIZENESW,
-    "falling": pygame.SYSTEM_CURSOR_SIZENWSE,
-}
 STATUS_HINT = "F5 try it · F1 keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
@@ -227,7 +218,7 @@ class EditorWindow(BaseWindow):
         self._arrange()
         self.panel.is_covered = self.dialogs.is_open
         self.panel.update()
-        self.cursor.show(_CURSORS[self._choose_cursor()])
+        self.cursor.show(self._choose_cursor())
         unsaved_mark = "● " if editor.document.history.has_unsaved_changes else ""
         set_title(f"{unsaved_mark}{editor.document.title} · robocov edit")
 
@@ -241,7 +232,7 @@ class EditorWindow(BaseWindow):
             self.canvas.team = team
             editor.show_message(team.message, is_error=True)
 
-    def _choose_cursor(self) -> str:
+    def _choose_cursor(self) -> CursorShape:
         if not self.canvas.contains(self.at):
             return "arrow"
         if self.pointer.is_panning:

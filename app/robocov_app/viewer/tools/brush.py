@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.environment import Point, Ring
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import Preview, Tool
+from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool
 
 DEFAULT_RADIUS_FRACTION = 0.1  # of the map's diameter
 MIN_RADIUS_FRACTION = 1 / 200
@@ -20,7 +20,7 @@ _RING_POINTS = 48  # of the circle that shows the brush
 
 
 @dataclass
-class BrushTool(Tool):
+class BrushTool(ViewerTool):
     """Paints the density: the left button raises it, the right one lowers it.
 
     Attributes
@@ -53,10 +53,6 @@ class BrushTool(Tool):
     _cursor: Point | None = None
     _applied_at: float = -1e9
 
-    def choose_button(self, *, is_right: bool) -> None:
-        """Lower the density with the right button, otherwise raise it."""
-        self.lowers = is_right
-
     def get_radius(self, session: Session) -> float:
         """Return the radius, m; choose one that suits the map if there is none yet."""
         if self.radius is None:
@@ -73,26 +69,27 @@ class BrushTool(Tool):
         self.radius = float(f"{radius:.3g}")
         return f"the brush has a radius of {self.radius:g} m"
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Start a stroke."""
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
+        """Start a stroke, which lowers the density with the right button."""
+        self.lowers = event.is_right
         self.is_painting = True
-        self._cursor = point
-        self._dabs = [point]
+        self._cursor = event.raw
+        self._dabs = [event.raw]
         self._boundary = session.displayed.environment.boundary
         self._stroke += 1
         self._apply(session)
         return None
 
-    def move(self, session: Session, point: Point) -> None:
+    def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Continue the stroke in dabs of equal distance; show the brush at the cursor."""
         if not self.is_painting or self._cursor is None:
-            self._cursor = point
+            self._cursor = event.raw
             return
         # Another map may have been opened during the stroke.
         if session.displayed.environment.boundary != self._boundary:
             self.is_painting = False
             return
-        self._add_dabs(self._cursor, point, DAB_SPACING_FRACTION * self.get_radius(session))
+        self._add_dabs(self._cursor, event.raw, DAB_SPACING_FRACTION * self.get_radius(session))
         if self._dabs and self.clock() - self._applied_at >= APPLY_INTERVAL_S:
             self._apply(session)
 
@@ -104,10 +101,10 @@ class BrushTool(Tool):
             self._cursor = (x, y)
             self._dabs.append(self._cursor)
 
-    def release(self, session: Session, point: Point) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """End the stroke."""
         if self.is_painting:
-            self.move(session, point)
+            self.move(session, event)
         if not self.is_painting:
             return None
         self.is_painting = False
@@ -124,10 +121,10 @@ class BrushTool(Tool):
             session.undo()
         return was_painting
 
-    def build_preview(self, session: Session) -> Preview | None:
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
         """Return the outline of the brush, with the density at the cursor."""
         if self._cursor is None:
-            return None
+            return ViewerDrawState()
         angles = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS + 1)
         radius = self.get_radius(session)
         x = self._cursor[0] + radius * np.cos(angles)
@@ -135,7 +132,7 @@ class BrushTool(Tool):
         ring = tuple(zip(x.tolist(), y.tolist(), strict=True))
         density = session.displayed.environment.density
         value = 1.0 if density is None else float(density.evaluate(np.array([self._cursor]))[0])
-        return Preview(ring, label=f"φ {value:.2g}", has_marks=False)
+        return ViewerDrawState(ring, label=f"φ {value:.2g}", has_marks=False)
 
     def _apply(self, session: Session) -> None:
         """Paint the dabs that were not applied yet."""

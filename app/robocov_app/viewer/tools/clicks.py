@@ -1,14 +1,13 @@
 """Tools that act on a click: delete, add a robot, let a robot fail."""
 
-from robocov.environment import Point
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session, toggle_failure
-from robocov_app.viewer.tools.tool import Tool, change_map
+from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, change_map
 
 ERASE_REACH_FRACTION = 0.5  # of a finger's width: obstacles this close to the cursor are deleted
 
 
-class EraserTool(Tool):
+class EraserTool(ViewerTool):
     """Deletes robots and obstacles."""
 
     name = "eraser"
@@ -17,12 +16,13 @@ class EraserTool(Tool):
     hint = "click an obstacle or a robot to delete it"
     takes_robots = True
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Delete the robot under the cursor; if there is none, delete the obstacle."""
-        if number is not None:
-            session.remove_robot(number)
-            return f"robot {number} removed"
-        index = map_edits.find_obstacle(session.displayed.environment, point, ERASE_REACH_FRACTION * reach)
+        if event.robot is not None:
+            session.remove_robot(event.robot)
+            return f"robot {event.robot} removed"
+        reach = ERASE_REACH_FRACTION * event.reach
+        index = map_edits.find_obstacle(session.displayed.environment, event.raw, reach)
         if index is None:
             return None
         obstacle = session.displayed.environment.obstacles[index]
@@ -30,7 +30,7 @@ class EraserTool(Tool):
         return change_map(session, environment, f"{map_edits.describe_obstacle(obstacle)} deleted")
 
 
-class AddRobotTool(Tool):
+class AddRobotTool(ViewerTool):
     """Adds robots to the team."""
 
     name = "robot"
@@ -39,12 +39,12 @@ class AddRobotTool(Tool):
     key = "a"
     hint = "click where a robot should join"
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a robot at the cursor, or as close to it as there is space."""
-        return f"robot {session.add_robot(point)} joined"
+        return f"robot {session.add_robot(event.raw)} joined"
 
 
-class FailureTool(Tool):
+class FailureTool(ViewerTool):
     """Lets robots fail, and revives them."""
 
     name = "failure"
@@ -53,6 +53,6 @@ class FailureTool(Tool):
     hint = "click a robot to make it fail; click it again to revive it"
     takes_robots = True
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Let the robot under the cursor fail, or revive it."""
-        return None if number is None else toggle_failure(session, number)
+        return None if event.robot is None else toggle_failure(session, event.robot)

@@ -6,17 +6,18 @@ from math import dist
 import numpy as np
 
 from robocov.environment import Obstacle, Point
+from robocov_app.toolkit.tool import CursorShape
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import Preview, Tool, change_map
+from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, change_map
 
 MIN_DRAG_M = 0.02  # a shorter move is part of a click
 _MIN_SHIFT_M = 1e-3  # an obstacle that moves less stays where it is
 
 
 @dataclass
-class HandTool(Tool):
+class HandTool(ViewerTool):
     """Drags and throws robots, and moves obstacles.
 
     Attributes
@@ -43,18 +44,18 @@ class HandTool(Tool):
     _obstacles: tuple[Obstacle, ...] = ()  # of the map when the button was pressed
     _drags: bool = False
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Take hold of the robot or the obstacle under the cursor."""
-        self._pressed_at = point
-        self._cursor = point
+        self._pressed_at = event.raw
+        self._cursor = event.raw
         self._drags = False
         self._obstacles = session.displayed.environment.obstacles
-        self.robot = number
+        self.robot = event.robot
         self.obstacle = None
-        if number is None:
-            self.obstacle = map_edits.find_obstacle(session.displayed.environment, point)
+        if event.robot is None:
+            self.obstacle = map_edits.find_obstacle(session.displayed.environment, event.raw)
         else:
-            self.inspection.selected = number
+            self.inspection.selected = event.robot
         return None
 
     @property
@@ -62,20 +63,20 @@ class HandTool(Tool):
         """Whether a robot or an obstacle is held."""
         return self.robot is not None or self.obstacle is not None
 
-    def move(self, session: Session, point: Point) -> None:
+    def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Drag the robot that is held; obstacles follow when the button is released."""
-        self._cursor = point
-        if dist(self._pressed_at, point) > MIN_DRAG_M:
+        self._cursor = event.raw
+        if dist(self._pressed_at, event.raw) > MIN_DRAG_M:
             self._drags = True
         if self.robot is None or not self._drags:
             return
         # The robot may have been removed since it was pressed.
         if self.robot in session.displayed.get_setup(session.timeline.panes[0]).all_numbers:
-            session.drag_robot(self.robot, point)
+            session.drag_robot(self.robot, event.raw)
 
-    def release(self, session: Session, point: Point) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """Let go of the robot or the obstacle."""
-        self._cursor = point
+        self._cursor = event.raw
         index = self.obstacle
         moved = self._move_obstacle(session)
         if self.robot is not None:
@@ -98,14 +99,18 @@ class HandTool(Tool):
         session.release()
         return True
 
-    def build_preview(self, session: Session) -> Preview | None:
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
         """Return the obstacle that is held, at its new position."""
         moved = self._move_obstacle(session)
         if moved is None:
-            return None
+            return ViewerDrawState()
         distance = dist(self._pressed_at, self._cursor)
         line = (self._pressed_at, self._cursor)
-        return Preview(line, obstacle=moved, label=f"{distance:.2f} m")
+        return ViewerDrawState(line, obstacle=moved, label=f"{distance:.2f} m")
+
+    def choose_cursor(self, session: Session) -> CursorShape:
+        """Return the shape of the cursor where there is no robot."""
+        return "arrow"
 
     def _move_obstacle(self, session: Session) -> Obstacle | None:
         """Return the obstacle that is held, moved with the cursor; None if it stays where it is."""

@@ -11,8 +11,7 @@ from robocov.errors import RobocovError
 from robocov_app.toolkit.drawn_outline import SAME_POINT_M, DrawnOutline
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.snapping import SNAP_REACH_FRACTION, snap_point
-from robocov_app.viewer.tools.tool import Preview, Tool, add_obstacle
+from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, add_obstacle
 
 DEFAULT_WALL_WIDTH_M = 0.1
 MIN_WALL_WIDTH_M = 0.02
@@ -21,101 +20,66 @@ WALL_END_FRACTION = 0.3  # of a finger's width: a press this close to the last p
 
 
 @dataclass
-class SnappedOutline:
-    """Points that are drawn one by one and snap to the map.
-
-    Attributes
-    ----------
-    outline : DrawnOutline
-        The points so far.
-    end_fraction : float
-        Fraction of a finger's width from the last point within which a press completes the outline.
-    """
-
-    outline: DrawnOutline
-    end_fraction: float = 0.0
-    _reach: float = 0.0
-
-    def press(self, session: Session, point: Point, reach: float) -> bool:
-        """Add a point; return whether that completes the outline."""
-        self._reach = reach
-        same_point = max(SAME_POINT_M, self.end_fraction * reach)
-        return self.outline.press(self._snap(session, point), point, reach, same_point)
-
-    def move(self, session: Session, point: Point) -> None:
-        """Move the end of the line that follows the cursor."""
-        self.outline.cursor = self._snap(session, point) if self.outline.points else point
-
-    def release(self, session: Session, point: Point) -> bool:
-        """End a drag; return whether that completes the outline."""
-        is_complete = self.outline.release(self._snap(session, point), point, self._reach)
-        if is_complete:
-            self.outline.points.append(self.outline.cursor)
-        return is_complete
-
-    def take_points(self) -> list[Point]:
-        """Return the points, and start over."""
-        return self.outline.take_points()
-
-    def cancel(self) -> bool:
-        """Drop the points; return whether there were any."""
-        return self.outline.cancel()
-
-    def build_preview(self) -> Preview | None:
-        """Return the line up to the cursor, with the length of its last edge."""
-        if not self.outline.points:
-            return None
-        line = (*self.outline.points, self.outline.cursor)
-        return Preview(line, is_closed=len(line) > 2, label=f"{dist(line[-2], line[-1]):.2f} m")
-
-    def _snap(self, session: Session, point: Point) -> Point:
-        return snap_point(session.displayed.environment, point, SNAP_REACH_FRACTION * self._reach)
-
-
-@dataclass
-class OutlineTool(Tool):
+class OutlineTool(ViewerTool):
     """Base class of tools that draw an obstacle point by point.
 
     Attributes
     ----------
-    drawing : SnappedOutline
+    end_fraction : float
+        Fraction of a finger's width from the last point within which a press completes the outline.
+    outline : DrawnOutline
         The points so far.
     """
 
-    ends_on_double_click = True
+    snaps = True
+    end_fraction = 0.0
 
-    drawing: SnappedOutline = field(repr=False)
+    outline: DrawnOutline = field(repr=False)
 
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the obstacle with these points, m; raise RobocovError if they do not form one."""
         raise NotImplementedError
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a point, or complete the obstacle."""
-        return self.finish(session) if self.drawing.press(session, point, reach) else None
+        same_point = max(SAME_POINT_M, self.end_fraction * event.reach)
+        is_complete = self.outline.press(event.point, event.raw, event.reach, same_point)
+        return self.finish(session) if is_complete else None
 
-    def move(self, session: Session, point: Point) -> None:
+    def double_click(self, session: Session, event: ViewerPointerEvent) -> str | None:
+        """Complete the obstacle; the first of the two clicks has added its point already."""
+        return self.finish(session)
+
+    def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Move the edge that follows the cursor."""
-        self.drawing.move(session, point)
+        self.outline.cursor = event.point
 
-    def release(self, session: Session, point: Point) -> str | None:
-        """End a drag."""
-        return self.finish(session) if self.drawing.release(session, point) else None
+    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
+        """Complete a drag."""
+        is_complete = self.outline.release(event.point, event.raw, event.reach, clicked=clicked)
+        if not is_complete:
+            return None
+        self.outline.points.append(self.outline.cursor)
+        return self.finish(session)
 
     def finish(self, session: Session) -> str | None:
         """Add the obstacle to the map."""
-        points = self.drawing.take_points()
+        points = self.outline.take_points()
         if not points:
             return None
         return add_obstacle(session, self.build_obstacle(points), self.name)
 
     def cancel(self, session: Session) -> bool:
         """Drop the points."""
-        return self.drawing.cancel()
+        return self.outline.cancel()
 
-    def build_preview(self, session: Session) -> Preview | None:
-        """Return the outline so far."""
-        return self.drawing.build_preview()
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
+        """Return the line up to the cursor, with the length of its last edge."""
+        if not self.outline.points:
+            return ViewerDrawState()
+        line = (*self.outline.points, self.outline.cursor)
+        label = f"{dist(line[-2], line[-1]):.2f} m"
+        return ViewerDrawState(line, is_closed=len(line) > 2, label=label)
 
 
 @dataclass
@@ -127,9 +91,7 @@ class AddPolygonTool(OutlineTool):
     key = "p"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
 
-    drawing: SnappedOutline = field(
-        default_factory=lambda: SnappedOutline(DrawnOutline(min_points=3, closes=True)), repr=False
-    )
+    outline: DrawnOutline = field(default_factory=lambda: DrawnOutline(min_points=3, closes=True), repr=False)
 
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the polygon with these corners, m."""
@@ -151,26 +113,26 @@ class AddWallTool(OutlineTool):
     key = "w"
     hint = "drag, or click its points; Enter or a double click ends it; [ and ] change its width"
     is_resizable = True
+    end_fraction = WALL_END_FRACTION
 
-    drawing: SnappedOutline = field(
-        default_factory=lambda: SnappedOutline(DrawnOutline(drags=True), WALL_END_FRACTION), repr=False
-    )
+    outline: DrawnOutline = field(default_factory=lambda: DrawnOutline(drags=True), repr=False)
     width: float = DEFAULT_WALL_WIDTH_M
 
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the wall with these points, m."""
         return map_edits.build_wall(points, self.width)
 
-    def build_preview(self, session: Session) -> Preview | None:
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
         """Return the wall so far."""
-        outline = self.drawing.build_preview()
-        if outline is None:
-            return None
+        state = super().build_draw_state(session)
+        if not state.line:
+            return state
         wall: Obstacle | None = None
         # Two points in the same position are no wall yet.
         with suppress(RobocovError):
-            wall = self.build_obstacle(list(outline.line))
-        return Preview(outline.line, obstacle=wall, label=f"{outline.label}, {self.width:g} m wide")
+            wall = self.build_obstacle(list(state.line))
+        label = f"{state.label}, {self.width:g} m wide"
+        return ViewerDrawState(state.line, obstacle=wall, label=label)
 
     def resize(self, session: Session, factor: float) -> str:
         """Multiply the width of new walls by a factor."""

@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle, Point
 from robocov.errors import RobocovError
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import Preview, Tool, add_obstacle
+from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerPointerEvent, ViewerTool, add_obstacle
 
 
 @dataclass
@@ -54,7 +54,7 @@ class DraggedSegment:
 
 
 @dataclass
-class SegmentTool(Tool):
+class SegmentTool(ViewerTool):
     """Base class of tools that drag from one point to another.
 
     Attributes
@@ -64,14 +64,14 @@ class SegmentTool(Tool):
 
     segment: DraggedSegment = field(default_factory=DraggedSegment, repr=False)
 
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Start a segment."""
-        self.segment.press(point)
+        self.segment.press(event.raw)
         return None
 
-    def move(self, session: Session, point: Point) -> None:
+    def move(self, session: Session, event: ViewerPointerEvent) -> None:
         """Drag the end of the segment to the cursor."""
-        self.segment.move(point)
+        self.segment.move(event.raw)
 
     def cancel(self, session: Session) -> bool:
         """Drop the segment."""
@@ -87,20 +87,20 @@ class RulerTool(SegmentTool):
     key = "m"
     hint = "drag from one point to another"
 
-    def release(self, session: Session, point: Point) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """Keep the measurement."""
         self.segment.release()
         return None
 
-    def build_preview(self, session: Session) -> Preview | None:
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
         """Return the segment with its length and its components."""
         start = self.segment.start
         if start is None:
-            return None
+            return ViewerDrawState()
         end = self.segment.end
         dx = end[0] - start[0]
         dy = end[1] - start[1]
-        return Preview((start, end), label=f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
+        return ViewerDrawState((start, end), label=f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
 
 
 @dataclass
@@ -112,22 +112,22 @@ class AddCircleTool(SegmentTool):
     key = "c"
     hint = "drag from the center to the rim"
 
-    def release(self, session: Session, point: Point) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
         """Add the circle to the map."""
         center = self.segment.start
         self.segment.clear()
         if center is None:
             return None
-        return add_obstacle(session, map_edits.build_circle(center, point), self.name)
+        return add_obstacle(session, map_edits.build_circle(center, event.raw), self.name)
 
-    def build_preview(self, session: Session) -> Preview | None:
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
         """Return the circle so far."""
         center = self.segment.start
         if center is None:
-            return None
+            return ViewerDrawState()
         rim = self.segment.end
         circle: CircleObstacle | None = None
         # A circle without a radius is no obstacle yet.
         with suppress(RobocovError):
             circle = map_edits.build_circle(center, rim)
-        return Preview((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")
+        return ViewerDrawState((center, rim), obstacle=circle, label=f"radius {dist(center, rim):.2f} m")

@@ -1,57 +1,59 @@
-"""Base class of the tools, their previews, and changes of the map. Lengths in meters."""
+"""Base class of the viewer's tools, events and draw states, and changes of the map; lengths in meters."""
 
 from dataclasses import dataclass
 
-from robocov.environment import Environment, Obstacle, Point
+from robocov.environment import Environment, Obstacle
+from robocov_app.toolkit.tool import DrawState, PointerEvent, Tool
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.passages import describe_passage_changes
 from robocov_app.viewer.session.session import Session
 
 
 @dataclass(frozen=True)
-class Preview:
-    """Preview of a tool's next action.
+class ViewerPointerEvent(PointerEvent):
+    """Position of the pointer in a pane.
 
     Attributes
     ----------
-    line : tuple of Point
-        Points of a line, m; the label is next to the last one.
-    is_closed : bool
-        Whether the line returns to its first point.
+    point, raw, reach, shift, alt, ctrl
+        See `PointerEvent`.
+    robot : int or None
+        Number of the robot under the pointer.
+    is_right : bool
+        Whether the right button is pressed instead of the left one.
+    """
+
+    robot: int | None = None
+    is_right: bool = False
+
+
+@dataclass(frozen=True)
+class ViewerDrawState(DrawState):
+    """What a tool of the viewer shows in a pane.
+
+    Attributes
+    ----------
+    line, is_closed, label
+        See `DrawState`.
     obstacle : Obstacle or None
         Obstacle that would be drawn or moved.
-    label : str
-        Text next to the last point.
     has_marks : bool
         Whether each point of the line has a mark.
     """
 
-    line: tuple[Point, ...] = ()
-    is_closed: bool = False
     obstacle: Obstacle | None = None
-    label: str = ""
     has_marks: bool = True
 
 
-class Tool:
-    """A tool that does nothing: base class of the others. Strings that methods return are shown as messages.
+class ViewerTool(Tool[Session, ViewerPointerEvent]):
+    """A tool of the viewer that does nothing: base class of the others.
 
     Attributes
     ----------
-    name : str
-        Unique name, as in the command ``tool:name``.
-    title : str
-        Name in the window.
     button_text : str
         Text of its button, if the title is too long; empty for the title.
-    key : str
-        Key that chooses the tool.
-    hint : str
-        How to use it.
     takes_robots : bool
         Whether a press acts on the robot under the cursor.
-    ends_on_double_click : bool
-        Whether a double click completes the drawing.
     uses_right_button : bool
         Whether the right button works like the left one, instead of panning.
     uses_wheel : bool
@@ -62,63 +64,19 @@ class Tool:
         Whether the density is being changed right now.
     """
 
-    name = ""
-    title = ""
     button_text = ""
-    key = ""
-    hint = ""
     takes_robots = False
-    ends_on_double_click = False
     uses_right_button = False
     uses_wheel = False
     is_resizable = False
     is_painting = False
 
-    def choose_button(self, *, is_right: bool) -> None:
-        """Take note of the button that is about to be pressed."""
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Handle a press of the button.
-
-        Parameters
-        ----------
-        session : Session
-            The session to act on.
-        point : Point
-            Position of the cursor, m.
-        reach : float
-            Width of a finger on the map, m: closer objects count as hit.
-        number : int or None
-            Number of the robot under the cursor.
-
-        Returns
-        -------
-        str or None
-            Message to show.
-        """
-        return None
-
-    def move(self, session: Session, point: Point) -> None:
-        """Handle a move of the cursor, whether a button is held down or not."""
-
-    def release(self, session: Session, point: Point) -> str | None:
-        """Handle the release of the button."""
-        return None
-
-    def finish(self, session: Session) -> str | None:
-        """Complete the drawing: Enter, a double click or a right click."""
-        return None
-
-    def cancel(self, session: Session) -> bool:
-        """Give up the action, and return whether there was one."""
-        return False
-
-    def build_preview(self, session: Session) -> Preview | None:
-        """Return the preview of the next action, if there is one."""
-        return None
+    def build_draw_state(self, session: Session) -> ViewerDrawState:
+        """Return what the tool shows in a pane."""
+        return ViewerDrawState()
 
     def resize(self, session: Session, factor: float) -> str:
-        """Multiply the size of the tool by a factor."""
+        """Multiply the size of the tool by a factor; return a message."""
         return ""
 
 

@@ -6,7 +6,7 @@ from robocov_app.viewer.tools.clicks import AddRobotTool, EraserTool, FailureToo
 from robocov_app.viewer.tools.hand import HandTool
 from robocov_app.viewer.tools.outlines import AddPolygonTool, AddWallTool
 from robocov_app.viewer.tools.segments import AddCircleTool, RulerTool
-from robocov_app.viewer.tools.tool import Tool
+from robocov_app.viewer.tools.tool import ViewerTool
 
 
 class Toolbox:
@@ -19,21 +19,21 @@ class Toolbox:
 
     Attributes
     ----------
-    by_name : dict of str to Tool
+    by_name : dict of str to ViewerTool
         The tools, in the order of the panel.
     hand : HandTool
         The tool to which Escape returns.
     wall : AddWallTool
         The tool whose width can be changed at any time.
-    current : Tool
+    current : ViewerTool
         The tool in use.
     """
 
     def __init__(self, inspection: Inspection) -> None:
         self.hand = HandTool(inspection)
         self.wall = AddWallTool()
-        self.current: Tool = self.hand
-        tools: list[Tool] = [
+        self.current: ViewerTool = self.hand
+        tools: list[ViewerTool] = [
             self.hand,
             AddPolygonTool(),
             self.wall,
@@ -47,6 +47,6 @@ class Toolbox:
         self.by_name = {tool.name: tool for tool in tools}
 
     @property
-    def resizable(self) -> Tool:
+    def resizable(self) -> ViewerTool:
         """The tool whose size the keys [ and ] change: the one in use, else the wall."""
         return self.current if self.current.is_resizable else self.wall

@@ -1,0 +1,139 @@
+"""The part of the editor that its tools know: the open map, its selection and the snap settings."""
+
+from collections.abc import Hashable
+
+from robocov.environment import Point, Ring
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Owner, Sketch
+from robocov_app.editor.tools.handles import Handle, list_handles, list_vertex_owners
+from robocov_app.editor.tools.snapping import SNAPS, Dragged, Snap, Snapper, SnapSettings, snap_point
+from robocov_app.render.surface_cache import Latest
+
+SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a line that is far off must not win over the grid
+
+
+class EditorContext:
+    """The open map, its selection and the snap settings: the part of the editor that tools know.
+
+    Parameters
+    ----------
+    document : Document
+        The open map.
+
+    Attributes
+    ----------
+    revision : int
+        Grows whenever panel and sheet have to be drawn again.
+    snaps : set of str
+        Names of the snap modes that are on; see `SNAPS`.
+    grid : float
+        Spacing of the grid, m.
+    snap_angle : float
+        Lines snap to multiples of this angle, degrees.
+    wall_width : float
+        Width of new walls, m.
+    pixel : float
+        Side of a pixel at scale 1, m.
+    message : str
+        Latest status message; empty after a few seconds.
+    has_error_message : bool
+        Whether the message reports an error.
+    now : float
+        Clock of the window, s.
+    message_time : float
+        Time at which the message appeared, s.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.revision = 0
+        self.snaps = set(SNAPS)
+        self.grid = 0.1
+        self.snap_angle = 15.0
+        self.wall_width = 0.1
+        self.pixel = 0.01
+        self.snapper = Snapper()
+        self.message = ""
+        self.has_error_message = False
+        self.now = 0.0
+        self.message_time = 0.0
+        self._handles: Latest[tuple[Handle, ...]] = Latest()
+
+    @property
+    def sketch(self) -> Sketch:
+        """The map as it is now."""
+        return self.document.history.sketch
+
+    @property
+    def selection(self) -> Selection:
+        """The selected objects and vertices."""
+        return self.document.history.selection
+
+    @property
+    def vertex_owners(self) -> tuple[Owner, ...]:
+        """Objects whose vertices are shown."""
+        return list_vertex_owners(self.selection)
+
+    @property
+    def handles(self) -> tuple[Handle, ...]:
+        """Handles of the selection."""
+        sketch = self.sketch
+        selection = self.selection
+        pixel = self.pixel
+        return self._handles.of(sketch, (selection, pixel), lambda: list_handles(sketch, selection, pixel))
+
+    def build_snap_settings(self, reach: float) -> SnapSettings:
+        """Return the snap settings for a pointer with a reach, m."""
+        kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name].kinds)
+        return SnapSettings(SNAP_REACH_FRACTION * reach, self.grid, self.snap_angle, kinds)
+
+    def snap(
+        self, raw: Point, reach: float, origin: Point | None = None, more: Ring = (), without: Dragged = ()
+    ) -> Snap:
+        """Snap a point.
+
+        Parameters
+        ----------
+        raw : Point
+            Position of the pointer, m.
+        reach : float
+            Reach of the pointer, m.
+        origin : Point, optional
+            Point from which angles count, m.
+        more : sequence of Point
+            Further points to snap to, m.
+        without : iterable of Owner or Vertex
+            Objects and vertices not to snap to, because they are dragged.
+
+        Returns
+        -------
+        Snap
+            The snapped point; the raw point while the targets of a large map are being computed.
+        """
+        targets = self.snapper.find_targets(self.sketch, without, more)
+        if targets is None:
+            return Snap(raw)
+        return snap_point(raw, targets, self.build_snap_settings(reach), origin)
+
+    def apply(self, change: Change, *, drag: Hashable | None = None) -> None:
+        """Apply a change; successive changes of the same `drag` are undone together."""
+        if self.document.history.apply(change, drag=drag):
+            self.show_message(change.description)
+        self._handle_change()
+
+    def _handle_change(self) -> None:
+        self.revision += 1
+
+    def select(self, selection: Selection) -> None:
+        """Replace the selection."""
+        if selection != self.selection:
+            self.document.history.selection = selection
+            self.revision += 1
+
+    def show_message(self, text: str, *, is_error: bool = False) -> None:
+        """Show a status message; an empty one leaves the present message."""
+        if text:
+            self.message = text
+            self.has_error_message = is_error
+            self.message_time = self.now

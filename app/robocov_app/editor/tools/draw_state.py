@@ -1,0 +1,86 @@
+"""What the tools of the editor show on the sheet; all lengths in meters."""
+
+from dataclasses import dataclass
+
+from robocov.environment import Obstacle, Point, Ring, StartSpec
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Owner, Sketch
+from robocov_app.editor.tools.handles import Handle
+from robocov_app.toolkit.tool import DrawState
+
+
+@dataclass(frozen=True)
+class CarriedItems:
+    """Obstacles that are dragged as a picture, because there are too many to move one by one.
+
+    Attributes
+    ----------
+    selection : Selection
+        The obstacles and starts that are dragged.
+    offset : tuple of float
+        Displacement, (x, y) m.
+    are_copies : bool
+        Whether the originals stay where they are.
+    """
+
+    selection: Selection
+    offset: tuple[float, float]
+    are_copies: bool
+
+
+@dataclass(frozen=True)
+class EditorDrawState(DrawState):
+    """Everything that a tool of the editor shows on the sheet.
+
+    Attributes
+    ----------
+    line, is_closed, label
+        See `DrawState`. The label is next to the cursor.
+    shows_lengths : bool
+        Whether each edge of the line has its length written next to it.
+    shapes : tuple of Obstacle
+        Obstacles that would be drawn.
+    start : StartSpec or None
+        Start that would be drawn.
+    box : tuple of Point or None
+        Opposite corners of a selection box, m.
+    box_selects_touched : bool
+        Whether the box selects what it touches, not only what lies inside.
+    rings : tuple of Ring
+        Outlines, m.
+    dots : tuple of Point
+        Marks, m.
+    chosen : int or None
+        Index of the ring or dot that stands out.
+    pending : Sketch or None
+        The map with a density or paths that are being changed.
+    background : Background or None
+        The reference image at the position to which it is dragged.
+    carried : CarriedItems or None
+        Obstacles that are dragged as a picture.
+    hovered : Owner or None
+        Object under the cursor.
+    near : Handle or None
+        Handle under the cursor.
+    shows_handles : bool
+        Whether the selection has its handles.
+    labels_cursor : bool
+        Whether the tool may write next to the cursor.
+    """
+
+    shows_lengths: bool = False
+    shapes: tuple[Obstacle, ...] = ()
+    start: StartSpec | None = None
+    box: tuple[Point, Point] | None = None
+    box_selects_touched: bool = False
+    rings: tuple[Ring, ...] = ()
+    dots: tuple[Point, ...] = ()
+    chosen: int | None = None
+    pending: Sketch | None = None
+    background: Background | None = None
+    carried: CarriedItems | None = None
+    hovered: Owner | None = None
+    near: Handle | None = None
+    shows_handles: bool = False
+    labels_cursor: bool = True

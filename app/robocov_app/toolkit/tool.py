@@ -1,0 +1,121 @@
+"""Tools: base class of the mouse actions in a map, the events that they get, and what they show."""
+
+from dataclasses import dataclass
+from math import dist
+from typing import Generic, Literal, TypeAlias, TypeVar
+
+Point: TypeAlias = tuple[float, float]
+CursorShape: TypeAlias = Literal["arrow", "cross", "hand", "move", "sideways", "updown", "rising", "falling"]
+"""Shape of the mouse cursor; "rising" and "falling" are arrows along the diagonals."""
+
+MOVED_FRACTION = 0.25
+"""Fraction of the pointer's reach from which on the pointer has moved on purpose."""
+
+
+@dataclass(frozen=True)
+class PointerEvent:
+    """Position of the pointer, and the modifier keys held down with it.
+
+    Attributes
+    ----------
+    point : (x, y), m
+        Position after snapping.
+    raw : (x, y), m
+        Position before snapping.
+    reach : float, m
+        Distance within which the pointer takes hold of something.
+    shift, alt, ctrl : bool
+        Whether the key is held down.
+    """
+
+    point: Point
+    raw: Point
+    reach: float
+    shift: bool = False
+    alt: bool = False
+    ctrl: bool = False
+
+    def has_moved_from(self, position: Point) -> bool:
+        """Return whether the pointer has moved on purpose since it was pressed at a position, m."""
+        return dist(position, self.raw) >= MOVED_FRACTION * self.reach
+
+
+@dataclass(frozen=True)
+class DrawState:
+    """What a tool shows in the map.
+
+    Attributes
+    ----------
+    line : tuple of (x, y), m
+        Points of a line with a mark at each.
+    is_closed : bool
+        Whether the line returns to its first point.
+    label : str
+        Text next to the line, or to the cursor.
+    """
+
+    line: tuple[Point, ...] = ()
+    is_closed: bool = False
+    label: str = ""
+
+
+ContextT = TypeVar("ContextT")
+EventT = TypeVar("EventT", bound=PointerEvent)
+
+
+class Tool(Generic[ContextT, EventT]):
+    """A tool that does nothing: base class of the tools of both windows.
+
+    Every method gets the context on which the tool acts: the session of the viewer, or the map and selection
+    of the editor. Texts that methods return are shown as messages.
+
+    Attributes
+    ----------
+    name : str
+        Unique name, as in the command ``tool:name``.
+    title : str
+        Name in the window.
+    key : str
+        Key that chooses the tool.
+    hint : str
+        How to use it.
+    snaps : bool
+        Whether pointer positions are snapped before the tool gets them.
+    """
+
+    name = ""
+    title = ""
+    key = ""
+    hint = ""
+    snaps = False
+
+    def press(self, context: ContextT, event: EventT) -> str | None:
+        """Handle a press of the button."""
+        return None
+
+    def double_click(self, context: ContextT, event: EventT) -> str | None:
+        """Handle the second press of a double click; by default like any other press."""
+        return self.press(context, event)
+
+    def move(self, context: ContextT, event: EventT) -> None:
+        """Handle a move of the pointer, with or without a button held down."""
+
+    def release(self, context: ContextT, event: EventT, *, clicked: bool) -> str | None:
+        """Handle the release of the button; `clicked` if the pointer has not moved since the press."""
+        return None
+
+    def finish(self, context: ContextT) -> str | None:
+        """Complete the drawing: Enter, or a right click."""
+        return None
+
+    def cancel(self, context: ContextT) -> bool:
+        """Give up the action, as Escape does; return whether there was one."""
+        return False
+
+    def build_draw_state(self, context: ContextT) -> DrawState:
+        """Return what the tool shows in the map."""
+        return DrawState()
+
+    def choose_cursor(self, context: ContextT) -> CursorShape:
+        """Return the shape of the cursor over the map."""
+        return "cross"
