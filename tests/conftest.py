@@ -27,7 +27,7 @@ os.environ["ROBOCOV_DRAFTS"] = ""
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
 
 # Which kernels are compiled already depends on earlier tests, so that commands do not report it here.
-progress._report_first_kernel = lambda kernel: None
+progress._print_compilation_notice = lambda: None
 
 # A process in the background of a script ignores SIGINT, and so do its children.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

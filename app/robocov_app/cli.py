@@ -11,7 +11,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -124,13 +124,14 @@ def _run_command(name: str, rest: list[str]) -> int:
         from robocov_app.terminal.arguments import parse_options
 
         options = parse_options(module.Arguments, name, rest)
-    if COMMANDS[name].uses_kernels:
-        from robocov_app.terminal.progress import report_compilation
-
-        report_compilation()
     from robocov_app.terminal.interruption import note_interrupts
 
-    with note_interrupts():
+    with ExitStack() as stack:
+        if COMMANDS[name].uses_kernels:
+            from robocov_app.terminal.progress import report_compilation
+
+            stack.enter_context(report_compilation())
+        stack.enter_context(note_interrupts())
         status = module.command(options)
     sys.stdout.flush()
     return int(status or OK)

@@ -19,8 +19,8 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -38,9 +38,8 @@ _MAX_KEPT_VERSIONS = 4
 _MIN_UNUSED_DAYS = 1.0
 """Machine code that was used more recently is kept in any case: a program may still be running with it."""
 
-on_compile: list[Callable[[str], None]] = []
-"""Functions that are called with the name of each kernel right before it is compiled."""
-
+_compilation_listeners: list[Callable[[str], None]] = []
+"""Functions that `notify_compilation` calls."""
 _lock = threading.RLock()
 _is_cache_usable = True
 _must_interpret: Callable[[str], bool] | None = None
@@ -255,11 +254,11 @@ def _import_numba() -> ModuleType:
         return typeof(called.get_dispatcher())
 
     class CompilationListener(event.Listener):
-        """Passes the names of kernels on to `on_compile`."""
+        """Passes the names of kernels to the functions of `notify_compilation`."""
 
         def on_start(self, started: Any) -> None:
             """Report the kernel that is compiled."""
-            for report in tuple(on_compile):
+            for report in tuple(_compilation_listeners):
                 report(started.data["dispatcher"].__name__)
 
         def on_end(self, ended: Any) -> None:
@@ -267,6 +266,22 @@ def _import_numba() -> ModuleType:
 
     register("numba:compile", CompilationListener())
     return numba
+
+
+@contextmanager
+def notify_compilation(report: Callable[[str], None]) -> Iterator[None]:
+    """Call a function right before each compilation of a kernel, as long as the context is open.
+
+    Parameters
+    ----------
+    report : callable
+        Called with the name of the kernel.
+    """
+    _compilation_listeners.append(report)
+    try:
+        yield
+    finally:
+        _compilation_listeners.remove(report)
 
 
 @functools.cache

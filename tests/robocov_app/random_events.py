@@ -14,7 +14,7 @@ import pygame
 from driven_window import MODIFIERS, key_event
 
 from robocov.mapfile import list_bundled_maps, load_map, save_map
-from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.web import events as page_events
 
@@ -160,7 +160,8 @@ class RandomEvents:
         self.window = window
         self.random = random.Random(seed)
         self.files = write_odd_files(folder)
-        self.page = page_events.EventTranslator()
+        self.clipboard = Clipboard()
+        self.page = page_events.EventTranslator(self.clipboard)
         self.at = (5, 5)
         self.held: list[int] = []
         self.pressed: dict[str, int] = {}
@@ -236,7 +237,7 @@ class RandomEvents:
         self.post(pygame.TEXTEDITING, text=self.random.choice((*WORDS, "", "")), start=0, length=0)
 
     def paste(self) -> None:
-        clipboard.put(self.random.choice((*PASTED, *WORDS)))
+        self.clipboard.put(self.random.choice((*PASTED, *WORDS)))
         self.post_key(self.random.choice(("ctrl+v", "ctrl+shift+v")))
 
     def drop_file(self) -> None:

@@ -82,10 +82,10 @@ def command(options: Arguments) -> None:
     # These variables are read when numpy is loaded, which `report_compilation` does.
     for name in _THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
-    report_compilation()
-    cases = _collect_cases(options.part, is_quick=options.quick)
     rows: list[Row] = []
-    interruption = _measure(cases, rows, quiet=options.json)
+    with report_compilation():
+        cases = _collect_cases(options.part, is_quick=options.quick)
+        interruption = _measure(cases, rows, quiet=options.json)
     if options.plot is not None and rows:
         from robocov_app.bench.plot import save_ratios
         from robocov_app.look.theme import get_theme

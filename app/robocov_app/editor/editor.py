@@ -33,6 +33,7 @@ from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.snapping import SNAPS, count_vertices
 from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.jobs.workers import Worker
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
 from robocov_app.toolkit.faults import describe_os_error
 
@@ -88,6 +89,8 @@ class Editor(EditorContext):
         Problem whose message is shown on the sheet.
     dialogs : Dialogs
         The open dialog.
+    clipboard : Clipboard
+        Text that is copied and pasted.
     cursor : Point or None
         Position of the pointer over the map, m.
     typed : str
@@ -126,6 +129,7 @@ class Editor(EditorContext):
         self.measurement: Measurement | None = None
         self.problem: Problem | None = None
         self.dialogs = Dialogs()
+        self.clipboard = Clipboard()
         self.cursor: Point | None = None
         self.typed = ""
         self.moves_since: float | None = None

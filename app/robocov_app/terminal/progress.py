@@ -106,16 +106,22 @@ def make_counter(update: Callable[[int], None]) -> Callable[[], None]:
     return lambda: update(next(numbers))
 
 
-def report_compilation() -> None:
+@contextmanager
+def report_compilation() -> Iterator[None]:
     """Print a line when the first kernel is compiled, which makes the first command slow."""
-    from robocov import compiled
+    from robocov.compiled import notify_compilation
 
-    if _report_first_kernel not in compiled.on_compile:
-        compiled.on_compile.append(_report_first_kernel)
+    has_reported = False
+
+    def report(_: str) -> None:
+        nonlocal has_reported
+        if not has_reported:
+            has_reported = True
+            _print_compilation_notice()
+
+    with notify_compilation(report):
+        yield
 
 
-def _report_first_kernel(_: str) -> None:
-    from robocov import compiled
-
-    compiled.on_compile.remove(_report_first_kernel)
+def _print_compilation_notice() -> None:
     echo("compiling the simulation, once", to_stderr=True)

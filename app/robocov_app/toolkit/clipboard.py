@@ -8,21 +8,26 @@ from robocov.text import remove_controls
 
 _NOT_AVAILABLE = (pygame.error, AttributeError, ValueError)  # ValueError: a text that is not UTF-8
 
-_own_text = ""
 
+class Clipboard:
+    """The system's clipboard, which all windows share.
 
-def get() -> str:
-    """Return the text on the clipboard without control characters; empty if there is none."""
-    text = ""
-    with suppress(*_NOT_AVAILABLE):
-        if pygame.scrap.has_text():
-            text = pygame.scrap.get_text()
-    return remove_controls(text) or _own_text
+    Where the display has no clipboard, the text that was put last stays in this object.
+    """
 
+    def __init__(self) -> None:
+        self._own_text = ""
 
-def put(text: str) -> None:
-    """Put a text on the clipboard, without control characters."""
-    global _own_text
-    _own_text = remove_controls(text)
-    with suppress(*_NOT_AVAILABLE):
-        pygame.scrap.put_text(_own_text)
+    def get(self) -> str:
+        """Return the text on the clipboard without control characters; empty if there is none."""
+        text = ""
+        with suppress(*_NOT_AVAILABLE):
+            if pygame.scrap.has_text():
+                text = pygame.scrap.get_text()
+        return remove_controls(text) or self._own_text
+
+    def put(self, text: str) -> None:
+        """Put a text on the clipboard, without control characters."""
+        self._own_text = remove_controls(text)
+        with suppress(*_NOT_AVAILABLE):
+            pygame.scrap.put_text(self._own_text)

@@ -13,6 +13,7 @@ from pygame import Rect, Surface
 
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
 from robocov_app.toolkit.open_list import OpenList
 from robocov_app.toolkit.row_layout import RowLayout
@@ -78,6 +79,8 @@ class Page(RowLayout):
         Distance from the start of the knob that is dragged to the pointer, px.
     edit : TextEdit or None
         Text with the cursor, if the focused widget has one.
+    clipboard : Clipboard
+        Text that is copied from text fields and pasted into them.
     open_list : OpenList or None
         List that hangs from a drop-down menu.
     widgets : dict of str to Widget
@@ -101,6 +104,7 @@ class Page(RowLayout):
         self.active: str | None = None
         self.grab_offset = 0.0
         self.edit: TextEdit | None = None
+        self.clipboard = Clipboard()
         self.open_list: OpenList | None = None
         self.widgets: dict[str, Widget] = {}
         self.folded_sections: set[str] = set()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from robocov.text import remove_controls
-from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.clipboard import Clipboard
 
 MAX_CHARS = 10_000
 """Characters of a field: as many as the longest texts in maps have."""
@@ -79,13 +79,15 @@ class TextEdit:
             self._replace(low, high, line, is_typing=len(line) == 1)
         self.composed = ""
 
-    def press_key(self, name: str) -> None:
+    def press_key(self, name: str, clipboard: Clipboard) -> None:
         """Edit the text by a key; keys that mean nothing here are ignored.
 
         Parameters
         ----------
         name : str
             Name with modifiers, as in ``ctrl+z``.
+        clipboard : Clipboard
+            Text that is copied and pasted.
         """
         key = name.replace("shift+", "")
         if key == "ctrl+y" or name == "ctrl+shift+z":
@@ -98,7 +100,7 @@ class TextEdit:
         elif erase_key in targets:
             self._erase(targets[erase_key])
         else:
-            self._press_ctrl_key(key)
+            self._press_ctrl_key(key, clipboard)
 
     def _find_targets(self) -> dict[str, int]:
         """Return where the keys that move the caret put it."""
@@ -134,7 +136,7 @@ class TextEdit:
         if 0 <= start < end <= len(self.text):
             self._replace(start, end, "")
 
-    def _press_ctrl_key(self, key: str) -> None:
+    def _press_ctrl_key(self, key: str, clipboard: Clipboard) -> None:
         start, end = self.selection
         if key == "ctrl+a":
             self.anchor = 0

@@ -1,4 +1,4 @@
-"""Restriction of a process to the files below one folder, whatever a visitor types in a served window."""
+"""Restriction of a process to the files below one folder, for windows that visitors use."""
 
 import os
 import sys
@@ -6,7 +6,6 @@ import sysconfig
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,34 +26,47 @@ _PATH_COUNTS = {
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _SYSTEM_FOLDERS = ("/dev", "/proc", "/usr/share")
 
-_readable: tuple[Path, ...] | None = None  # None: no restriction
-_writable: tuple[Path, ...] = ()
-
 
 class OutsideError(InputError, PermissionError):
     """A file that is not below the folder of a served window."""
 
 
-def _audit(event: str, arguments: tuple[Any, ...]) -> None:
-    """Raise OutsideError if an event of Python's audit hook is about a file that is not allowed."""
-    if _readable is None or event not in _PATH_COUNTS:
-        return
-    is_reading = event in _READING_EVENTS
-    if event == "open" and not (arguments[2] or 0) & _WRITE_FLAGS:
-        is_reading = True
-    for argument in arguments[: _PATH_COUNTS[event]]:
-        if not isinstance(argument, str | bytes | os.PathLike):
-            continue  # The number of a file that is already open.
-        path = Path(os.path.realpath(os.fsdecode(argument)))
-        is_compiled_code = "__pycache__" in path.parts
-        roots = _readable if is_reading or is_compiled_code else _writable
-        if not any(path.is_relative_to(root) for root in roots):
-            raise OutsideError(f"{os.fsdecode(argument)}: outside of the folder that is served")
+class FileConfinement:
+    """Restriction of this process to files below some folders, however their names came about.
 
+    Parameters
+    ----------
+    readable, writable : tuple of Path
+        Folders from which files may be read, and in which they may be written, without symbolic links.
 
-@cache
-def _add_hook() -> None:
-    sys.addaudithook(_audit)  # Hooks cannot be removed.
+    Attributes
+    ----------
+    is_active : bool
+        Whether the restriction holds.
+    """
+
+    def __init__(self, readable: tuple[Path, ...], writable: tuple[Path, ...]) -> None:
+        self.is_active = True
+        self._readable = readable
+        self._writable = writable
+        # Python cannot remove the hook, which does nothing once the confinement is no longer active.
+        sys.addaudithook(self.check_event)
+
+    def check_event(self, event: str, arguments: tuple[Any, ...]) -> None:
+        """Raise OutsideError if an event of Python's audit hooks is about a file that is not allowed."""
+        if not self.is_active or event not in _PATH_COUNTS:
+            return
+        is_reading = event in _READING_EVENTS
+        if event == "open" and not (arguments[2] or 0) & _WRITE_FLAGS:
+            is_reading = True
+        for argument in arguments[: _PATH_COUNTS[event]]:
+            if not isinstance(argument, str | bytes | os.PathLike):
+                continue  # The number of a file that is already open.
+            path = Path(os.path.realpath(os.fsdecode(argument)))
+            is_compiled_code = "__pycache__" in path.parts
+            roots = self._readable if is_reading or is_compiled_code else self._writable
+            if not any(path.is_relative_to(root) for root in roots):
+                raise OutsideError(f"{os.fsdecode(argument)}: outside of the folder that is served")
 
 
 @contextmanager
@@ -62,6 +74,7 @@ def confine_files(folder: Path) -> Iterator[None]:
     """Let the process read and write only files below a folder, and read the files of programs.
 
     The restriction holds for every file that Python opens, whether it is typed, named in a session or linked.
+    Temporary files are written to a folder of their own, which is removed at the end.
 
     Parameters
     ----------
@@ -72,23 +85,29 @@ def confine_files(folder: Path) -> Iterator[None]:
     OutsideError
         Where another file is opened.
     """
-    global _readable, _writable
-    _add_hook()
-    programs = _list_program_folders()
     arrays = ArrayCache.open_default()
-    caches = [
-        cache_folder for cache_folder in (open_cache_folder(), arrays and arrays.folder) if cache_folder
-    ]
-    previous_temporary_folder = tempfile.tempdir
-    with tempfile.TemporaryDirectory(prefix="robocov-") as temporary_folder:
-        tempfile.tempdir = temporary_folder
-        _writable = _resolve_all([folder, temporary_folder, os.devnull, "/dev/shm", *caches])
-        _readable = (*_writable, *_resolve_all(programs))
+    caches = [open_cache_folder(), None if arrays is None else arrays.folder]
+    used_caches = [cache_folder for cache_folder in caches if cache_folder is not None]
+    programs = _list_program_folders()
+    with _use_own_temporary_folder() as temporary_folder:
+        writable = _resolve_all([folder, temporary_folder, os.devnull, "/dev/shm", *used_caches])
+        confinement = FileConfinement((*writable, *_resolve_all(programs)), writable)
         try:
             yield
         finally:
-            _readable = None
-            tempfile.tempdir = previous_temporary_folder
+            confinement.is_active = False
+
+
+@contextmanager
+def _use_own_temporary_folder() -> Iterator[str]:
+    """Let `tempfile`, also in libraries, create files in a new folder, which is removed at the end."""
+    previous_folder = tempfile.tempdir
+    with tempfile.TemporaryDirectory(prefix="robocov-") as folder:
+        tempfile.tempdir = folder
+        try:
+            yield folder
+        finally:
+            tempfile.tempdir = previous_folder
 
 
 def _list_program_folders() -> list[str | Path]:

@@ -8,7 +8,7 @@ import pygame
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter
 from pygame.event import Event
 
-from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.clipboard import Clipboard
 
 MIN_PAGE_SIDE_PX = 200
 MAX_PAGE_SIDE_PX = 7680
@@ -193,9 +193,16 @@ _MODIFIERS = (pygame.KMOD_LSHIFT, pygame.KMOD_LCTRL, pygame.KMOD_LALT, pygame.KM
 
 
 class EventTranslator:
-    """Translates messages of a page to events of pygame; remembers the pointer and its button."""
+    """Translates messages of a page to events of pygame; remembers the pointer and its button.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    clipboard : Clipboard
+        Clipboard on which a text is put that the page pastes.
+    """
+
+    def __init__(self, clipboard: Clipboard) -> None:
+        self._clipboard = clipboard
         self._position = (0, 0)
         self._pressed_button = 0
 
@@ -223,7 +230,7 @@ class EventTranslator:
                 for character in message.text:
                     yield from _press_key(_CHARACTER_KEYS.get(character, character))
             case TextPasted():
-                clipboard.put(message.text)
+                self._clipboard.put(message.text)
                 yield from _press_key("v", held=_CTRL)
             case Uploaded():
                 yield Event(pygame.DROPFILE, file=message.path)

@@ -22,7 +22,7 @@ import numpy as np
 import pygame
 
 from robocov.errors import InputError
-from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.web import events
 from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
@@ -89,6 +89,8 @@ class WebDisplay:
         Addresses of the page, while the server runs.
     shared : SharedWindow
         What all pages have in common.
+    clipboard : Clipboard
+        Text that the controlling page pastes, and that was copied in the window.
     saved_files : tuple of str
         Names of the files that pages may download.
     """
@@ -105,11 +107,12 @@ class WebDisplay:
         token_hash = sha256(self.token.encode()).hexdigest()
         self._cookie_name = f"robocov-{token_hash[:_COOKIE_HASH_CHARACTERS]}"
         self._file_executor = ThreadPoolExecutor(1, thread_name_prefix="web-files")
+        self.clipboard = Clipboard()
         pages = Pages(self._handle_control_change)
         self.shared = SharedWindow(
             pages=pages,
             delivery=FrameDelivery(pages),
-            window_input=WindowInput(),
+            window_input=WindowInput(self.clipboard),
             folder=folder,
             file_executor=self._file_executor,
         )
@@ -162,7 +165,7 @@ class WebDisplay:
             "cursor": _CSS_CURSORS.get(cursor, "default"),
             "title": next(iter(pygame.display.get_caption()), "robocov"),
             "saved": self.saved_files,
-            "copied": clipboard.get()[:MAX_COPIED_CHARACTERS],
+            "copied": self.clipboard.get()[:MAX_COPIED_CHARACTERS],
         }
         if state != self.shared.state:
             self.shared.state = state

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pygame
 
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.web.events import EventTranslator, InputMessage, PageChanged, Uploaded, get_modifiers
 
 if TYPE_CHECKING:
@@ -25,14 +26,19 @@ class WindowInput:
     """Messages and settings of the controlling page, on their way to the window.
 
     The server's thread calls `put` and `set_page`, the window's thread `wait` and `post`.
+
+    Parameters
+    ----------
+    clipboard : Clipboard
+        Clipboard on which a text is put that the page pastes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clipboard: Clipboard) -> None:
         self._messages: deque[InputMessage | Uploaded] = deque()
         self._page: PageChanged | None = None
         self._fitted_page: PageChanged | None = None
         self._is_narrow = False
-        self._translator = EventTranslator()
+        self._translator = EventTranslator(clipboard)
         self._held = 0
         self._has_arrived = threading.Event()
 

@@ -15,7 +15,6 @@ from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.ui.commands import GROUPS
 from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, list_typed_commands
-from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.palette import list_options
 
@@ -153,15 +152,15 @@ def test_copies_go_through_the_clipboard_also_to_another_window(hands: Hands, tm
     assert len(hands.shapes) == 7
     hands.key("ctrl+x")
     assert len(hands.shapes) == 5
-    text = clipboard.get()
+    text = hands.editor.clipboard.get()
     with opened_editor(tmp_path) as other:
-        clipboard.put(text)
+        other.editor.clipboard.put(text)
         other.key("ctrl+shift+v")
         assert len(other.shapes) == 2
-        clipboard.put("no map at all")
+        other.editor.clipboard.put("no map at all")
         other.key("ctrl+v")
         assert other.editor.has_error_message and len(other.shapes) == 2
-        clipboard.put("")
+        other.editor.clipboard.put("")
         other.key("ctrl+v")
         assert "empty" in other.said
 

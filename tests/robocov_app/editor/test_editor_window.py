@@ -16,7 +16,8 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.fields import format_number
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import TABS
-from robocov_app.toolkit import clipboard, help_page
+from robocov_app.toolkit import help_page
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.layout import MIN_SIZE_PX
 from robocov_app.toolkit.menu import Menu
@@ -358,6 +359,7 @@ def test_the_title_of_the_window_tells_what_is_unsaved(hands: Hands) -> None:
 
 def test_the_clipboard_keeps_texts_also_without_a_display() -> None:
     pygame.display.quit()
+    clipboard = Clipboard()
     clipboard.put("text")
     assert clipboard.get() == "text"
 

@@ -1,7 +1,10 @@
 import re
+from typing import Any
 
 import pytest
 
+from robocov.compiled import kernel
+from robocov_app.terminal import progress
 from robocov_app.terminal.progress import show_progress
 
 
@@ -29,3 +32,17 @@ def test_a_bar_in_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: py
     assert said.out == ""
     assert "counting" in said.err
     assert "3/3" in said.err
+
+
+def test_only_the_first_compiled_kernel_of_a_command_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    notices: list[str] = []
+    monkeypatch.setattr(progress, "_print_compilation_notice", lambda: notices.append("compiling"))
+    # Functions without a file are not cached, so that they are compiled each time the test runs.
+    namespace: dict[str, Any] = {}
+    exec("def halve(x): return 0.5 * x\ndef double(x): return 2.0 * x", namespace)
+    halve = kernel(namespace["halve"])
+    double = kernel(namespace["double"])
+    with progress.report_compilation():
+        assert halve(3.0) == 1.5
+        assert double(3.0) == 6.0
+    assert notices == ["compiling"]

@@ -14,7 +14,8 @@ from sample_sessions import start_session
 
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
-from robocov_app.toolkit import clipboard, faults
+from robocov_app.toolkit import faults
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.display import open_display, set_title
 from robocov_app.toolkit.faults import LOG_FILE, FaultLog
 from robocov_app.toolkit.input import clean_event
@@ -152,6 +153,7 @@ def test_where_no_log_file_can_be_written_it_is_standard_error(tmp_path: Path, c
 
 
 def test_no_control_character_comes_in(tmp_path: Path) -> None:
+    clipboard = Clipboard()
     with open_display(headless=True):
         for text in ("a\x00b", f"a{CONTROLS}b"):
             clipboard.put(text)
@@ -166,7 +168,7 @@ def test_no_control_character_comes_in(tmp_path: Path) -> None:
         set_title(f"a{CONTROLS}b")
         assert pygame.display.get_caption()[0] == "ab"
         message = MESSAGES.validate_json(json.dumps({"kind": "paste", "text": "a\x00b"}))
-        assert list(EventTranslator().translate(message))
+        assert list(EventTranslator(clipboard).translate(message))
         assert clipboard.get() == "ab"
 
 

@@ -12,7 +12,6 @@ from driven_window import opened
 
 from robocov.errors import InputError
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Argument, Command, CommandTable
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, create_file_choice
 from robocov_app.toolkit.menu import Menu
@@ -118,7 +117,7 @@ def test_a_field_replaces_undoes_and_gives_its_text_with_enter(page: Page) -> No
     page.draw()
     assert page.text() == "8"  # letters that follow each other are undone together
     page.keys("ctrl+y", "ctrl+a", "ctrl+c", "return")
-    assert page.name == "12" and not page.ui.edit and clipboard.get() == "12"
+    assert page.name == "12" and not page.ui.edit and page.ui.clipboard.get() == "12"
     page.press("entry", "name")
     page.keys("backspace", "escape")
     page.draw()

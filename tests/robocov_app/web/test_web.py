@@ -3,6 +3,7 @@
 import errno
 import json
 import socket
+import tempfile
 import time
 import unicodedata
 import urllib.error
@@ -23,7 +24,7 @@ from robocov.compiled import open_cache_folder
 from robocov.errors import InputError, RobocovError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
-from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.input import get_key_name
 from robocov_app.web.confined import OutsideError, confine_files
 from robocov_app.web.events import (
@@ -87,7 +88,7 @@ def test_a_picture_without_a_change_is_empty():
 )
 def test_keys_have_the_names_that_the_window_knows(key, held, name):
     told = json.dumps({"kind": "key", "key": key, "down": True, "held": held})
-    event = next(EventTranslator().translate(MESSAGES.validate_json(told)))
+    event = next(EventTranslator(Clipboard()).translate(MESSAGES.validate_json(told)))
     assert get_key_name(event) == name
 
 
@@ -111,7 +112,7 @@ def test_whatever_a_page_tells_is_understood_or_refused(told):
     except ValueError:
         return
     if not isinstance(message, PageChanged | FrameShown | Control | Named | UploadStarted):
-        for event in EventTranslator().translate(message):
+        for event in EventTranslator(Clipboard()).translate(message):
             assert event.type
 
 
@@ -280,7 +281,7 @@ def test_a_page_that_lost_its_line_is_known_again(display):
 
 
 def test_what_is_held_is_let_go_when_control_passes():
-    hands, at = EventTranslator(), {"kind": "button", "x": 5, "y": 6, "button": 1}
+    hands, at = EventTranslator(Clipboard()), {"kind": "button", "x": 5, "y": 6, "button": 1}
     told = ({**at, "down": True}, {"kind": "blur"}, {"kind": "blur"})
     found = [[each.type for each in hands.translate(MESSAGES.validate_json(json.dumps(one)))] for one in told]
     assert found[1:] == [[pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST], [pygame.WINDOWFOCUSLOST]]
@@ -302,7 +303,7 @@ def test_a_port_that_is_taken_is_told_in_a_line(display):
 
 
 def test_only_who_controls_sees_the_clipboard(display):
-    clipboard.put("a secret")
+    display.clipboard.put("a secret")
     surface = pygame.Surface((20, 20), 0, 32)
     with socket_of(display, Cookie=cookie_of(display)) as teacher, watcher_of(display) as pupil:
         display.send(surface)
@@ -525,7 +526,8 @@ CONTROL_CHARACTERS = st.text(
 def test_events_of_a_window_have_no_control_characters(text, kind):
     told = {"kind": kind, "key": text, "down": True} if kind == "key" else {"kind": kind, "text": text}
     message = MESSAGES.validate_json(json.dumps(told))
-    for event in EventTranslator().translate(message):
+    clipboard = Clipboard()
+    for event in EventTranslator(clipboard).translate(message):
         written = getattr(event, "unicode", "") + getattr(event, "text", "")
         assert all(unicodedata.category(each) != "Cc" for each in written)
     if kind == "paste":
@@ -534,7 +536,9 @@ def test_events_of_a_window_have_no_control_characters(text, kind):
 
 def test_a_telephones_line_break_is_enter():
     message = MESSAGES.validate_json(json.dumps({"kind": "text", "text": "7\n"}))
-    keys = [event.key for event in EventTranslator().translate(message) if event.type == pygame.KEYDOWN]
+    keys = [
+        event.key for event in EventTranslator(Clipboard()).translate(message) if event.type == pygame.KEYDOWN
+    ]
     assert keys == [pygame.K_7, pygame.K_RETURN]
 
 
@@ -675,3 +679,19 @@ def test_a_served_window_reads_and_writes_below_its_folder_alone(tmp_path):
         with pytest.raises(RobocovError, match="outside"):
             load_map(outside)
     assert outside.read_text() == "{}"
+
+
+def test_after_a_confinement_files_and_the_temporary_folder_are_as_before(tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    previous = tempfile.gettempdir()
+    with confine_files(folder):
+        temporary_folder = Path(tempfile.gettempdir())
+        assert temporary_folder != Path(previous)
+        with confine_files(folder), pytest.raises(OutsideError):
+            (tmp_path / "inner").mkdir()
+        with pytest.raises(OutsideError):
+            (tmp_path / "outer").mkdir()
+    assert tempfile.gettempdir() == previous
+    assert not temporary_folder.exists()
+    (tmp_path / "later").mkdir()

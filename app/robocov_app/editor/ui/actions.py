@@ -10,7 +10,6 @@ from robocov_app.editor.edits import clipboard, density, fixes, paths, propertie
 from robocov_app.editor.model import require
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
-from robocov_app.toolkit import clipboard as system_clipboard
 
 Edit = Callable[..., Change]
 FAR_STEPS = 10  # grid steps by which arrows nudge with Shift
@@ -71,7 +70,7 @@ def delete(editor: Editor) -> None:
 def copy(editor: Editor) -> str:
     """Copy the selected objects to the clipboard; return the status message."""
     selection = select_owners(editor.selection)
-    system_clipboard.put(clipboard.copy_selection(editor.sketch, selection))
+    editor.clipboard.put(clipboard.copy_selection(editor.sketch, selection))
     return f"copied: {selection.describe(editor.sketch)}"
 
 
@@ -83,7 +82,7 @@ def cut(editor: Editor) -> None:
 
 def paste(editor: Editor, position: Point | None) -> None:
     """Paste the clipboard at a position, m, or where it was copied."""
-    text = system_clipboard.get()
+    text = editor.clipboard.get()
     require(text.strip(), "the clipboard is empty")
     grid = editor.grid if "grid" in editor.snaps else None
     editor.apply(clipboard.paste(editor.sketch, text, position, grid))

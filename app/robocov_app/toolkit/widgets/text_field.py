@@ -91,7 +91,7 @@ def _read_input(page: Page, key: str, rect: Rect) -> str | None:
     if name in ENTER_KEYS:
         page.stop_typing()
         return edit.text
-    edit.press_key(name)
+    edit.press_key(name, page.clipboard)
     return None
 
 
