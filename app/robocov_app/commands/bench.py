@@ -74,7 +74,7 @@ class Arguments(FigureOptions):
     part: Annotated[tyro.conf.Positional[PartName], tyro.conf.arg(metavar="PART")] = "all"
     """Part to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
     quick: bool = False
-    """Fewer cases and rounds: some ten seconds."""
+    """Fewer cases and rounds: about ten seconds."""
 
 
 def command(options: Arguments) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.ui.window import EditorWindow
 
 _SCREENSHOT_FRAMES = 3
-"""Number of frames after which the layout of a window does not change any more."""
+"""Number of frames after which the layout of a window no longer changes."""
 _SCREENSHOT_FRAME_S = 0.2
 
 

@@ -223,7 +223,7 @@ class VideoOptions(LayerOptions):
         require_number("--film-speed", self.film_speed, 0.01, 1e4)
         self.parse_size()
         if self.video:
-            # Rather now than after the run.
+            # Fail now rather than after the run.
             from robocov_app.runs.encoding import find_encoder
 
             find_encoder()
@@ -352,7 +352,7 @@ class RunOptions(ScenarioOptions, JsonOption):
 
     @property
     def record_every(self) -> int:
-        """The record keeps one step in this number."""
+        """Number of steps from one recorded step to the next."""
         if self.record_hz is None:
             rows = self.duration / self.dt * self.robots
             return math.ceil(max(rows / MAX_DEFAULT_RECORD_ROWS, 1.0))

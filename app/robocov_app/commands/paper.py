@@ -40,7 +40,7 @@ class Arguments(JsonOption):
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the results; an unfinished study in it is resumed."""
     quick: bool = False
-    """Run a small study of some minutes as a check; the full one takes two hours or more."""
+    """Run a small study of a few minutes as a check; the full one takes two hours or more."""
     figures_only: bool = False
     """Only the figures, without the claims."""
     without_beyond: bool = False

@@ -43,7 +43,7 @@ class Arguments(JsonOption):
     theme: Literal["auto", "light", "dark"] = "auto"
     """Colors; auto follows the reader's preference."""
     optimum: bool = False
-    """Search for the best placement on each map, some seconds each; cached ones are always used."""
+    """Search for the best placement on each map, a few seconds each; cached ones are always used."""
 
 
 def command(options: Arguments) -> None:
@@ -65,7 +65,7 @@ def command(options: Arguments) -> None:
 def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
     """Return the result folders at a path, each with its description.
 
-    A session is simulated first, into the scratch folder. A story has one folder for each of its parts.
+    A session is simulated first, into the scratch folder. A branch has one folder for each of its parts.
     """
     from robocov_app.viewer.branch_output.folders import list_part_folders
 
@@ -75,8 +75,8 @@ def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
 
     run_options = run.Arguments(map=str(path), out=scratch / path.stem, all_branches=True, json=True)
     with Interruption() as interruption:
-        stories = [Path(answer["out"]) for answer in run.save_branches(run_options, interruption)]
-    return [section for story in stories for section in list_part_folders(story)]
+        branch_folders = [Path(answer["out"]) for answer in run.save_branches(run_options, interruption)]
+    return [section for folder in branch_folders for section in list_part_folders(folder)]
 
 
 def _write_report(
@@ -207,5 +207,5 @@ def check_target(target: Path, *, overwrite: bool) -> None:
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):
-        way_out = "choose another --out or pass --overwrite"
-        raise InputError(f"{target}: the file is no report of robocov; {way_out}")
+        advice = "choose another --out or pass --overwrite"
+        raise InputError(f"{target}: the file is not a report of robocov; {advice}")

@@ -1,7 +1,7 @@
-"""Searches for the best placement on a map, in processes of their own.
+"""Searches for the best placement on a map, in separate processes.
 
-A reference placement is the best of many descents with the whole map known. Its mean distance J_ref is what
-the gap J / J_ref - 1 of a controller is measured by.
+A reference placement is the best result of many descents with the whole map known. With its mean distance
+J_ref, the gap of a controller is J / J_ref - 1.
 """
 
 import hashlib
@@ -138,7 +138,7 @@ def answer_queries(
     def answer_query(name: str) -> tuple[str, Any]:
         reply = ask_process(thread_state.process, queries[name])
         if reply is None:
-            raise OutputError(f"references: the process that searched for that of {name} has ended")
+            raise OutputError(f"reference of map {name!r}: the process of the search has ended")
         if reply.answer is None:
             raise OutputError(f"reference of map {name!r}: {reply.trouble}")
         return name, reply.answer
@@ -151,7 +151,7 @@ def answer_queries(
             for future in done:
                 yield future.result()
     finally:
-        # A search takes seconds or minutes. After an interruption nobody should have to wait for it.
+        # A search takes seconds or minutes, for which the user should not wait after an interruption.
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.kill()

@@ -28,7 +28,7 @@ MAX_TIME_INTERVALS = 8
 MIN_TIME_LIMIT_S = 10.0
 """A growing axis of times shows at least this many seconds."""
 _MIN_VALUE = 1e-3
-"""Equal values that are nearer to zero than this get the axis of this value."""
+"""If all values are equal and nearer to zero than this, the axis is that of this value."""
 
 
 class Axis(NamedTuple):
@@ -100,7 +100,7 @@ def choose_tick_step(span: float, max_intervals: float) -> float:
     """
     min_step = span / max(max_intervals, 1.0)
     power = 10.0 ** math.floor(math.log10(min_step))
-    # A step that is too small by a rounding error is large enough.
+    # A step may be too small by a rounding error.
     step = next(factor * power for factor in TICK_FACTORS if factor * power >= 0.999 * min_step)
     return float(f"{step:.12g}")
 
@@ -115,8 +115,8 @@ def list_ticks(start: float, end: float, step: float) -> Array:
 def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> Axis:
     """Choose the axis of curves that grow while they are watched.
 
-    Costs fall at first, so there is space for values that are still lower, and the start is a multiple of the
-    step: the axis moves seldom.
+    Costs fall at first. The axis has space for lower values, and starts at a multiple of the step, so that it
+    seldom changes.
 
     Parameters
     ----------
@@ -146,9 +146,9 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
 
 
 def choose_growing_time_limit(end_s: float) -> float:
-    """Choose where the axis of times ends while time passes.
+    """Choose the end of the axis of times while time passes.
 
-    It ends a little after the present, at a round time, so that it moves seldom.
+    It is a round time a little after the present, so that the axis seldom changes.
 
     Examples
     --------

@@ -118,9 +118,9 @@ def _choose_first_styles(controllers: Sequence[str]) -> dict[str, CurveStyle]:
 
 
 def _iterate_other_styles() -> Iterator[CurveStyle]:
-    """Yield 25 styles that differ, over and over.
+    """Yield 25 different styles, over and over.
 
-    After all colors have been used, they are combined with the next shape each.
+    After all colors have been used, each color is combined with the next shape, and so on.
     """
     count = len(OTHER_SHAPES)
     styles = []

@@ -46,7 +46,8 @@ def choose_robot_hues(
     Returns
     -------
     (n,) int array
-        Indices into `Theme.robots`: one for each robot up to `MAX_OWN_HUES`, else below `N_SHARED_HUES`.
+        Indices into `Theme.robots`: a different one for each of up to `MAX_OWN_HUES` robots; below
+        `N_SHARED_HUES` in larger teams.
     """
     if n <= MAX_OWN_HUES:
         return np.arange(n, dtype=np.intp)
@@ -62,7 +63,7 @@ def choose_robot_hues(
 
 
 def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
-    """Change the hues of cells that conflict, and of few others; return None if that does not end."""
+    """Change the hues of conflicting cells, and of few others; return None if that does not converge."""
     visits = np.zeros(len(hues), dtype=int)
     flat = adjacency.ravel()
     hue_pairs = hues[adjacency]
@@ -91,8 +92,8 @@ def _repair_hues(hues: IntArray, adjacency: IntArray) -> IntArray | None:
 def _color_graph(n: int, adjacency: IntArray) -> IntArray:
     """Color a graph by DSATUR, using all hues about equally often.
 
-    DSATUR (Brelaz, 1979) colors the vertex next that has neighbors of the most different colors. If these are
-    all, it gets the rarest of them.
+    DSATUR (Brelaz, 1979) next colors the vertex whose neighbors have the most different colors. If they have
+    all colors, the vertex gets the one that is rarest among them.
     """
     neighbors: list[list[int]] = [[] for _ in range(n)]
     for first, second in adjacency.tolist():
@@ -144,7 +145,7 @@ def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> l
 
 
 def choose_trail_color(theme: Theme, hue: int) -> Color:
-    """Choose the color of a trajectory: its robot's hue, as much darker as its cell demands."""
+    """Choose the color of a trajectory: its robot's hue, darkened until it contrasts with the cell."""
     cell_color = theme.get_cell_color(hue)
     fraction = 0.12
     color = mix(theme.robots[hue], theme.ink, fraction)

@@ -228,7 +228,7 @@ def get_theme(name: str | Theme) -> Theme:
     Raises
     ------
     ParameterError
-        If there is no theme of this name.
+        If there is no theme with this name.
     """
     if isinstance(name, Theme):
         return name

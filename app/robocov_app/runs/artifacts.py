@@ -63,7 +63,7 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     RobocovError
         If the run fails, or the folder cannot be written.
     """
-    # A folder that cannot be used is reported before anything takes long.
+    # A folder that cannot be used is reported before the long computations.
     with create_result(out, "run", overwrite=settings.overwrite) as result:
         compile_kernels()
         cost = build_cost(scenario.environment, settings.lattice, quiet=settings.quiet)
@@ -90,7 +90,7 @@ def execute_comparison(
     Returns
     -------
     runs : dict of str to Run
-        Only those that were begun, if Ctrl-C ended the comparison early.
+        If Ctrl-C ended the comparison early, only those that were started.
     is_interrupted : bool
 
     Raises
@@ -121,7 +121,7 @@ def _save_videos(
     settings: OutputSettings,
     interruption: Interruption,
 ) -> None:
-    """Save frames and videos if they are wanted; everything before them is safe first."""
+    """Save frames and videos if they are wanted, after all other results are on the disk."""
     result.save_progress()
     if settings.video.is_wanted:
         from robocov_app.runs.video import save_videos
@@ -220,7 +220,7 @@ def save_figures(
     folder : Path
     settings : OutputSettings
     is_comparison : bool
-        Whether the runs are drawn side by side, also if there is only one.
+        Whether the runs are drawn side by side, even if there is only one.
 
     Raises
     ------

@@ -75,7 +75,7 @@ def execute_scenario(
     """
     record = _simulate(scenario, settings, interruption)
     record.save(result.staging / subfolder)
-    # The record took the longest. It is safe before the evaluation begins.
+    # The simulation took the longest, so the record is saved before the evaluation starts.
     result.save_progress()
     run = evaluate_record(record, cost, interruption, quiet=settings.quiet)
     save_numbers(run, result.staging / subfolder, settings.lattice)

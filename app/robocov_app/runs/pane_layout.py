@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -116,7 +117,7 @@ def build_pane_layout(
     aspect = max(_compute_aspect(record) for record in records)
     width, height = size or MAX_DEFAULT_SIZE_PX
     columns = _count_columns(len(records), aspect, (width, height))
-    rows = -(-len(records) // columns)
+    rows = math.ceil(len(records) / columns)
     scale = scale_for((width, height))
     scale = max(min(scale, width / columns / _MIN_PANE_WIDTH_PX), _MIN_SCALE)
     pane_width = (width - (columns - 1) * PANE_GAP_PX) // columns
@@ -176,7 +177,7 @@ def _draw_legend(
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
     entries = [painter.legend_entries(scene) for scene in scenes]
-    # The order of the longest legend is kept, because it mostly contains all entries.
+    # The longest legend determines the order, because it usually contains all entries.
     entries.sort(key=len)
     entries.reverse()
     merged = merge_legends(entries, LegendEntry.key)
@@ -211,7 +212,7 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, ba
     Frame
     """
     height, width, _ = frames[0].shape
-    rows = -(-len(frames) // columns)
+    rows = math.ceil(len(frames) / columns)
     columns = min(columns, len(frames))
     shape = (rows * (height + gap) - gap, columns * (width + gap) - gap, 3)
     page = np.full(shape, background, dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""Settings of what is computed and drawn of runs."""
+"""Settings of the evaluation of runs, and of their figures and videos."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class VideoSettings:
         Raises
         ------
         ParameterError
-            If there is none of this name.
+            If there is none with this name.
         """
         from robocov_app.look.theme import get_theme
 

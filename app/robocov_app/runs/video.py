@@ -1,4 +1,4 @@
-"""Videos of runs: of one by itself, or of several side by side."""
+"""Videos of single runs, and of several runs side by side."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def draw_comparison_frames(
         draw_frames(
             record,
             settings,
-            # Layers keep what they have drawn, so each pane needs its own.
+            # Layers cache drawings, so each pane needs its own.
             layers=pane_layers(settings.colors),
             cost=cost,
             rows=select_frame_rows(record.time, settings.fps, settings.speed, hold),

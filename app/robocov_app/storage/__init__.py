@@ -1,5 +1,5 @@
-"""Files of the user that the windows keep by themselves.
+"""Files of the user that the windows write by themselves.
 
-- `autosave`: drafts of work that is not saved, which survive a crash
-- `settings`: the look of the windows
+- `autosave`: drafts of unsaved work, which survive a crash
+- `settings`: appearance of the windows
 """

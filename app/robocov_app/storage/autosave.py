@@ -1,4 +1,4 @@
-"""Drafts: work that survives a crash. Each open document has a folder, locked while its program lives."""
+"""Drafts: unsaved work that survives a crash. Each open document has a folder, locked while it is open."""
 
 import json
 import os
@@ -53,7 +53,7 @@ class Draft:
     when : datetime
         Local time of the draft.
     content : mapping
-        The work, as `Autosaver.save_draft` was given it; empty if everything was saved.
+        The work that was passed to `Autosaver.save_draft`; empty if everything was saved.
     """
 
     folder: Path
@@ -63,7 +63,7 @@ class Draft:
 
 
 class Autosaver:
-    """Writes the drafts of one document in a thread of its own; only `flush` and `close` wait for the disk.
+    """Writes the drafts of one document in a separate thread; only `flush` and `close` wait for the disk.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Autosaver:
                 self._changed.notify_all()
 
     def mark_saved(self, path: Path | None) -> None:
-        """Note that everything is saved in a file, so that there is nothing to recover."""
+        """Record that everything is saved in a file, so that there is nothing to recover."""
         self._path = path
         self.save_draft(None)
 
@@ -138,7 +138,7 @@ class Autosaver:
         Returns
         -------
         bool
-            Whether it is.
+            Whether it is on the disk.
         """
         with self._changed:
             self._is_hurried = True
@@ -208,7 +208,7 @@ class Autosaver:
             try:
                 self._write(*job)
             except Exception as error:
-                # The thread goes on, because the next draft may succeed.
+                # The thread continues, because the next draft may succeed.
                 trouble = f"drafts cannot be saved: {error}"
             pause = max(_MIN_PAUSE_S, _PAUSE_FACTOR * (time.perf_counter() - start))
             with self._changed:
@@ -262,7 +262,7 @@ def find_draft_folder(served_from: Path | None = None) -> Path | None:
     Returns
     -------
     Path or None
-        None if the environment variable `FOLDER_VARIABLE` is set and empty: no drafts are kept then.
+        None if the environment variable `FOLDER_VARIABLE` is set and empty, so that no drafts are kept.
     """
     named_folder = os.environ.get(FOLDER_VARIABLE)
     if named_folder == "":
@@ -310,8 +310,8 @@ def find_drafts(folder: Path | None, kind: str, read: Callable[[Draft], _Work | 
 def remove_draft(folder: Path) -> None:
     """Remove the folder of one draft, as far as possible.
 
-    Each file is named in full: `shutil.rmtree` names them relative to an open folder, which a window that
-    may use one folder alone cannot allow (see `robocov_app.web.confined`).
+    `shutil.rmtree` uses paths relative to an open folder, which `robocov_app.web.confined` does not allow.
+    Therefore each file is removed by its full path.
     """
     with suppress(OSError):
         for file in list(folder.iterdir()):
@@ -335,7 +335,7 @@ def is_open_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
     -------
     bool
     """
-    # Unlike resolve(), this raises nothing if links lead in a circle.
+    # Unlike Path.resolve, this does not raise if links form a loop.
     real_path = os.path.realpath(path)
     for draft_folder in _list_folders(folder):
         with suppress(MapError, OSError):

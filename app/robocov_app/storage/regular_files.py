@@ -1,4 +1,4 @@
-"""Files that a window is asked to open."""
+"""Checks of files before a window opens them."""
 
 from pathlib import Path
 
@@ -6,9 +6,9 @@ from robocov.errors import MapError, describe_error, to_one_line
 
 
 def require_regular_file(path: Path) -> None:
-    """Raise MapError if a path names a pipe or a device, which would hold up the window, or no file at all.
+    """Raise MapError for a pipe or a device, which would block the window, and for a broken link.
 
-    A path to nothing passes: what reads it says so in its own words.
+    A path that does not exist passes; reading it raises its own error.
     """
     try:
         exists = path.exists()

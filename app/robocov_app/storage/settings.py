@@ -1,4 +1,4 @@
-"""Persistent settings of a window, as JSON in the user's folder for settings."""
+"""Persistent settings of a window, in a JSON file in the user's configuration folder."""
 
 import os
 from pathlib import Path
@@ -49,14 +49,14 @@ def load_settings(kind: type[SettingsType], file: Path | None) -> tuple[Settings
 def merge_changed_settings(
     saved: SettingsType, at_opening: SettingsType, at_closing: SettingsType
 ) -> SettingsType:
-    """Return the saved settings with those that were changed in the window.
+    """Return the saved settings with the changes that were made in the window.
 
     Parameters
     ----------
     saved : BaseModel
         Settings as they were loaded.
     at_opening, at_closing : BaseModel
-        Settings of the window. Those that options of the command line selected do not differ between the two.
+        Settings of the window. Those selected on the command line are the same in both.
 
     Returns
     -------

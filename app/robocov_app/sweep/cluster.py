@@ -21,7 +21,7 @@ CONNECTION_TIMEOUT_S = 10.0
 _MIN_CAPACITY = 4
 """Number of tasks that are submitted to a cluster without workers."""
 _TASKS_PER_THREAD = 2
-"""A task takes time on its way to a worker, so that each thread has another one waiting."""
+"""Sending a task to a worker takes time, so each thread has another task waiting."""
 _THREAD_COUNT_INTERVAL_S = 2.0
 """Time between two queries of the number of threads; workers may come and go."""
 _LOCAL_ADDRESS = "inproc://"
@@ -91,7 +91,7 @@ class Cluster(Executor):
         return "" if self.threads else f"no workers are connected to {self._address}; waiting"
 
     def _start(self, task: Task) -> None:
-        # With a key of its own, the result is not taken from another program on the cluster.
+        # A unique key prevents Dask from returning the result of another program on the cluster.
         key = f"robocov-{uuid.uuid4().hex}"
         future: Any = self._client.submit(perform, task, key=key, pure=False)
         self._futures.add(future)

@@ -25,7 +25,7 @@ class LostWorker(NamedTuple):
     """The end of a worker in the middle of a task."""
 
     cause: str
-    """Reason in words."""
+    """Description of the reason."""
     details: str
     """Last output of the worker."""
     is_caused_by_task: bool

@@ -181,7 +181,7 @@ def _parse_events(name: str, value: object, path: JsonPath) -> str:
 
 def _parse_condition(name: str, value: object, path: JsonPath) -> ParameterValue:
     """Check a number against the range of its condition."""
-    # A long memory goes with all values of the other conditions.
+    # A long memory is compatible with all values of the other conditions.
     values: dict[str, Any] = {"forget_after": 1e6, name: value}
     conditions = validate_at(path, lambda: Conditions(**values))
     parsed: float | None = getattr(conditions, name)

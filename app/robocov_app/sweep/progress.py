@@ -1,4 +1,4 @@
-"""Progress of a sweep: a bar in a terminal, and a line now and then elsewhere."""
+"""Progress of a sweep: a bar in a terminal, otherwise lines at intervals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 LINE_INTERVAL_S = 10.0
 """Time between two lines where there is no terminal."""
 _MIN_WHOLE_RATE_PER_S = 10.0
-"""Rate from which on it is printed as a whole number."""
+"""Higher rates are printed as whole numbers."""
 _UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
 """Length of a unit in seconds and its name, and those of the next smaller unit."""
 
@@ -71,13 +71,13 @@ class SweepProgress:
         return (self.total - self.finished) / self.rate if self.rate else None
 
     def describe_outlook(self) -> str:
-        """Return the remaining time in words, or the reason why all runs wait; empty if neither is known."""
+        """Return the remaining time as text, or the reason why all runs wait; empty if neither is known."""
         if self.waiting_reason:
             return self.waiting_reason
         return f"{format_duration(self.remaining_time)} left" if self.remaining_time else ""
 
     def describe(self) -> str:
-        """Return the numbers of runs in words."""
+        """Return the numbers of runs as text."""
         parts = [f"{self.finished} of {self.total} runs"]
         if self.failed:
             parts.append(f"{self.failed} failed")

@@ -180,7 +180,7 @@ class Study:
         self._check_record_size()
 
     def _set(self, name: str, value: object) -> None:
-        """Replace a given value by the one that it stands for, while the study is built."""
+        """Replace a given value by its resolved form, while the study is built."""
         object.__setattr__(self, name, value)
 
     def _check_size(self) -> None:
@@ -244,7 +244,7 @@ class Study:
         require_distinct(self.starts, ("starts",))
 
     def _check_starts(self) -> None:
-        """Raise an error if a map does not have a start that is named."""
+        """Raise an error if a map lacks one of the given starts."""
         if self.starts == (ALL_STARTS,):
             return
         for index, start in enumerate(self.starts):

@@ -55,7 +55,7 @@ def require_few_runs(
 def count_values(values: object) -> int:
     """Return the number of values in a list, 1 for a single value."""
     if isinstance(values, range):
-        # It may be too long for `len`.
+        # It may be too long for `len`. The negative signs round the quotient up.
         return max(-(-(values.stop - values.start) // values.step), 0)
     is_list = isinstance(values, Sequence) and not isinstance(values, str)
     return len(cast("Sequence[object]", values)) if is_list else 1

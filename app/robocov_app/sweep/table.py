@@ -42,10 +42,10 @@ class Column(NamedTuple):
 
 
 _RUN_COLUMNS = (
-    Column("map", "string", "", "the map, as the study calls it"),
+    Column("map", "string", "", "name of the map in the study"),
     Column("controller", "string", "", "the controller"),
     Column("robots", "int64", "", "number of robots"),
-    Column("start", "string", "", "the start, as the map calls it"),
+    Column("start", "string", "", "name of the start in the map"),
     Column("seed", "int64", "", "seed of the starting positions"),
 )
 _DURATION_COLUMN = Column("duration_s", "double", "s", "simulated time")
@@ -59,14 +59,16 @@ _MEAN_TIME_COLUMN = Column(
 )
 _METRIC_COLUMNS = (
     Column("sensed_area_m2", "double", "m²", "free area in a robot's sensing range and line of sight"),
-    Column("range_area_m2", "double", "m²", "free area in a robot's sensing range, walls or not"),
+    Column("range_area_m2", "double", "m²", "free area in a robot's sensing range, ignoring walls"),
     Column("visible_area_m2", "double", "m²", "free area in a robot's line of sight"),
-    Column("work_J", "double", "J", "integral of |F v| of the forces asked for, all robots together"),
-    Column("effort_N2_s", "double", "N² s", "integral of |F|² of these, all robots together"),
-    Column("components", "double", "", "parts into which the team falls that hear each other"),
-    Column("algebraic_connectivity", "double", "", "of the graph of who hears whom"),
+    Column("work_J", "double", "J", "integral of |F v| of the controller's forces, sum over the robots"),
+    Column("effort_N2_s", "double", "N² s", "integral of |F|² of these forces, sum over the robots"),
+    Column("components", "double", "", "connected components of the communication graph"),
+    Column("algebraic_connectivity", "double", "", "of the communication graph"),
     Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null where there is one"),
-    Column("near_final_s", "double", "s", "from when on the mean distance was within 5 % of that of the end"),
+    Column(
+        "near_final_s", "double", "s", "time after which the mean distance stays within 5 % of its last value"
+    ),
 )
 
 RESULT_COLUMNS = (*_FIGURE_COLUMNS, _MEAN_TIME_COLUMN, *_METRIC_COLUMNS)

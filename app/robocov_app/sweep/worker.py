@@ -30,14 +30,14 @@ from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 
 _COLLECTION_STEPS = 1000
-"""Steps of a long run between two collections of garbage."""
+"""Steps of a long run between two garbage collections."""
 FIGURES = {
     "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
     "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
     "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
     "uncovered_area_m2": ("double", "m²", "area cut off from every robot"),
     "settled_at_s": ("double", "s", "when the team came to rest, null if it did not"),
-    "contacts": ("int64", "", "how often a robot began to touch a wall or another robot"),
+    "contacts": ("int64", "", "number of contacts of a robot with a wall or another robot"),
     "min_clearance_m": ("double", "m", "smallest gap between a robot and a wall"),
     "path_length_m": ("double", "m", "distance traveled, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
@@ -183,7 +183,7 @@ def build_failure(message: str, details: str) -> Outcome:
         Its error is a single line of valid characters.
     """
     line = " ".join(message.split()).encode(errors="replace").decode()
-    error = line or "it does not say why"
+    error = line or "no reason was given"
     content = {"error": error, "traceback": details}
     return Outcome({"error.json": format_json(content).encode()}, {}, error)
 

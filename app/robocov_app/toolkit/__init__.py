@@ -1,1 +1,1 @@
-"""Toolkit of both windows; it knows no robots and no maps."""
+"""Widgets, dialogs, commands and the main loop of both windows, independent of robots and maps."""

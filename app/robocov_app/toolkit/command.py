@@ -46,7 +46,7 @@ class Command:
     Attributes
     ----------
     name : str
-        Unique name: the word that is typed for a command with an argument, else as in "save:run".
+        Unique name: the word that is typed for a command with an argument, otherwise as in "save:run".
     title : str
         Text in menus, tool tips and help.
     group : str
@@ -76,7 +76,7 @@ class Command:
 
     @property
     def key_text(self) -> str:
-        """The first key, for people; empty if there is none."""
+        """The first key as text for users; empty if there is none."""
         return format_key(self.keys[0]) if self.keys else ""
 
     @property
@@ -141,9 +141,9 @@ class CommandGroup:
         name : str
             Unique name.
         title : str
-            Text for people; empty to leave the command out of palette and help.
+            Text for users; empty to leave the command out of palette and help.
         action : callable
-            Does it; a text that it returns is shown as message.
+            Runs the command. A text that it returns is shown as message.
         *keys : str
             Keys, such as ``ctrl+z``.
         repeats : bool
@@ -258,7 +258,7 @@ class CommandTable:
         return commands[name].run_now(argument)
 
     def search(self, text: str) -> list[Command]:
-        """Return the commands that palette and help do not leave out and that match a typed text."""
+        """Return the commands that match a typed text, without hidden ones."""
         commands = list(self.commands)
         if text.strip():
             commands += self._list_temporary()

@@ -24,7 +24,7 @@ _FULL_HD_HEIGHT_PX = 1080
 _MAX_SCALE = 3.0
 _SCALE_STEP = 0.25
 _COLLECTION_THRESHOLD = 50_000
-"""Allocations between two garbage collections: once a frame or so, not after every 700 coordinates."""
+"""Allocations between two garbage collections: about one collection in a frame (Python's default is 700)."""
 
 
 @contextmanager
@@ -55,7 +55,7 @@ def open_display(*, headless: bool, missing_message: str = "no display") -> Iter
         finally:
             pygame.display.quit()
     finally:
-        # A later window of this process must not be invisible because this one was.
+        # Otherwise a later window of this process would be invisible, too.
         if previous_driver is None:
             os.environ.pop(_DRIVER_VARIABLE, None)
         else:
@@ -63,7 +63,7 @@ def open_display(*, headless: bool, missing_message: str = "no display") -> Iter
 
 
 def _start_display(missing_message: str, *, may_be_invisible: bool) -> None:
-    """Start pygame's display; raises InputError with a message if it would be invisible and must not be."""
+    """Start pygame's display, or raise an InputError with a message if it would be invisible but must not."""
     has_display = sys.platform != "linux" or any(os.environ.get(name) for name in _DISPLAY_VARIABLES)
     if not has_display:
         raise InputError(missing_message)
@@ -86,12 +86,12 @@ def get_screen_scale() -> float:
 
 
 def choose_scale(requested: float | None, *, has_display: bool) -> float:
-    """Return the scale of a window: the requested one, else the one that suits the display.
+    """Return the scale of a window: the requested one, or the one that suits the display.
 
     Parameters
     ----------
     requested : float or None
-        Scale that an option or the settings demand.
+        Scale from an option or the settings.
     has_display : bool
         Whether the window is visible.
     """

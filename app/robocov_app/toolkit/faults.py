@@ -100,7 +100,7 @@ def describe_os_error(error: OSError) -> str:
 
 
 def _find_place(error: BaseException) -> tuple[str, str, int]:
-    """Return the kind of an exception, and the file and line that raised it."""
+    """Return the type of an exception, and the file and line that raised it."""
     frames = traceback.extract_tb(error.__traceback__, limit=-1)
     if not frames:
         return type(error).__name__, "", 0

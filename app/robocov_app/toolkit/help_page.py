@@ -1,5 +1,6 @@
 """The help page: the keys of all commands."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -26,7 +27,7 @@ _KEY_WIDTH_PX = 84
 _MIN_TEXT_PX = 8
 """Size of texts in small windows, at any scale."""
 _HEADING_ROWS = 2.6
-"""Rows that are free below a heading, which is not alone at the foot of a column."""
+"""Rows that a heading needs, so that it is never alone at the foot of a column."""
 
 
 @dataclass(frozen=True)
@@ -105,10 +106,10 @@ def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
     """Choose the number of columns, and the height of rows so that all of them fit."""
     width, height = screen.get_size()
     count = 4 if width >= _WIDE_WINDOW_PX * scale else 3
-    rows_of_column = -(-rows // count) + 1
-    row_height = min(_MAX_ROW_PX * scale, (height - 90 * scale) / rows_of_column)
+    rows_per_column = math.ceil(rows / count) + 1
+    row_height = min(_MAX_ROW_PX * scale, (height - 90 * scale) / rows_per_column)
     box_width = round(min(width - 24 * scale, _MAX_WIDTH_PX * scale))
-    box = Rect(0, 0, box_width, round(rows_of_column * row_height + 66 * scale))
+    box = Rect(0, 0, box_width, round(rows_per_column * row_height + 66 * scale))
     box.center = width // 2, height // 2
     return _Columns(count, row_height, max(_MIN_TEXT_PX, round(row_height * 0.66)), box, scale)
 

@@ -7,7 +7,7 @@ import pygame
 from robocov.text import remove_controls
 
 KEY_REPEAT_MS = (350, 40)
-"""Time until a held key is repeated, the first time and from then on."""
+"""Time before a held key is repeated, and between further repetitions."""
 DOUBLE_CLICK_S = 0.35
 """Maximum time between the two clicks of a double click."""
 MAX_CLICK_MOVE_PX = 5.0
@@ -71,7 +71,7 @@ def split_key_name(name: str) -> list[str]:
 
 
 def format_key(name: str) -> str:
-    """Return a key for people.
+    """Format a key for users.
 
     >>> format_key("ctrl+shift+z")
     'Ctrl Shift Z'

@@ -1,6 +1,6 @@
 """Window layout: arena, panel, chart, timeline and status line. Pure arithmetic."""
 
-from math import floor
+from math import ceil, floor
 from typing import NamedTuple, TypeAlias
 
 from robocov_app.render.layout import columns_for
@@ -18,7 +18,7 @@ LEGEND_ROW_PX = 22
 MIN_SIZE_PX = (900, 600)
 """Width and height of a window in which everything fits at scale 1."""
 MIN_PORTRAIT_SIZE_PX = (460, 600)
-"""The same for a telephone that is held upright, where the panel takes most of the width."""
+"""The same for a phone in portrait orientation, where the panel takes most of the width."""
 
 _MIN_SCALE = 0.25
 _SCALE_STEPS = 8
@@ -114,7 +114,7 @@ def _arrange_panes(
     """Arrange panes in rows below the legend."""
     free_size = width, max(arena_height - legend_height, 1)
     columns = columns_for(count, aspect, free_size, around=68 * scale, beside=31 * scale)
-    rows = -(-count // columns)
+    rows = ceil(count / columns)
     pane_width = (width - PANE_GAP_PX * (columns - 1)) // columns
     pane_height = (arena_height - legend_height - PANE_GAP_PX * (rows - 1)) // rows
     boxes: list[Box] = []

@@ -32,7 +32,7 @@ class MouseCursor:
         self.shape = pygame.SYSTEM_CURSOR_ARROW
 
     def show(self, name: CursorShape) -> None:
-        """Give the cursor another shape."""
+        """Change the shape of the cursor."""
         shape = _SYSTEM_CURSORS[name]
         if shape == self.shape:
             return

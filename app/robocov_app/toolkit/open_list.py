@@ -1,4 +1,4 @@
-"""The list that hangs from a drop-down menu while it is open."""
+"""The list of a drop-down menu while it is open."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -17,7 +17,9 @@ MAX_LIST_HEIGHT_PX = 268.0
 LIST_ROW_PX = 24.0
 _TEXT_PX = 12.0
 
-_KEY_STEPS = {"up": -1, "down": 1, "page up": -8, "page down": 8, "home": -9999, "end": 9999}
+_TO_END = 9999
+"""Step that leads beyond the end of any list, which limits it."""
+_KEY_STEPS = {"up": -1, "down": 1, "page up": -8, "page down": 8, "home": -_TO_END, "end": _TO_END}
 
 
 class ListResponse(Enum):
@@ -39,7 +41,7 @@ class OpenList:
     Attributes
     ----------
     key : str
-        Key of the menu from which it hangs.
+        Key of its menu.
     options : list of str
     rect : pygame.Rect
         Place in the window.
@@ -48,7 +50,7 @@ class OpenList:
     chosen : int
         Number of the highlighted option.
     top : float
-        Length that is scrolled out of sight at the top, px.
+        Length that is scrolled out of view at the top, px.
     picked : str or None
         Option that was picked.
     """
@@ -63,11 +65,11 @@ class OpenList:
 
     @property
     def max_top(self) -> float:
-        """Length by which the options are longer than the list, px."""
+        """Maximum of `top`: length of the options that does not fit into the list, px."""
         return max(len(self.options) * self.row_height + 2 - self.rect.height, 0)
 
     def get_item_rect(self, number: int) -> Rect:
-        """Return the place of an option, which may be out of sight."""
+        """Return the place of an option, which may be out of view."""
         y = self.rect.top + 1 + number * self.row_height - round(self.top)
         return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row_height)
 
@@ -78,7 +80,7 @@ class OpenList:
         return number if is_item else None
 
     def choose(self, number: int) -> None:
-        """Highlight an option, or the nearest one that exists, and scroll it into sight."""
+        """Highlight an option, or the nearest one that exists, and scroll it into view."""
         self.chosen = min(max(number, 0), len(self.options) - 1)
         low = self.chosen * self.row_height
         high = (self.chosen + 1) * self.row_height + 2 - self.rect.height
@@ -91,7 +93,7 @@ class OpenList:
             self.chosen = number
 
     def handle_event(self, event: pygame.event.Event) -> ListResponse:
-        """Handle an event, which all come to the list while it is open."""
+        """Handle an event. While the list is open, it gets all events."""
         if event.type == pygame.MOUSEBUTTONDOWN:
             number = self.find_item(event.pos)
             return ListResponse.CLOSED if number is None else self._pick(number)

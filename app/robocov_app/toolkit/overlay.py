@@ -102,7 +102,7 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
 
 
 def draw_card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
-    """Draw the background of something that lies over the window."""
+    """Draw the background of a dialog or another card over the window."""
     edge = mix(theme.panel, theme.ink, 0.28)
     radius = round(_CARD_RADIUS_PX * scale)
     draw_rounded_box(screen, box, theme.panel, edge=edge, radius=radius, width=max(1, round(scale)))

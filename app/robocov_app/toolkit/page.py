@@ -82,13 +82,13 @@ class Page(RowLayout):
     clipboard : Clipboard
         Text that is copied from text fields and pasted into them.
     open_list : OpenList or None
-        List that hangs from a drop-down menu.
+        List of the drop-down menu that is open.
     widgets : dict of str to Widget
         Widgets of the last run by kind and key, such as "button:pause".
     folded_sections : set of str
         Keys of the sections whose content is hidden.
     scroll_offsets, content_heights : dict of str to float
-        Length that is scrolled out of sight, and height of all content, of each scroll area.
+        Length that is scrolled out of view, and height of all content, by the key of the scroll area.
     tool_tip : ToolTip
         Decides when the tip of the widget under the pointer appears.
     """
@@ -172,7 +172,7 @@ class Page(RowLayout):
     # Drawing
 
     def draw(self, screen: Surface) -> None:
-        """Draw the page, or copy what was drawn last if it has not changed."""
+        """Draw the page, or copy the last drawing if nothing has changed."""
         if not self.needs_redraw and self._image is not None and self._image.get_size() == self.box.size:
             screen.blit(self._image, self.box)
             return
@@ -236,7 +236,7 @@ class Page(RowLayout):
         return get_key_name(self._event)
 
     def is_hovered(self, rect: Rect) -> bool:
-        """Return whether the pointer is over a visible part of the page, and free."""
+        """Return whether the pointer is over a visible part of the page, and no button or list is in use."""
         is_free = self.open_list is None and self.active is None
         return is_free and bool(rect.collidepoint(self.pointer) and self.clip.collidepoint(self.pointer))
 

@@ -136,7 +136,7 @@ class PageEvents:
             page.stop_typing()
         elif response is ListResponse.PICKED:
             page.focus = None
-            page.run()  # The menu from which it hangs reads what was picked.
+            page.run()  # Its menu reads the picked option.
             page.open_list = None
         return response is not ListResponse.IGNORED
 

@@ -10,7 +10,7 @@ from robocov_app.toolkit.input import format_key
 
 MAX_OPTIONS = 9
 _MAX_KEYS = 2
-_HINT = "↑ ↓ choose · Tab completes · Enter does it · Esc closes"
+_HINT = "↑ ↓ choose · Tab completes · Enter runs · Esc closes"
 
 
 def create_palette(table: CommandTable, placeholder: str, show_message: Callable[[str], object]) -> Choice:
@@ -22,7 +22,7 @@ def create_palette(table: CommandTable, placeholder: str, show_message: Callable
     placeholder : str
         Faint text in the empty field.
     show_message : callable
-        Gets the message of the command; an empty one if it returns none.
+        Called with the message of the command, which is empty if it returns none.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def list_options(table: CommandTable, text: str) -> list[Option]:
 def _list_completions(
     table: CommandTable, command: Command, argument: Argument, argument_text: str, text: str
 ) -> list[Option]:
-    """List the values of an argument that match what was typed of it, and the typed text itself."""
+    """List the values of an argument that match its typed part, and the typed text itself."""
     values = list(argument.list_values())
     reason = command.get_disabled_reason()
     start = argument_text.lower()

@@ -1,7 +1,7 @@
 """The end of a window by SIGTERM or SIGHUP: drafts are written, and the process ends in time.
 
 A window whose loop runs ends as if it had been closed, without questions; its draft stays. A window that is
-busy with something else, such as compiling, cannot do that. A thread of its own, which the signal wakes, then
+busy with something else, such as compiling, cannot do that. Then a separate thread, which the signal wakes,
 writes the drafts and ends the process.
 """
 
@@ -24,7 +24,7 @@ _SIGNALS = ("SIGTERM", "SIGHUP")
 _LOOP_GRACE_S = 0.7
 """Time for the loop to notice that the process is to end."""
 _CLOSING_GRACE_S = 3.0
-"""Time in all once it has noticed, for closing videos and saving settings."""
+"""Time from the signal to the end once the loop has noticed, for closing videos and saving settings."""
 _CLOSED_GRACE_S = 0.1
 """Time for Python's own end once everything is closed."""
 _FLUSH_S = 0.2
@@ -76,18 +76,18 @@ class _Watcher:
         self._status: int | None = None  # Exit status, once everything is closed.
         self._receiver, self._sender = socket.socketpair()
         self._sender.setblocking(False)
-        self._former_fd = -1
-        self._former: dict[signal.Signals, signal._HANDLER] = {}
+        self._previous_fd = -1
+        self._previous_handlers: dict[signal.Signals, signal._HANDLER] = {}
         self._thread = threading.Thread(target=self._watch, name="termination", daemon=True)
 
     def start(self) -> None:
-        """Start to wait for signals, except for those that the process ignores."""
+        """Start waiting for signals, except for those that the process ignores."""
         for name in _SIGNALS:
             number = getattr(signal, name, None)
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-                self._former[number] = signal.signal(number, self._note)
+                self._previous_handlers[number] = signal.signal(number, self._record_signal)
         # Python's handler runs only when the main thread is back in Python; this wakes the thread at once.
-        self._former_fd = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
+        self._previous_fd = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
         self._thread.start()
 
     def handle_closing(self, *, failed: bool) -> None:
@@ -99,22 +99,22 @@ class _Watcher:
             self._closed_at = time.monotonic()
 
     def stop(self) -> None:
-        """Restore the former handlers of signals, and end the thread."""
-        signal.set_wakeup_fd(self._former_fd)
-        for number, handler in self._former.items():
-            if signal.getsignal(number) == self._note:
+        """Restore the previous handlers of signals, and end the thread."""
+        signal.set_wakeup_fd(self._previous_fd)
+        for number, handler in self._previous_handlers.items():
+            if signal.getsignal(number) == self._record_signal:
                 signal.signal(number, handler)
         self._sender.close()
         self._thread.join()
         self._receiver.close()
 
-    def _note(self, number: int, frame: FrameType | None) -> None:
+    def _record_signal(self, number: int, frame: FrameType | None) -> None:
         self.number = number
 
     def _watch(self) -> None:
         with suppress(OSError):
             while data := self._receiver.recv(64):
-                numbers = [number for number in data if number in self._former]
+                numbers = [number for number in data if number in self._previous_handlers]
                 if numbers:
                     self.number = numbers[0]
                     self._end()

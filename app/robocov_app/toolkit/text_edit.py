@@ -70,7 +70,7 @@ class TextEdit:
         Parameters
         ----------
         text : str
-            Line ends become blanks, and what is beyond `MAX_CHARS` is cut off.
+            Line ends become blanks; text beyond `MAX_CHARS` is cut off.
         """
         low, high = self.selection
         max_length = max(MAX_CHARS - len(self.text) + (high - low), 0)
@@ -103,7 +103,7 @@ class TextEdit:
             self._press_ctrl_key(key, clipboard)
 
     def _find_targets(self) -> dict[str, int]:
-        """Return where the keys that move the caret put it."""
+        """Return the new position of the caret for each key that moves it."""
         return {
             "left": self.caret - 1,
             "right": self.caret + 1,
@@ -129,7 +129,7 @@ class TextEdit:
         self.place(target, extend=extend)
 
     def _erase(self, target: int) -> None:
-        """Erase the selection, or what is between the caret and a position."""
+        """Erase the selection; if it is empty, erase the text between the caret and a position."""
         start, end = self.selection
         if start == end:
             start, end = sorted((self.caret, target))

@@ -101,7 +101,7 @@ class SidePanel:
         """Show and edit the content."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Take the place of the panel in a layout, and its colors and scale."""
+        """Move to the place of the panel in a layout, and adopt the scale and the theme."""
         self.hidden = not layout.panel[2]
         if self.hidden:
             self.ui.stop_typing()

@@ -24,7 +24,7 @@ FPS = 60
 CALM_S = 0.8
 """Time without changes after which the loop waits for events. Tool tips appear earlier."""
 MAX_WAIT_S = 0.1
-"""Maximum time between two looks for changes while the loop waits."""
+"""Maximum time between two checks for changes while the loop waits."""
 
 _MIN_SURFACE_PX = (320, 240)
 """Size of what is drawn, however small the window is."""
@@ -101,7 +101,7 @@ class BaseWindow:
         self._had_events = False
         self._drawn_state: object = None
 
-    # What windows are made of
+    # Methods that windows override
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event."""
@@ -113,14 +113,14 @@ class BaseWindow:
         """Draw everything, and show it."""
 
     def get_visible_state(self) -> object:
-        """Return everything that changes the frame without an event; None while something moves."""
+        """Return a key of everything that changes the frame without an event; None while something moves."""
         return None
 
     def close(self) -> None:
-        """End what runs besides the window."""
+        """Stop everything that runs besides the window."""
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Take the appearance that suits the place where the window is displayed.
+        """Adopt the appearance that suits the place where the window is displayed.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class BaseWindow:
         """
 
     def create_save_point(self) -> RollBack:
-        """Return a function that reverts all changes since now; it is called if an event raises."""
+        """Return a function that reverts all later changes; it is called if an event raises."""
         return _revert_nothing
 
     def report_fault(self, message: str, *, in_drawing: bool) -> None:
@@ -161,7 +161,7 @@ class BaseWindow:
             self.remote.wait(frame_start_s + wait_s - perf_counter())
             return
         clock.tick(FPS)
-        # SDL's own function that waits for events looks for them a thousand times a second.
+        # SDL's own function that waits for events polls a thousand times a second.
         while self.is_resting and perf_counter() - frame_start_s < MAX_WAIT_S and not pygame.event.peek():
             clock.tick(FPS)
 
@@ -198,7 +198,7 @@ class BaseWindow:
         """Handle all events that have arrived, and let time pass."""
         remote = self.remote
         if remote is not None:
-            self._run_contained("taking messages of a page", lambda: remote.receive(self))
+            self._run_contained("receiving messages of a page", lambda: remote.receive(self))
         events = pygame.event.get()
         self._had_events = bool(events)
         for event in events:
@@ -236,7 +236,7 @@ class BaseWindow:
         *,
         create_save_point: Callable[[], RollBack] | None = None,
     ) -> bool:
-        """Do one part of a frame; log and report what it raises, and revert what it has changed.
+        """Run one part of a frame; log and report any exception, and revert the changes before it.
 
         An action that fails again and again is tried only now and then, so that the window can be used.
         MemoryError, and everything that is raised after the display was closed, is passed on.
@@ -274,7 +274,7 @@ class BaseWindow:
             self._retry_at_s[action] = perf_counter() + _RETRY_S
         message = self.faults.record(error, action)
         if roll_back is not None and self._revert(roll_back):
-            message += " The action was taken back."
+            message += " The action was undone."
         message += " Save your work."
         in_drawing = action == "drawing"
         try:
@@ -289,7 +289,7 @@ class BaseWindow:
         try:
             roll_back()
         except Exception as error:
-            self.faults.record(error, "taking an action back")
+            self.faults.record(error, "undoing an action")
             return False
         return True
 

@@ -1,4 +1,4 @@
-"""The window in a browser: its pictures go out, pointer, keys, wheel and the size of the page come in."""
+"""The window in a browser: frames are sent to pages, which send input and their size."""
 
 from __future__ import annotations
 
@@ -38,9 +38,20 @@ def prepare(options: Any, folder: Path) -> None:
 
 
 def show(window: BaseWindow, options: Any, folder: Path) -> None:
-    """Run a window until it is closed: on the screen, or in browsers, as the options of a command say.
+    """Run a window until it is closed, on the screen or in browsers.
 
-    Files below the folder alone can be used then. Raises RobocovError without the extra.
+    Parameters
+    ----------
+    window : BaseWindow
+    options : WebOptions
+        Options of a command; ``--serve`` selects browsers.
+    folder : Path
+        The only folder with files that a window in a browser can use.
+
+    Raises
+    ------
+    RobocovError
+        Without the extra.
     """
     if not options.serve:
         window.run()
@@ -58,18 +69,21 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         echo(f"open {display.link}", flush=True)
         echo(f"to watch only: {display.watch_link}", flush=True)
         window.remote = display
-        stopped: list[int] = []
+        was_interrupted = False
 
-        def stop(number: int, _: object) -> None:
-            if stopped:
-                raise KeyboardInterrupt  # a second time: at once
-            stopped.append(number)
-            window.closed = True  # who stops the process cannot be asked about unsaved work
+        def close_window(number: int, frame: object) -> None:
+            """Close the window without a question about unsaved work; stop at once the second time."""
+            nonlocal was_interrupted
+            if was_interrupted:
+                raise KeyboardInterrupt
+            was_interrupted = True
+            window.closed = True
 
-        signal.signal(signal.SIGINT, stop)  # the window itself sees to SIGTERM
+        # The window itself handles SIGTERM.
+        signal.signal(signal.SIGINT, close_window)
         unblock_interrupts()
         window.run()
-    if stopped or is_ending():
+    if was_interrupted or is_ending():
         raise KeyboardInterrupt
 
 

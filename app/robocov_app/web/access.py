@@ -20,11 +20,9 @@ def build_link(host: str, port: int, token: str) -> str:
 
 
 def build_listen_error(host: str, port: int, error: OSError) -> InputError:
-    """Return the error for an address that a server cannot listen at."""
+    """Return the error for an address at which a server cannot listen."""
     reason = (error.strerror or str(error)).rpartition(": ")[2]
-    return InputError(
-        f"--port: {host}:{port} cannot be listened to: {reason}; --port 0 takes one that is free"
-    )
+    return InputError(f"--port: cannot listen at {host}:{port}: {reason}. Use --port 0 for any free port.")
 
 
 def parse_query(address: str) -> dict[str, str]:

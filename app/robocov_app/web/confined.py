@@ -32,7 +32,7 @@ class OutsideError(InputError, PermissionError):
 
 
 class FileConfinement:
-    """Restriction of this process to files below some folders, however their names came about.
+    """Restriction of this process to files below some folders, whether their paths are typed, stored or linked.
 
     Parameters
     ----------
@@ -66,15 +66,15 @@ class FileConfinement:
             is_compiled_code = "__pycache__" in path.parts
             roots = self._readable if is_reading or is_compiled_code else self._writable
             if not any(path.is_relative_to(root) for root in roots):
-                raise OutsideError(f"{os.fsdecode(argument)}: outside of the folder that is served")
+                raise OutsideError(f"{os.fsdecode(argument)}: outside the served folder")
 
 
 @contextmanager
 def confine_files(folder: Path) -> Iterator[None]:
-    """Let the process read and write only files below a folder, and read the files of programs.
+    """Allow the process to use only files below a folder, and to read the files of programs.
 
-    The restriction holds for every file that Python opens, whether it is typed, named in a session or linked.
-    Temporary files are written to a folder of their own, which is removed at the end.
+    The restriction holds for every file that Python opens, whether its path is typed, stored in a session or
+    the target of a link. Temporary files are written to a separate folder, which is removed at the end.
 
     Parameters
     ----------

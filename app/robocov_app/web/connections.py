@@ -1,4 +1,4 @@
-"""Connections of browsers: requests are answered, sockets handed over, and what strangers hold is bounded."""
+"""Connections of browsers: requests, sockets, and limits on the resources that strangers can occupy."""
 
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ MAX_QUEUED_MESSAGES = 4  # from one page, before reading from it pauses
 WRITE_LIMIT_BYTES = 1 << 16
 MAX_UNANSWERED = 256  # connections without an open socket; the oldest one is ended when there are more
 REQUEST_TIMEOUT_S = 10.0  # for a request to come in
-MAX_FILES_BYTES = 1 << 29  # of files that browsers are taking at the same time
-RESPONSE_TIMEOUT_S = 600.0  # for a browser to take a file
-SEND_TIMEOUT_S = 30.0  # for a page to take a message
+MAX_FILES_BYTES = 1 << 29  # of files that browsers are downloading at the same time
+RESPONSE_TIMEOUT_S = 600.0  # for a browser to download a file
+SEND_TIMEOUT_S = 30.0  # for a page to receive a message
 CLOSE_TIMEOUT_S = 5.0
 MIN_FILES = 2048  # that the process may have open: each connection is one
-END_TIMEOUT_S = 1.0  # for all pages to say goodbye at the end of the server
+END_TIMEOUT_S = 1.0  # for all pages to close their sockets at the end of the server
 
-# close codes of sockets, see page.html
+# Close codes of sockets, see page.html.
 WINDOW_CLOSED = 1001
 NOT_UNDERSTOOD = 1008
 FAULT = 1011
-WINDOW_ENDED = 1012  # comes back by itself
+WINDOW_ENDED = 1012  # the page connects again by itself
 TRY_AGAIN_LATER = 1013
-REPLACED = 4001  # the page does not come back by itself
+REPLACED = 4001  # the page does not connect again by itself
 
 Answer = Callable[["ServerConnection", "Request"], Awaitable["Response | None"]]
 Talk = Callable[["ServerConnection"], Awaitable[None]]
 
 
-def report_fault(what: str) -> None:
-    """Print what went wrong in the server, with the traceback of the current exception, on stderr."""
-    report(f"{what}\n{traceback.format_exc()}")
+def report_fault(message: str) -> None:
+    """Print a message about a fault, with the traceback of the current exception, on stderr."""
+    report(f"{message}\n{traceback.format_exc()}")
 
 
-def report(what: str) -> None:
-    """Print a line on stderr."""
-    echo(f"robocov: {what}", to_stderr=True, flush=True)
+def report(message: str) -> None:
+    """Print a message on stderr."""
+    echo(f"robocov: {message}", to_stderr=True, flush=True)
 
 
 class Listener:
@@ -69,11 +69,11 @@ class Listener:
         self._talk = talk
         self._connections: set[ServerConnection] = set()
         self._unanswered: dict[ServerConnection, asyncio.TimerHandle] = {}  # in the order in which they came
-        self._files: dict[ServerConnection, int] = {}  # bytes of the files that browsers are taking
+        self._files: dict[ServerConnection, int] = {}  # bytes of the files that browsers are downloading
         self._server: Server | None = None
 
     async def listen(self, host: str, port: int) -> int:
-        """Begin to listen, and return the port; raises `InputError` if that is not possible."""
+        """Start listening, and return the port; raise `InputError` if that is not possible."""
         from websockets.asyncio.server import ServerConnection, serve
 
         listener = self
@@ -88,7 +88,7 @@ class Listener:
                 super().connection_lost(error)
 
         _raise_file_limit()
-        # what strangers send is not worth a line on the terminal
+        # Invalid requests of strangers would fill the terminal.
         logger = logging.getLogger("robocov.web")
         logger.propagate = False
         logger.addHandler(logging.NullHandler())
@@ -114,12 +114,13 @@ class Listener:
         return found
 
     async def close(self) -> None:
-        """Say goodbye to all pages, and end all connections."""
+        """Close the sockets of all pages, and end all connections."""
         if self._server is None:
             return
         self._server.close(code=WINDOW_CLOSED)
         closed = asyncio.ensure_future(self._server.wait_closed())
-        for connection in list(self._unanswered):  # browsers open some ahead of need, on which nothing comes
+        # Browsers open connections in advance, without sending a request.
+        for connection in list(self._unanswered):
             connection.transport.abort()
         await asyncio.wait([closed], timeout=END_TIMEOUT_S)
         for connection in list(self._connections):
@@ -148,7 +149,8 @@ class Listener:
             timer.cancel()
 
     async def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
-        method = getattr(request, "method", "GET")  # websockets before 17 takes no other
+        # Versions of websockets before 17 accept GET only, and lack the attribute.
+        method = getattr(request, "method", "GET")
         if method not in ("GET", "HEAD"):
             return respond(connection, HTTPStatus.METHOD_NOT_ALLOWED, "Expected GET or HEAD.\n")
         try:
@@ -164,11 +166,11 @@ class Listener:
             if sum(self._files.values()) + len(response.body) > MAX_FILES_BYTES:
                 text = "Too many files are being downloaded; try again in a minute.\n"
                 return respond(connection, HTTPStatus.SERVICE_UNAVAILABLE, text)
-            self._give_time(connection, len(response.body))
+            self._extend_timeout(connection, len(response.body))
         return response
 
-    def _give_time(self, connection: ServerConnection, n_bytes: int) -> None:
-        """Let a browser with a slow connection take a file."""
+    def _extend_timeout(self, connection: ServerConnection, n_bytes: int) -> None:
+        """Give a browser with a slow connection enough time to download a file."""
         self._on_answered(connection)
         self._files[connection] = n_bytes
         connection.close_timeout = RESPONSE_TIMEOUT_S
@@ -185,16 +187,16 @@ class Listener:
 
 
 def _raise_file_limit() -> None:
-    """Let the process have many files open, as far as the system allows; some allow 256 at first."""
+    """Raise the limit of open files of the process, as far as the system allows; some start with 256."""
     try:
         import resource
     except ImportError:  # Windows has no such limit
         return
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = MIN_FILES if hard == resource.RLIM_INFINITY else min(MIN_FILES, hard)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
+    target = MIN_FILES if hard == resource.RLIM_INFINITY else min(MIN_FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < target:
         with suppress(OSError, ValueError):
-            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+            resource.setrlimit(resource.RLIMIT_NOFILE, (target, hard))
 
 
 def respond(connection: ServerConnection, status: HTTPStatus, text: str) -> Response:
@@ -228,9 +230,9 @@ def respond_with_page(connection: ServerConnection, *, may_be_framed: bool, cook
     connection : ServerConnection
         The connection that asks for it.
     may_be_framed : bool
-        Whether other sites may frame it, such as notebooks do.
+        Whether other sites may frame it, as notebooks do.
     cookie : str
-        ``name=value`` to keep in the browser; empty to keep none.
+        Cookie to set in the browser, as ``name=value``; empty for none.
     """
     nonce = secrets.token_urlsafe(12)
     page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
@@ -241,14 +243,14 @@ def respond_with_page(connection: ServerConnection, *, may_be_framed: bool, cook
         f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
     )
     if cookie:
-        # Without a path it is that of the page, also behind a proxy. Lax: a link in a mail or on a
-        # course page is followed from another site, and must find the cookie of who comes back.
+        # Without a path, the cookie belongs to the path of the page, even behind a proxy. Lax: a visitor who
+        # returns by a link in a mail or on a course page comes from another site, and keeps the cookie.
         headers["Set-Cookie"] = f"{cookie}; HttpOnly; SameSite=Lax"
     return respond_with(connection, HTTPStatus.OK, page.encode(), "text/html; charset=utf-8", headers)
 
 
 def is_from_own_page(request: Request) -> bool:
-    """Return whether a socket is opened by the server's own page, or by what is no browser."""
+    """Return whether a socket is opened by the server's own page, or by a program other than a browser."""
     origins = request.headers.get_all("Origin")
     if not origins:
         return True

@@ -217,7 +217,7 @@ class Conversation:
             while True:
                 await page.has_news.wait()
                 page.has_news.clear()
-                # The frames are taken before the state, which is then never older than they are.
+                # The frames are read before the state, so that the state is never older than they are.
                 frames = list(page.outbox)
                 page.outbox.clear()
                 await self._send_state()

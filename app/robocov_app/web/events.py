@@ -207,7 +207,7 @@ class EventTranslator:
         self._pressed_button = 0
 
     def translate(self, message: InputMessage | Uploaded) -> Iterator[Event]:
-        """Yield the events that a message stands for."""
+        """Yield the events of pygame that correspond to a message."""
         match message:
             case PointerMoved():
                 yield self._move(message.x, message.y, message.button)
@@ -253,7 +253,7 @@ class EventTranslator:
             yield Event(pygame.WINDOWLEAVE)
             return
         if self._pressed_button:
-            # The page will not see that the button is released.
+            # The page will not notice when the button is released.
             yield Event(pygame.MOUSEBUTTONUP, pos=self._position, button=self._pressed_button, touch=False)
             self._pressed_button = 0
         yield Event(pygame.WINDOWFOCUSLOST)

@@ -1,4 +1,4 @@
-"""Files that go in and out of a served window, all in the folder that was named for it."""
+"""Files that are uploaded to a served window and downloaded from it, all in its folder."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _MAX_OFFERED = 20
 
 
 class TransferError(RobocovError):
-    """A file cannot be taken from a page, or given to it; the message is for the page."""
+    """A file cannot be uploaded or downloaded; the message is for the page."""
 
 
 def prepare_folder(folder: Path) -> None:
-    """Create the folder of a served window, and find out whether files can be written to it.
+    """Create the folder of a served window, and check that files can be written to it.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def prepare_folder(folder: Path) -> None:
 
 
 class Upload:
-    """A file that comes in from a page piece by piece.
+    """A file that arrives from a page in pieces.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Upload:
     size : int
         Its size in bytes.
     is_refused : bool
-        Whether its pieces are thrown away when they come; the page may have sent them already.
+        Whether its pieces are discarded on arrival; the page may have sent them already.
     """
 
     def __init__(self, name: str, size: int, *, is_refused: bool) -> None:
@@ -71,15 +71,15 @@ class Upload:
         return self._remaining == 0
 
     def add(self, piece: bytes) -> None:
-        """Take the next piece; raises `ValueError` if more comes than was announced."""
+        """Add the next piece; raise `ValueError` if the file becomes larger than announced."""
         if len(piece) > self._remaining:
-            raise ValueError(f"{self.name}: more came than was announced")
+            raise ValueError(f"{self.name}: larger than announced")
         self._remaining -= len(piece)
         if not self.is_refused:
             self._pieces.append(piece)
 
     def save(self, folder: Path) -> Path:
-        """Write the file under a name that is free, and return its path; raises `TransferError`."""
+        """Write the file under a name that is not in use, and return its path; raise `TransferError`."""
         path = folder / self.name
         try:
             if path.exists():
@@ -91,13 +91,14 @@ class Upload:
                 f"{self.name}: cannot be saved on the server: {describe_error(error)}"
             ) from error
         except OutputError as error:
-            why = describe_error(error.__cause__) if isinstance(error.__cause__, OSError) else str(error)
-            raise TransferError(f"{self.name}: cannot be saved on the server: {why}") from error
+            cause = error.__cause__
+            reason = describe_error(cause) if isinstance(cause, OSError) else str(error)
+            raise TransferError(f"{self.name}: cannot be saved on the server: {reason}") from error
         return path
 
 
 def check_name(name: str) -> None:
-    """Raise `TransferError` if a file of this name is not taken from a page."""
+    """Raise `TransferError` if a file with this name cannot be uploaded."""
     path = Path(name)
     if not name or path.name != name or "\\" in name or name.startswith("."):
         raise TransferError("expected the name of a file without folders")
@@ -110,14 +111,14 @@ def check_name(name: str) -> None:
 
 
 def list_saved(folder: Path, since: float) -> tuple[str, ...]:
-    """Return the names of what windows saved to a folder since a time, the newest first."""
+    """Return the names of the files and folders that windows saved since a time, the newest first."""
     try:
         offered = [path for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES) if _is_offered(path)]
-        changed = [(path.stat().st_mtime, path.name) for path in offered]
+        dated_names = [(path.stat().st_mtime, path.name) for path in offered]
     except OSError:
         return ()
-    found = sorted((each for each in changed if each[0] >= since), reverse=True)
-    return tuple(name for _, name in found[:_MAX_OFFERED])
+    recent = sorted((pair for pair in dated_names if pair[0] >= since), reverse=True)
+    return tuple(name for _, name in recent[:_MAX_OFFERED])
 
 
 def _is_offered(path: Path) -> bool:
@@ -129,19 +130,20 @@ def _is_offered(path: Path) -> bool:
 
 
 def read_saved(path: Path) -> tuple[str, bytes]:
-    """Return the name and the content of a file, or of a folder as a zip, to give to a page.
+    """Return the name and the content of a file, or of a folder as a zip, for a download.
 
     Raises
     ------
     TransferError
-        If it cannot be read, or is too large to be given.
+        If it cannot be read, or is too large.
     """
     try:
         if path.is_dir():
-            members = [each for each in sorted(path.rglob("*")) if each.is_file() and not each.is_symlink()]
+            entries = sorted(path.rglob("*"))
+            members = [entry for entry in entries if entry.is_file() and not entry.is_symlink()]
         else:
             members = [path]
-        if sum(each.stat().st_size for each in members) > MAX_DOWNLOAD_BYTES:
+        if sum(member.stat().st_size for member in members) > MAX_DOWNLOAD_BYTES:
             limit = f"{MAX_DOWNLOAD_BYTES >> 20} MB"
             raise TransferError(f"{path.name}: larger than {limit}; copy it from the folder of the server")
         if path.is_dir():

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pygame
 
 HEADER = struct.Struct("<I7H")
-"""Number, width, height; left, top, width and height of what changed; 1 if the frame starts from black."""
+"""Number, width, height; left, top, width and height of the changed box; 1 if the frame starts from black."""
 MAX_BASES_BYTES = 1 << 27
 """Memory of the frames that are kept because a page shows them."""
 _COMPRESSION_LEVEL = 1

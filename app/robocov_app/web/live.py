@@ -1,4 +1,4 @@
-"""A served window in a cell of a notebook: a process of its own, and a frame that shows it."""
+"""A served window in a cell of a notebook: a separate process, and a frame that shows it."""
 
 import os
 import re
@@ -14,53 +14,81 @@ from robocov.errors import RobocovError
 from robocov.optional_imports import import_optional
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 
+_END_TIMEOUT_S = 5.0
+"""Time for the process to end before it is killed."""
+
 
 class LiveWindow:
-    """The interactive window, live in the cell that shows it, until `close` or the end of the kernel.
+    """The interactive window in the notebook cell that shows it, until `close` or the end of the kernel.
 
-    `link`: its address, also for another tab. `arguments`: of ``robocov``, a command first. Raises
-    RobocovError with what the command says if it does not begin. JupyterHub needs jupyter-server-proxy.
+    JupyterHub needs jupyter-server-proxy.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Arguments of ``robocov``, the command first.
+    height : int
+        Height of the frame in the cell, CSS pixels.
+
+    Attributes
+    ----------
+    link : str
+        Address of the window, which can also be opened in another tab.
+    height : int
+        As passed.
+    close : callable
+        Ends the window.
+
+    Raises
+    ------
+    RobocovError
+        If the command does not open a window, with its message.
     """
+
+    link: str
 
     def __init__(self, arguments: Sequence[str], height: int = 620) -> None:
         import_optional("websockets", "web")
-        call = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
-        environment = {**os.environ, DRAFTS: ""}  # the cell makes the window again, there is nothing to offer
-        # a file: nobody reads on once the window is open, and a pipe that is full would stop the process
+        self.height = height
+        command = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
+        # Running the cell again rebuilds the window, so that drafts are not needed.
+        environment = {**os.environ, DRAFTS: ""}
+        # Errors go to a file: a full pipe that nobody reads would stop the process.
         with tempfile.TemporaryFile() as errors:
             self._process = subprocess.Popen(
-                call,
+                command,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,
                 text=True,
                 env=environment,
             )
-            self.close = weakref.finalize(self, _ended, self._process)
+            self.close = weakref.finalize(self, _end_process, self._process)
             assert self._process.stdout is not None
-            self.height = height
-            found = re.match(r"open (\S+)", self._process.stdout.readline())
-            if found is None:
+            first_line = re.match(r"open (\S+)", self._process.stdout.readline())
+            if first_line is None:
                 self._process.wait()
                 errors.seek(0)
                 text = errors.read().decode(errors="replace").strip().removeprefix("robocov: error: ")
                 raise RobocovError(text or "the window did not open")
-            self.link = found[1]
+            self.link = first_line[1]
 
     def _repr_html_(self) -> str:
         link = self.link
-        if prefix := os.environ.get("JUPYTERHUB_SERVICE_PREFIX"):
-            place = urlsplit(link)
-            link = f"{prefix}proxy/{place.port}/?{place.query}"
+        prefix = os.environ.get("JUPYTERHUB_SERVICE_PREFIX")
+        if prefix:
+            parts = urlsplit(link)
+            link = f"{prefix}proxy/{parts.port}/?{parts.query}"
         style = f"width:100%;height:{self.height}px;border:0"
         allowed = "clipboard-read; clipboard-write; fullscreen"
         return f'<iframe src="{escape(link)}" style="{style}" allow="{allowed}" title="robocov"></iframe>'
 
 
-def _ended(process: subprocess.Popen[str]) -> None:
-    with process:  # which closes its streams, and waits
+def _end_process(process: subprocess.Popen[str]) -> None:
+    """End a process, and close its streams."""
+    with process:
         process.terminate()
         try:
-            process.wait(5)
+            process.wait(_END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             process.kill()

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 MAX_VIEWERS = 100
 """Maximum number of pages with the link for watching."""
 MAX_TEACHERS = 16
-"""Maximum number of pages with the link for controlling. The oldest one has to go for one more."""
+"""Maximum number of pages with the link for controlling. If one more is opened, the oldest is closed."""
 MAX_NOTICES = 8
 """Maximum number of messages that wait for a page."""
 MAX_FRAMES_IN_FLIGHT = 2
-"""Maximum number of frames that were sent to a page and that it has not shown yet."""
+"""Maximum number of frames that were sent to a page but not shown yet."""
 
 
 class NoPlaceError(RobocovError):
@@ -203,7 +203,7 @@ class Pages:
         self._update_people()
 
     def pass_control(self, page: Page, number: int) -> None:
-        """Give control to the page with a number, if the page that asks for it may do so."""
+        """Give control to the page with a number, if the page that requests it is allowed to."""
         if page is not self.controlling and not page.is_teacher:
             return
         receivers = (other for other in self._pages if other.number == number)
@@ -222,7 +222,7 @@ class Pages:
         self._update_people()
 
     def wake(self) -> None:
-        """Send all pages what has changed."""
+        """Let all pages receive the changes."""
         for page in self._pages:
             page.has_news.set()
 

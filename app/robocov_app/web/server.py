@@ -233,7 +233,7 @@ class WebDisplay:
         return parse_cookies(request.headers.get_all("Cookie")).get(self._cookie_name, "")
 
     def _read_token(self, request: Request) -> str:
-        """Return the token in the address of a request, or else in its cookie."""
+        """Return the token in the address of a request; without one, the token in its cookie."""
         return get_token(request.path) or self._read_cookie(request)
 
     def _is_known(self, token: str) -> bool:
@@ -261,11 +261,11 @@ class WebDisplay:
             await Conversation(page, self.shared).run()
         finally:
             pages.close(page)
-            # Its last frame need not be kept any more.
+            # Its last frame is no longer needed.
             self.shared.delivery.has_work.set()
 
     def _handle_control_change(self, previous: Page | None, page: Page | None) -> None:
-        """Fit the window to the page that has control now, and release the keys that the other one held."""
+        """Fit the window to the page that has control now, and release the keys held by the previous one."""
         if page is not None:
             self.shared.window_input.set_page(page.settings)
         if previous is not None:

@@ -195,7 +195,7 @@ class VisitorServer:
         return respond_with_page(connection, may_be_framed=has_link, cookie=cookie)
 
     def _admit(self, connection: ServerConnection, cookie_token: str) -> Response:
-        """Redirect a browser with the link to an address of its own; nothing is started for it yet."""
+        """Redirect a browser with the common link to a visitor's own link. This starts no window yet."""
         visitor = read_id(cookie_token)
         if not (is_signed(cookie_token, self.token) or self._folders.find(visitor)):
             visitor = create_id()
@@ -269,7 +269,7 @@ class VisitorServer:
             return window
 
     async def _start_opening(self, visitor: str) -> VisitorWindow | None:
-        """Start to open a window for a visitor; return None if all places are taken."""
+        """Start opening a window for a visitor; return None if all places are taken."""
         folder = self._folders.find(visitor)
         spare = self._spare
         if folder is None and spare is not None and spare.is_alive:
@@ -315,8 +315,8 @@ class VisitorServer:
     async def _make_room(self) -> bool:
         """Make room for a window; return False if all places are taken.
 
-        Where none is free, the spare window is ended, or one that has ended already, or else the one that
-        has been idle for longest.
+        If no place is free, the spare window is ended; without one, a window that has already ended is
+        removed, or the one that has been idle for longest is ended.
         """
         spare = self._spare
         if len(self._windows) + (spare is not None) < self._max_windows:
@@ -341,7 +341,7 @@ class VisitorServer:
         return max(idle, key=lambda visitor: self._windows[visitor].idle_time, default=None)
 
     def _remove_idle_windows(self) -> None:
-        """Forget windows that have ended, and end those that have been idle for too long."""
+        """Remove windows that have ended, and end those that have been idle for too long."""
         self._processes = [process for process in self._processes if process.is_alive()]
         for visitor, window in list(self._windows.items()):
             if window.ending is not None or not window.opening.done():
@@ -365,7 +365,7 @@ class VisitorServer:
 def _cancel_on_signals() -> None:
     """Let SIGINT and SIGTERM cancel the current task.
 
-    Raised as a KeyboardInterrupt, Ctrl-C could end whatever task is running, instead of this one.
+    As a KeyboardInterrupt, Ctrl-C could end any running task instead of this one.
     """
     task = asyncio.current_task()
     assert task is not None

@@ -1,4 +1,4 @@
-"""Visitors of a server that gives a window to each: how they are known, and which folder is theirs."""
+"""Visitors of a server that opens a window for each: their identities and folders."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _ID_CHARACTERS = 24
 
 
 def create_id() -> str:
-    """Create the identity of a visitor: what cannot be guessed."""
+    """Create the identity of a visitor, which cannot be guessed."""
     return secrets.token_urlsafe(_ID_BYTES)
 
 
 def sign(visitor: str, key: str) -> str:
-    """Return the token of a visitor: it proves that the server with this key let them in."""
-    return f"{visitor}.{_signature(visitor, key)}"
+    """Return the token of a visitor, which proves that the server with this key has admitted them."""
+    return f"{visitor}.{_compute_signature(visitor, key)}"
 
 
 def read_id(token: str) -> str:
-    """Return the identity in a token, whoever signed it; empty if it is not a token of a visitor."""
+    """Return the identity in a token without checking its signature; empty if it is not a visitor's token."""
     visitor, dot, _ = token.partition(".")
     return visitor if dot and len(visitor) == _ID_CHARACTERS else ""
 
@@ -39,14 +39,15 @@ def is_signed(token: str, key: str) -> bool:
     return bool(visitor) and hmac.compare_digest(token.encode(errors="replace"), sign(visitor, key).encode())
 
 
-def _signature(visitor: str, key: str) -> str:
+def _compute_signature(visitor: str, key: str) -> str:
     return hmac.new(key.encode(), visitor.encode(errors="replace"), sha256).hexdigest()[:32]
 
 
 class VisitorFolders:
-    """The folders of visitors below one folder, also those of an earlier server.
+    """The folders of visitors below one folder, including those of earlier servers.
 
-    A file in that folder lists them by hashes of the visitors' identities, so that reading it lets nobody in.
+    A file in that folder lists them by hashes of the visitors' identities, so that readers of the file cannot
+    use these identities.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class VisitorFolders:
         return self._folder / name
 
     def create(self) -> Path:
-        """Create a folder that is nobody's; raises `OSError`."""
+        """Create a folder for a new visitor; raise `OSError` if that is not possible."""
         number = 1
         while True:
             path = self._folder / f"session-{number}"
@@ -81,8 +82,8 @@ class VisitorFolders:
                 number += 1
 
     def assign(self, visitor: str, path: Path) -> None:
-        """Remember that a folder is a visitor's; raises `OSError` or `OutputError`."""
-        # another server may have the same folder
+        """Assign a folder to a visitor; raise `OSError` or `OutputError` if it cannot be recorded."""
+        # Another server may use the same folder.
         self._names = {**_read_names(self._read()), **self._names, _hash(visitor): path.name}
         content = {"cookie": self.cookie, "visitors": self._names}
         with replace_file(self._folder / FILE_NAME) as part:
@@ -101,7 +102,7 @@ def _hash(visitor: str) -> str:
 
 
 def _read_names(content: dict[str, Any]) -> dict[str, str]:
-    """Return the names of folders by hashes of identities, without what is none."""
+    """Return the names of folders by hashes of identities, without invalid names."""
     names = content.get("visitors")
     if not isinstance(names, dict):
         return {}

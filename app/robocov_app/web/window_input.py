@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from robocov_app.toolkit.window import BaseWindow
 
 MAX_WAITING_MESSAGES = 5000
-"""Number of messages from which on the server reads no more of them until the window has caught up."""
+"""Beyond this number of messages, the server reads no more of them until the window has caught up."""
 NARROW_PAGE_PX = 700
 """Width of a page below which the panel is hidden, in CSS pixels."""
 _MIN_WAIT_S = 0.001
-"""Other threads get their turn even if the window does not want to wait."""
+"""Lets other threads run even if the window would not wait."""
 
 
 class WindowInput:
@@ -53,7 +53,7 @@ class WindowInput:
         self._has_arrived.set()
 
     def set_page(self, page: PageChanged | None) -> None:
-        """Let the window take the size and look of a page; None leaves them as they are."""
+        """Let the window adopt the size and colors of a page; None leaves them as they are."""
         self._page = page or self._page
         self._has_arrived.set()
 
@@ -88,7 +88,10 @@ class WindowInput:
         if window.screen.get_size() != size:
             pygame.display.set_mode(size, pygame.RESIZABLE)
             pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
-        was_narrow = self._is_narrow
-        self._is_narrow = page.width < NARROW_PAGE_PX * page.ratio
-        shows_panel = None if self._is_narrow == was_narrow else not self._is_narrow
-        window.set_appearance(page.ratio, "dark" if page.dark else "light", panel=shows_panel)
+        theme = "dark" if page.dark else "light"
+        is_narrow = page.width < NARROW_PAGE_PX * page.ratio
+        shows_panel: bool | None = None
+        if is_narrow != self._is_narrow:
+            shows_panel = not is_narrow
+        self._is_narrow = is_narrow
+        window.set_appearance(page.ratio, theme, panel=shows_panel)

@@ -90,7 +90,7 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     -------
     process : SpawnProcess
     output : Connection
-        Receives what the process prints.
+        Receives the standard output of the process.
     """
     own_options = replace(options, each=False, host="127.0.0.1", port=0, folder=folder)
     context = multiprocessing.get_context("spawn")
@@ -143,7 +143,7 @@ class _PipeOutput(TextIOBase):
         self._pipe = pipe
 
     def write(self, text: str, /) -> int:
-        """Send a text; it is lost if the server does not read any more."""
+        """Send a text; it is lost if the server no longer reads."""
         with suppress(OSError):
             self._pipe.send(text)
         return len(text)

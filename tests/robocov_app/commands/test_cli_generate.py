@@ -76,7 +76,7 @@ def test_overwriting_replaces_maps_and_nothing_else(
     capsys.readouterr()
     mine.write_text("{}")
     assert main(words) == 2
-    assert f"{mine}: is no map of robocov, so --overwrite leaves it alone" in capsys.readouterr().err
+    assert f"{mine}: is not a map of robocov, and --overwrite does not replace it" in capsys.readouterr().err
     assert (other.read_text(), mine.read_text()) == ("mine", "{}")
 
 

@@ -52,7 +52,7 @@ def test_the_answer_as_json(run, tmp_path, capsys) -> None:
 def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
     (run / "report.html").write_text("mine")
     said = complaint(capsys, "report", str(run))
-    assert said.startswith(f"{run / 'report.html'}: the file is no report of robocov")
+    assert said.startswith(f"{run / 'report.html'}: the file is not a report of robocov")
     assert (run / "report.html").read_text() == "mine"
     assert main(["report", str(run), "--overwrite", "--theme", "dark"]) == 0
     assert is_report(run / "report.html")

@@ -297,7 +297,7 @@ def test_the_end_does_not_wait_for_lines_on_which_nothing_comes():
 
 
 def test_a_port_that_is_taken_is_told_in_a_line(display):
-    taken = rf"^--port: 127.0.0.1:{display.port} cannot be listened to: address already in use; --port 0"
+    taken = rf"^--port: cannot listen at 127.0.0.1:{display.port}: address already in use. Use --port 0"
     with pytest.raises(RobocovError, match=taken), WebDisplay(port=display.port):
         pass
 
@@ -671,7 +671,7 @@ def test_a_served_window_reads_and_writes_below_its_folder_alone(tmp_path):
             for act in (path.read_text, lambda path=path: path.write_text("1"), path.unlink, path.mkdir):
                 if path.name == "link.json" and act == path.unlink:
                     continue
-                with pytest.raises(OutsideError, match="outside of the folder"):
+                with pytest.raises(OutsideError, match="outside the served folder"):
                     act()
         for act in (lambda: list(tmp_path.iterdir()), lambda: (folder / "own.json").rename(tmp_path / "x")):
             with pytest.raises(OutsideError):

@@ -192,13 +192,13 @@ def _check_file(path: Path, *, overwrite: bool) -> None:
 
 
 def _check_replaced_map(path: Path) -> None:
-    """Check that a file which would be replaced is a map of robocov."""
+    """Check that an existing file is a map of robocov, which may be replaced."""
     if not resolve_target(path).exists():
         return
     try:
         load_map(path)
     except MapError:
-        reason = "is no map of robocov, so --overwrite leaves it alone; choose another --out"
+        reason = "is not a map of robocov, and --overwrite does not replace it; choose another --out"
         raise InputError(f"{path}: {reason}") from None
 
 

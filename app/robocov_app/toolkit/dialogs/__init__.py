@@ -1,4 +1,4 @@
-"""Dialogs over a window: questions with answers, lists from which one chooses by typing, files.
+"""Dialogs over a window: questions with answers, lists that are filtered by typing, files.
 
 - `dialog`, `dialogs`: what all dialogs have in common; the one that is open gets the events
 - `question`, `choice`, `file_choice`, `recovery`: the kinds of dialogs

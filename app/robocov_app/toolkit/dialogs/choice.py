@@ -1,4 +1,4 @@
-"""Lists from which one chooses by typing."""
+"""Lists that are filtered by typing."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Option:
     disabled_reason : str
         Why it cannot be chosen; empty if it can.
     value : object
-        Anything that the function needs which accepts it.
+        Data for the function that accepts the line.
     """
 
     text: str
@@ -77,8 +77,8 @@ class Choice(Dialog):
     options: Callable[[str], Sequence[Option]]
     accept: Callable[[str, Option | None], object]
     placeholder: str = ""
-    hint: str = "↑ ↓ choose · Enter does it · Esc closes"
-    empty_text: str = "nothing of that name"
+    hint: str = "↑ ↓ choose · Enter accepts · Esc closes"
+    empty_text: str = "no matches"
     text: str = ""
     chosen: int = 0
     top: int = 0
@@ -122,7 +122,7 @@ class Choice(Dialog):
         box.midtop = screen.width // 2, round(_TOP_PX * scale)
 
     def read_widgets(self, ui: Ui) -> None:
-        """Read the typed text, also if more events come within the same frame."""
+        """Read the typed text, even if more events come within the same frame."""
         if ui.focus == _FIELD and ui.edit is not None and ui.edit.text != self.text:
             self._set_text(ui.edit.text)
 
@@ -168,7 +168,7 @@ class Choice(Dialog):
         return True
 
     def _move(self, step: int) -> None:
-        """Choose another line, and scroll it into sight."""
+        """Choose another line, and scroll it into view."""
         last = max(len(self.options(self.text)) - 1, 0)
         self.chosen = min(max(self.chosen + step, 0), last)
         self.top = min(max(self.top, self.chosen - VISIBLE_OPTIONS + 1), self.chosen)
@@ -203,7 +203,7 @@ def create_list_choice(
 
     def accept_option(text: str, option: Option | None) -> None:
         if option is None:
-            raise InputError(f"expected one of the list, got {text!r}")
+            raise InputError(f"expected a line of the list, got {text!r}")
         accept(option)
 
     return Choice(title, find_options, accept_option, placeholder="type to find")

@@ -47,11 +47,11 @@ class Dialog:
         ui.space(above)
 
     def handle_key(self, name: str, ui: Ui) -> bool:
-        """Handle a key; return whether it meant something. Otherwise, the focused widget gets it."""
+        """Handle a key; return whether it was used. If not, the focused widget gets it."""
         return False
 
     def handle_wheel(self, notches: float) -> bool:
-        """Handle the wheel; return whether it meant something. Otherwise, the widgets get it."""
+        """Handle the wheel; return whether it was used. If not, the widgets get it."""
         return False
 
     def read_widgets(self, ui: Ui) -> None:

@@ -30,7 +30,7 @@ def create_file_choice(
     folder : Path
         Folder of paths that are not absolute.
     accept : callable
-        Gets the path.
+        Called with the path.
     suffixes : sequence of str
         Suffixes of the files that are listed; by default all are.
     recent : sequence of Path

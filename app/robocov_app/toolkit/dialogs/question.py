@@ -87,7 +87,7 @@ class Question(Dialog):
         for line in lines[:MAX_LINES]:
             ui.paragraph(line, size=_TEXT_PX)
         if len(lines) > MAX_LINES:
-            more = f"… and {len(lines) - MAX_LINES} lines more"
+            more = f"… and {len(lines) - MAX_LINES} more lines"
             ui.paragraph(more, size=_TEXT_PX, color=ui.theme.faint)
 
     def _give(self, answer: Answer) -> None:

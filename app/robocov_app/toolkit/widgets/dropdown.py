@@ -43,7 +43,7 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
 
 
 def _read_list(page: Page, key: str, options: Sequence[str]) -> str | None:
-    """Return what was picked from the open list of a menu, and close a list of other options."""
+    """Return the option picked from the open list of a menu; close the list if its options have changed."""
     open_list = page.open_list
     if open_list is None or open_list.key != key:
         return None

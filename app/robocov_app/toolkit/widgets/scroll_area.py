@@ -90,7 +90,7 @@ def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:
 
 
 def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: float) -> float:
-    """Show the scroll bar of an area, and return the length that is scrolled out of sight."""
+    """Show the scroll bar of an area, and return the length that is scrolled out of view."""
     height = area.height / page.scale
     max_offset = content_height - height
     bar_key = f"bar:{key}"

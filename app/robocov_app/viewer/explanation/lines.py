@@ -189,7 +189,7 @@ def _compute_component(force: complex, direction: complex) -> float:
 
 
 def _find_balancing_forces(forces: dict[str, complex]) -> list[str]:
-    """Return the kinds of the two strongest forces if they cancel, else of the three strongest."""
+    """Return the kinds of the two strongest forces if they cancel, otherwise of the three strongest."""
     strongest = sorted(forces, key=lambda kind: -abs(forces[kind]))
     pair = sum((forces[kind] for kind in strongest[:2]), 0j)
     is_pair = abs(pair) < _PAIR_FRACTION * abs(forces[strongest[0]])

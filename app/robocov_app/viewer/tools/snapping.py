@@ -23,7 +23,8 @@ def snap_point(environment: Environment, point: Point, reach: float) -> Point:
     Returns
     -------
     Point
-        The nearest corner within reach, else the nearest point on a wall within reach, else the point itself.
+        The nearest corner within reach; if there is none, the nearest point on a wall within reach; otherwise
+        the point itself.
     """
     walls = environment.free.boundary
     corners = shapely.get_coordinates(walls)

@@ -48,5 +48,5 @@ class Toolbox:
 
     @property
     def resizable(self) -> ViewerTool:
-        """The tool whose size the keys [ and ] change: the one in use, else the wall."""
+        """The tool whose size the keys [ and ] change: the one in use, or the wall if that has no size."""
         return self.current if self.current.is_resizable else self.wall
