@@ -32,7 +32,7 @@ class OutsideError(InputError, PermissionError):
 
 
 class FileConfinement:
-    """Restriction of this process to files below some folders, whether their paths are typed, stored or linked.
+    """Restriction of this process to files below some folders, whether paths are typed, stored or linked.
 
     Parameters
     ----------
