@@ -5,13 +5,13 @@ import pygame
 
 from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.fonts import label
+from robocov_app.render.fonts import render_text
 from robocov_app.render.picture import Painter
 
 
 def places(frame, words, size, theme, color):
     """Return the (x, y) middles of all places where bold `words` stand on the background."""
-    alpha = pygame.surfarray.array_alpha(label(words, size, color, True)).T.astype(float) / 255
+    alpha = pygame.surfarray.array_alpha(render_text(words, size, color, True)).T.astype(float) / 255
     rows, columns = np.nonzero(alpha)
     alpha = alpha[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     height, width = alpha.shape

@@ -12,9 +12,9 @@ from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.fonts import shortened, text_width
+from robocov_app.render.fonts import measure_text, shorten_to_width
 from robocov_app.render.scene import Scene
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 MARGIN = 14.0
 EDGE = MARGIN + 2.0
@@ -32,7 +32,7 @@ def is_small(height: float, scale: float, shown: Set[str]) -> bool:
 
 def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:
     height = canvas.surface.get_height()
-    if not is_small(height, canvas.scale, canvas.shown):
+    if not is_small(height, canvas.scale, canvas.visible_layers):
         _draw_bar(canvas, EDGE * canvas.scale, height - 0.5 * STRIP * canvas.scale)
 
 
@@ -40,13 +40,13 @@ def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
     """Draw a bar of a round length, with its length, and return how wide both are, px."""
     length = bar_length(canvas)
     pixels = length * canvas.camera.zoom
-    tick, width = 4.0 * canvas.scale, canvas.width(1.5)
+    tick, width = 4.0 * canvas.scale, canvas.scale_width(1.5)
     ink = canvas.theme.ink
     for x in (left, left + pixels):
         canvas.surface.fill(ink, (round(x - width / 2), round(y - tick), width, round(2 * tick)))
     canvas.surface.fill(ink, (round(left), round(y - width / 2), round(pixels), width))
     space = pixels + 8 * canvas.scale
-    return space + canvas.text(format_scale_length(length), (left + space, y), bold=True)
+    return space + canvas.draw_text(format_scale_length(length), (left + space, y), bold=True)
 
 
 def bar_length(canvas: Canvas) -> float:
@@ -61,27 +61,29 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
     brief = scene.cost.replace("mean distance by φ ", "").replace("mean distance ", "")
     costs = [scene.cost, brief, brief.partition(",")[0]]  # the number stays where the words have no room
     gap = 12 * canvas.scale
-    room = right - left - gap - canvas.text_width(costs[-1])
-    name = shortened(scene.label, canvas.text_size(size), room, bold=True)
-    left += canvas.text(name, (left, y), size=size, bold=True) + gap
-    if "scale_bar" in canvas.shown and is_small(canvas.surface.get_height(), canvas.scale, canvas.shown):
+    room = right - left - gap - canvas.measure_text(costs[-1])
+    name = shorten_to_width(scene.label, canvas.scale_text_size(size), room, bold=True)
+    left += canvas.draw_text(name, (left, y), size=size, bold=True) + gap
+    if "scale_bar" in canvas.visible_layers and is_small(
+        canvas.surface.get_height(), canvas.scale, canvas.visible_layers
+    ):
         left += _draw_bar(canvas, left, y) + gap
-    cost = next((each for each in costs if canvas.text_width(each) <= right - left), "")
-    canvas.text(cost, (right, y), anchor="right")
+    cost = next((each for each in costs if canvas.measure_text(each) <= right - left), "")
+    canvas.draw_text(cost, (right, y), anchor="right")
 
 
 def draw_status(canvas: Canvas, scene: Scene) -> None:
     bar = bar_length(canvas)
     taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
-    taken += canvas.text_width(format_scale_length(bar), bold=True)
+    taken += canvas.measure_text(format_scale_length(bar), bold=True)
     right = canvas.surface.get_width() - EDGE * canvas.scale
     y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
-    size = canvas.text_size(canvas.theme.text)
-    name = shortened(scene.label, size, right - taken, bold=True)
-    text = fitting_status(scene, size, right - taken - canvas.text_width(name, bold=True))
-    canvas.text(text, (right, y), anchor="right")
-    left = right - canvas.text_width(text) if text else right
-    canvas.text(name, (left, y), anchor="right", bold=True)
+    size = canvas.scale_text_size(canvas.theme.text)
+    name = shorten_to_width(scene.label, size, right - taken, bold=True)
+    text = fitting_status(scene, size, right - taken - canvas.measure_text(name, bold=True))
+    canvas.draw_text(text, (right, y), anchor="right")
+    left = right - canvas.measure_text(text) if text else right
+    canvas.draw_text(name, (left, y), anchor="right", bold=True)
 
 
 def fitting_status(scene: Scene, size: int, room: float) -> str:
@@ -89,21 +91,21 @@ def fitting_status(scene: Scene, size: int, room: float) -> str:
     time = f"t = {scene.snapshot.time:.1f} s" if scene.snapshot is not None else ""
     facts = [text for text in (time, scene.cost, scene.environment.name) if text]
     lead = "   ·   " if scene.label else ""
-    while len(facts) > 1 and text_width(lead + "   ·   ".join(facts), size) > room:
+    while len(facts) > 1 and measure_text(lead + "   ·   ".join(facts), size) > room:
         facts.pop()
-    return shortened(lead + "   ·   ".join(facts), size, room) if facts else ""
+    return shorten_to_width(lead + "   ·   ".join(facts), size, room) if facts else ""
 
 
 class LegendStrip:
     """Glyphs, drawn as the layers draw them, with words; kept until one changes."""
 
     def __init__(self) -> None:
-        self._strip = Latest[pygame.Surface]()
+        self._strip = LatestValue[pygame.Surface]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        width, words = canvas.surface.get_width(), tuple(entry.key() for entry in canvas.legend)
-        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
-        canvas.surface.blit(self._strip.of(None, key, lambda: legend_strip(canvas.legend, canvas)), (0, 0))
+        width, words = canvas.surface.get_width(), tuple(entry.key for entry in canvas.legend)
+        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.visible_layers)
+        canvas.surface.blit(self._strip.get(None, key, lambda: legend_strip(canvas.legend, canvas)), (0, 0))
 
 
 def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:
@@ -119,7 +121,7 @@ def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surfa
         for entry in row:
             entry.draw(own, x + 0.5 * (_GLYPH - 6) * canvas.scale, y)
             x += _GLYPH * canvas.scale
-            x += own.text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
+            x += own.draw_text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
     return strip
 
 
@@ -139,7 +141,7 @@ def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[Leg
     rows: list[list[LegendEntry]] = []
     used = 0.0
     for entry in entries:
-        wide = _GLYPH * canvas.scale + canvas.text_width(entry.text, canvas.theme.small_text)
+        wide = _GLYPH * canvas.scale + canvas.measure_text(entry.text, canvas.theme.small_text)
         if not rows or used + wide > room:
             rows.append([])
             used = 0.0

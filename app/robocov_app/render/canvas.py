@@ -1,241 +1,354 @@
-"""The canvas: a surface with a camera and a theme, and the strokes that layers are made of."""
+"""The canvas: a surface with a camera and a theme, and the strokes from which layers are drawn."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import pygame
-import shapely
 
 from robocov.arrays import Array, IntArray
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
-from robocov_app.render.fonts import label, text_width
+from robocov_app.render.clipping import clip_polygon, clip_segment, is_within_limit
+from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.render.sprites import Pixel
 
-FAR = 20000.0  # pixels. Products of twice this still fit 32 bits.
+_MIN_TEXT_PX = 7
+_DASH_FRACTION = 0.55
+"""Length of a dash, as a fraction of the distance from one to the next."""
+_MIN_CIRCLE_SIDES = 24
+_MAX_CIRCLE_SIDES = 720
+_SWATCH_PX = 11
+_OUTSIDE_PX = 500
+"""Sprites and arrows that start farther outside the surface are left out."""
+
+Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
+"""Renders a small picture, shifted to the right and down by quarters of a pixel."""
+PlacedSprites: TypeAlias = list[tuple[pygame.Surface, tuple[int, int]]]
+"""Pictures and their upper left corners, px."""
+Glyph: TypeAlias = Callable[["Canvas", float, float], None]
+"""Draws a symbol of a legend around a pixel, in 22 x 14 px at scale 1."""
+ArrowHead: TypeAlias = Literal["full", "open", "dot", "bar"]
+TextAnchor: TypeAlias = Literal["left", "middle", "right"]
 
 
-def bounded(points: Array) -> Array:
-    """Return (..., 2) pixels, those farther out than `FAR` moved to it: for what is not seen there anyway."""
-    return np.clip(points, -FAR, FAR)
-
-
-def clipped_polygon(corners: Array) -> list[Array]:
-    """Return the rings of what of the (k, 2) px polygon lies within `FAR`: mostly the one given."""
-    if len(corners) < 3:
-        return []
-    if np.abs(corners).max() <= FAR:
-        return [corners]
-    inside = shapely.clip_by_rect(shapely.Polygon(corners), -FAR, -FAR, FAR, FAR)
-    parts = [part for part in shapely.get_parts(inside) if isinstance(part, shapely.Polygon)]
-    return [np.asarray(part.exterior.coords)[:-1] for part in parts if not part.is_empty]
-
-
-def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
-    """Return the ends of what of a segment lies within `FAR`, none when nothing does."""
-    (x1, y1), (x2, y2) = start, end
-    if max(abs(x1), abs(y1), abs(x2), abs(y2)) <= FAR:
-        return start, end
-    if min(x1, x2) > FAR or max(x1, x2) < -FAR or min(y1, y2) > FAR or max(y1, y2) < -FAR:
-        return []
-    inside = shapely.clip_by_rect(shapely.LineString([start, end]), -FAR, -FAR, FAR, FAR)
-    ends: list[Pixel] = shapely.get_coordinates(inside).tolist()
-    return ends
-
-
-Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]  # for a shift in quarters of a pixel
-Placed: TypeAlias = list[tuple[pygame.Surface, tuple[int, int]]]  # pictures and their corners, px
-Glyph: TypeAlias = Callable[["Canvas", float, float], None]  # around a pixel, in 22 x 14 px at scale 1
-
-
-def premultiplied(color: Color, alpha: float) -> tuple[int, int, int, int]:
-    """Return a color as ``BLEND_PREMULTIPLIED`` takes it; `alpha` is 0 to 1."""
-    red, green, blue = (round(c * alpha) for c in color)
+def premultiply(color: Color, alpha: float) -> tuple[int, int, int, int]:
+    """Return a color with an opacity from 0 to 1 for drawing with ``BLEND_PREMULTIPLIED``."""
+    red, green, blue = (round(channel * alpha) for channel in color)
     return red, green, blue, round(255 * alpha)
 
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """A line of the legend; `style` differs where the same words stand beside another glyph."""
+    """An entry of a legend.
+
+    Attributes
+    ----------
+    text : str
+    draw : Glyph
+        Draws its symbol.
+    style : str
+        Distinguishes entries that have the same text, but another symbol.
+    """
 
     text: str
     draw: Glyph
     style: str = ""
 
+    @property
     def key(self) -> tuple[str, str]:
+        """Text and style; entries with the same key look alike."""
         return self.text, self.style
 
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """Drawing target; `scale` multiplies the theme's sizes, `hues` (n,) index its colors of robots."""
+    """A surface with a camera, a theme and a scale, on which layers are drawn.
+
+    Attributes
+    ----------
+    surface : pygame.Surface
+    camera : Camera
+    theme : Theme
+    scale : float
+        Factor of the sizes of the theme.
+    hues : (n,) int array
+        Hue of each robot, an index into `Theme.robots`.
+    visible_layers : frozenset of str
+        Names of the layers that are drawn.
+    legend : sequence of LegendEntry
+        Entries of the legend.
+    """
 
     surface: pygame.Surface
     camera: Camera
     theme: Theme
     scale: float
     hues: IntArray
-    shown: frozenset[str] = frozenset()
+    visible_layers: frozenset[str] = frozenset()
     legend: Sequence[LegendEntry] = ()
 
-    def width(self, pixels: float) -> int:
-        """Return a stroke's width of `pixels` at scale 1: whole pixels, at least one."""
+    def scale_width(self, pixels: float) -> int:
+        """Return the width of a stroke, px at scale 1, in pixels of the surface: at least one."""
         return max(1, round(pixels * self.scale))
 
-    def text_size(self, pixels: float) -> int:
-        return max(7, round(pixels * self.scale))
+    def scale_text_size(self, pixels: float) -> int:
+        """Return a text size, px at scale 1, in pixels of the surface."""
+        return max(_MIN_TEXT_PX, round(pixels * self.scale))
 
-    def polygon(self, corners: Array, fill: Color | tuple[int, int, int, int]) -> None:
-        for ring in clipped_polygon(corners):
+    def fill_polygon(self, corners: Array, fill: Color | tuple[int, int, int, int]) -> None:
+        """Fill a polygon, (k, 2) px."""
+        for ring in clip_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
-    def polygons(
+    def draw_polygons(
         self, corners: Array, ends: Sequence[int], fills: Sequence[Color | None], edge: Color | None = None
     ) -> None:
-        """Fill polygons, one after the other in (k, 2) px corners up to each of the `ends`."""
-        far = len(corners) > 0 and np.abs(corners).max() > FAR
-        points, draw, begin = np.rint(corners).tolist(), pygame.draw.polygon, 0
+        """Draw many polygons.
+
+        Parameters
+        ----------
+        corners : (k, 2) array, px
+            The corners of all polygons, one polygon after the other.
+        ends : sequence of int
+            For each polygon, the row after its last corner.
+        fills : sequence of Color or None
+            Color of each polygon; those with None are not filled.
+        edge : Color, optional
+            Color of the outlines, which are not smooth.
+        """
+        is_near = is_within_limit(corners)
+        points = np.rint(corners).tolist()
+        edge_width = self.scale_width(1.0)
+        start = 0
         for end, fill in zip(ends, fills, strict=True):
-            for color, width in ((fill, 0), (edge, self.width(1.0))):
-                if color is None or end - begin < 3:
-                    continue
-                if not far:
-                    draw(self.surface, color, points[begin:end], width)
-                elif width:
-                    self.outline(corners[begin:end], color, width)
-                else:
-                    self.polygon(corners[begin:end], color)
-            begin = end
+            if end - start >= 3:
+                if fill is not None and is_near:
+                    pygame.draw.polygon(self.surface, fill, points[start:end])
+                elif fill is not None:
+                    self.fill_polygon(corners[start:end], fill)
+                if edge is not None and is_near:
+                    pygame.draw.polygon(self.surface, edge, points[start:end], edge_width)
+                elif edge is not None:
+                    self.draw_outline(corners[start:end], edge, edge_width)
+            start = end
 
-    def outline(self, corners: Array, color: Color, width: int = 1, closed: bool = True) -> None:
+    def draw_outline(self, corners: Array, color: Color, width: int = 1, *, is_closed: bool = True) -> None:
+        """Draw a smooth line through (k, 2) px, by default back to the first."""
         points = corners.tolist()
-        for start, end in pairwise([*points, *points[:1]] if closed else points):
-            self.line(start, end, color, width)
-        if width > 2:  # lines have straight ends: fill the corners' notches
+        path = [*points, *points[:1]] if is_closed else points
+        for start, end in pairwise(path):
+            self.draw_line(start, end, color, width)
+        if width > 2:
+            # Thick lines have straight ends, which leave notches at the corners.
+            dot = partial(sprites.render_dot, width / 2 - 0.5, color)
             for point in points:
-                self.stamp(partial(sprites.dot, width / 2 - 0.5, color), point)
+                self.draw_sprite(dot, point)
 
-    def line(self, start: Pixel, end: Pixel, color: Color, width: int = 1) -> None:
-        if ends := clipped_segment(start, end):
+    def draw_line(self, start: Pixel, end: Pixel, color: Color, width: int = 1) -> None:
+        """Draw a smooth line between two pixels."""
+        ends = clip_segment(start, end)
+        if ends:
             pygame.draw.aaline(self.surface, color, ends[0], ends[1], width)
 
-    def thin_path(self, points: Sequence[Pixel], color: Color, closed: bool = False) -> None:
-        """Draw a smooth line of one pixel through points within `FAR`."""
+    def draw_thin_path(self, points: Sequence[Pixel], color: Color, *, is_closed: bool = False) -> None:
+        """Draw a smooth line of one pixel through points within `clipping.MAX_DRAWN_PX`."""
         if len(points) == 2:
             # With two points, aalines of pygame-ce 2.5 reads memory beyond them: frames would vary.
             pygame.draw.aaline(self.surface, color, points[0], points[1])
         else:
-            pygame.draw.aalines(self.surface, color, closed, points)
+            pygame.draw.aalines(self.surface, color, is_closed, points)
 
-    def segments(self, ends: Array, color: Color, width: int = 1) -> None:
+    def draw_segments(self, ends: Array, color: Color, width: int = 1) -> None:
         """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
-        far = len(ends) > 0 and np.abs(ends).max() > FAR
+        is_near = is_within_limit(ends)
         for x1, y1, x2, y2 in ends.tolist():
-            if far:
-                self.line((x1, y1), (x2, y2), color, width)
-            else:
+            if is_near:
                 pygame.draw.aaline(self.surface, color, (x1, y1), (x2, y2), width)
+            else:
+                self.draw_line((x1, y1), (x2, y2), color, width)
 
-    def dashes(self, start: Pixel, end: Pixel, color: Color, width: int = 1, dash: float = 5.0) -> None:
-        if not (ends := clipped_segment(start, end)):
+    def draw_dashed_line(
+        self, start: Pixel, end: Pixel, color: Color, width: int = 1, dash: float = 5.0
+    ) -> None:
+        """Draw a dashed line between two pixels; dashes are about `dash` px long at scale 1."""
+        ends = clip_segment(start, end)
+        if not ends:
             return
-        a, b = map(np.array, ends)
-        count = max(1, round(float(np.hypot(*(b - a))) / (2 * dash * self.scale)))
+        first = np.array(ends[0])
+        along = np.array(ends[1]) - first
+        count = max(1, round(float(np.hypot(*along)) / (2 * dash * self.scale)))
         for k in range(count):
-            first, last = a + (b - a) * (k / count), a + (b - a) * ((k + 0.55) / count)
-            pygame.draw.aaline(self.surface, color, first.tolist(), last.tolist(), width)
+            dash_start = first + along * (k / count)
+            dash_end = first + along * ((k + _DASH_FRACTION) / count)
+            pygame.draw.aaline(self.surface, color, dash_start.tolist(), dash_end.tolist(), width)
 
-    def circle(self, center: Pixel, radius: float, color: Color, dashed: bool = False) -> None:
-        sides = int(min(max(radius, 24), 720)) // 2 * 2
+    def draw_circle(self, center: Pixel, radius: float, color: Color, *, is_dashed: bool = False) -> None:
+        """Draw a circle with a radius in pixels."""
+        sides = int(min(max(radius, _MIN_CIRCLE_SIDES), _MAX_CIRCLE_SIDES)) // 2 * 2
         angle = np.arange(sides + 1) * (2 * np.pi / sides)
         corners = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        for start, end in list(pairwise(corners.tolist()))[:: 2 if dashed else 1]:
-            self.line(start, end, color, self.width(1.0))
+        step = 2 if is_dashed else 1
+        for start, end in list(pairwise(corners.tolist()))[::step]:
+            self.draw_line(start, end, color, self.scale_width(1.0))
 
-    def level(self, x: float, y: float, half: float) -> tuple[Pixel, Pixel]:
-        """Return the ends of a level stroke for the legend, around a pixel; `half` its length at scale 1."""
-        return (x - half * self.scale, y), (x + half * self.scale, y)
+    def get_symbol_line(self, x: float, y: float, half_length: float) -> tuple[Pixel, Pixel]:
+        """Return the ends of a horizontal line that is the symbol of lines in a legend.
 
-    def swatch(self, x: float, y: float, fill: Color | None, edge: Color) -> None:
-        size = 11 * self.scale
+        Parameters
+        ----------
+        x, y : float, px
+            Middle of the line.
+        half_length : float, px at scale 1
+
+        Returns
+        -------
+        start, end : (float, float), px
+        """
+        half = half_length * self.scale
+        return (x - half, y), (x + half, y)
+
+    def draw_swatch(self, x: float, y: float, fill: Color | None, edge: Color) -> None:
+        """Draw a small square around a pixel, as the symbol of areas in a legend."""
+        size = _SWATCH_PX * self.scale
         box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
         if fill is not None:
             pygame.draw.rect(self.surface, fill, box)
-        pygame.draw.rect(self.surface, edge, box, self.width(1.0))
+        pygame.draw.rect(self.surface, edge, box, self.scale_width(1.0))
 
-    def arrow(self, start: Pixel, end: Pixel, color: Color, width: float, head: str = "full") -> None:
-        """Draw an arrow with a head that is ``full`` or ``open``, a ``dot`` or a ``bar``."""
-        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-        length = float(np.hypot(*(b - a)))
-        if length < 1.0 or ((a <= -500.0) | (a >= np.add(self.surface.get_size(), 500.0))).any():
+    def draw_arrow(
+        self, start: Pixel, end: Pixel, color: Color, width: float, head: ArrowHead = "full"
+    ) -> None:
+        """Draw an arrow between two pixels.
+
+        Parameters
+        ----------
+        start, end : (float, float), px
+        color : Color
+        width : float, px
+            Width of the shaft.
+        head : {"full", "open", "dot", "bar"}
+        """
+        tail = np.asarray(start, dtype=float)
+        tip = np.asarray(end, dtype=float)
+        length = float(np.hypot(*(tip - tail)))
+        is_outside = (tail <= -_OUTSIDE_PX) | (tail >= np.add(self.surface.get_size(), _OUTSIDE_PX))
+        if length < 1.0 or is_outside.any():
             return
-        along = (b - a) / length
+        along = (tip - tail) / length
         across = np.array([-along[1], along[0]])
-        size = min(2.6 * width + 4 * self.scale, length)
-        left, right = b - size * along + 0.48 * size * across, b - size * along - 0.48 * size * across
-        shaft = [a, b - 0.7 * size * along] if head == "full" else [a, b]
+        head_length = min(2.6 * width + 4 * self.scale, length)
         if head == "bar":
-            left, right = (b + side * (1.1 * width + 1.7 * self.scale) * across for side in (-1, 1))
-        barbs = np.array([left, right] if head == "bar" else [left, b, right]).tolist()
-        sketch = sprites.Sketch.around([a.tolist(), *barbs], 2 * width)
+            half_bar = 1.1 * width + 1.7 * self.scale
+            barbs = [(tip - half_bar * across).tolist(), (tip + half_bar * across).tolist()]
+        else:
+            base = tip - head_length * along
+            half_width = 0.48 * head_length
+            barbs = [
+                (base + half_width * across).tolist(),
+                tip.tolist(),
+                (base - half_width * across).tolist(),
+            ]
+        sketch = sprites.Sketch.from_points([tail.tolist(), *barbs], 2 * width)
         if sketch is None:
             return
-        sketch.path(np.array(shaft).tolist(), color, width)
+        # The shaft must not stick out of the tip of a full head.
+        shaft_end = tip - 0.7 * head_length * along if head == "full" else tip
+        sketch.draw_path([tail.tolist(), shaft_end.tolist()], color, width)
         if head == "full":
-            sketch.polygon(barbs, color)
+            sketch.fill_polygon(barbs, color)
         elif head == "dot":
-            sketch.dot(barbs[1], 1.5 * width, color)
+            sketch.draw_dot(barbs[1], 1.5 * width, color)
         else:
-            sketch.path(barbs, color, width)
-        sketch.onto(self.surface)
+            sketch.draw_path(barbs, color, width)
+        sketch.draw_on(self.surface)
 
-    def stamp(self, sprite: Sprite, center: Pixel) -> None:
-        self.stamps([sprite], np.array([center], dtype=float))
+    def draw_sprite(self, sprite: Sprite, center: Pixel) -> None:
+        """Draw a sprite around a pixel."""
+        self.draw_sprites([sprite], np.array([center], dtype=float))
 
-    def stamps(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> None:
-        """Put sprites at (n, 2) px, to a quarter of a pixel: number `which`, (n,), or all the first."""
-        self.surface.fblits(self.placed(some, centers, which), pygame.BLEND_PREMULTIPLIED)
+    def draw_sprites(
+        self, choices: Sequence[Sprite], centers: Array, indices: IntArray | None = None
+    ) -> None:
+        """Draw a sprite at each of many pixels.
 
-    def placed(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> Placed:
-        far = np.add(self.surface.get_size(), 500)
-        near = np.flatnonzero(((centers > -500) & (centers < far)).all(axis=1))
-        # as for lines, whole numbers are the middles of pixels
-        places, shifts = np.divmod(np.rint((centers[near] + 0.5) * sprites.FINE).astype(int), sprites.FINE)
-        number = np.zeros(len(near), dtype=int) if which is None else which[near]
-        known: dict[tuple[int, int, int], tuple[pygame.Surface, int]] = {}
-        pictures = []
-        columns = *places.T.tolist(), number.tolist(), *shifts.T.tolist()
-        for x, y, sprite, right, down in zip(*columns, strict=True):
-            if (look := (sprite, right, down)) not in known:
-                picture = some[sprite]((right, down))
-                known[look] = picture, picture.get_width() // 2
-            picture, half = known[look]
-            pictures.append((picture, (x - half, y - half)))
-        return pictures
+        Parameters
+        ----------
+        choices : sequence of Sprite
+        centers : (n, 2) array, px
+            Rounded to a quarter of a pixel.
+        indices : (n,) int array, optional
+            The sprite at each center, an index into `choices`; by default the first everywhere.
+        """
+        placed = self.place_sprites(choices, centers, indices)
+        self.surface.fblits(placed, pygame.BLEND_PREMULTIPLIED)
 
-    def text(
+    def place_sprites(
+        self, choices: Sequence[Sprite], centers: Array, indices: IntArray | None = None
+    ) -> PlacedSprites:
+        """Return the pictures that `draw_sprites` draws, with their upper left corners, px."""
+        limit = np.add(self.surface.get_size(), _OUTSIDE_PX)
+        is_near = ((centers > -_OUTSIDE_PX) & (centers < limit)).all(axis=1)
+        rows = np.flatnonzero(is_near)
+        # As for lines, whole numbers are the middles of pixels.
+        quarters = np.rint((centers[rows] + 0.5) * sprites.FINENESS).astype(int)
+        pixels, shifts = np.divmod(quarters, sprites.FINENESS)
+        chosen = np.zeros(len(rows), dtype=int) if indices is None else indices[rows]
+        rendered: dict[tuple[int, int, int], tuple[pygame.Surface, int]] = {}
+        placed = []
+        looks = np.column_stack([chosen, shifts])
+        for (x, y), (index, right, down) in zip(pixels.tolist(), looks.tolist(), strict=True):
+            look = (index, right, down)
+            if look not in rendered:
+                picture = choices[index]((right, down))
+                rendered[look] = (picture, picture.get_width() // 2)
+            picture, half = rendered[look]
+            placed.append((picture, (x - half, y - half)))
+        return placed
+
+    def draw_text(
         self,
         text: str,
-        at: Pixel,
+        position: Pixel,
         *,
         size: float | None = None,
         color: Color | None = None,
         bold: bool = False,
-        anchor: str = "left",
+        anchor: TextAnchor = "left",
     ) -> int:
-        """Write one line with its left, middle or right (`anchor`) at a pixel; return its width in pixels."""
-        pixels = self.text_size(self.theme.text if size is None else size)
-        picture = label(text, pixels, color or self.theme.ink, bold)
+        """Write one line of text.
+
+        Parameters
+        ----------
+        text : str
+        position : (float, float), px
+            Its left end, middle or right end, depending on `anchor`; y is that of its middle.
+        size : float, px at scale 1, optional
+            By default that of the theme.
+        color : Color, optional
+            By default the ink of the theme.
+        bold : bool
+        anchor : {"left", "middle", "right"}
+
+        Returns
+        -------
+        int
+            Width of the text, px.
+        """
+        pixels = self.scale_text_size(self.theme.text if size is None else size)
+        picture = render_text(text, pixels, color or self.theme.ink, bold)
         width, height = picture.get_size()
-        left = at[0] - {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
-        self.surface.blit(picture, (round(left), round(at[1] - height / 2)))
+        x, y = position
+        offset = {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
+        self.surface.blit(picture, (round(x - offset), round(y - height / 2)))
         return width
 
-    def text_width(self, text: str, size: float | None = None, bold: bool = False) -> int:
-        return text_width(text, self.text_size(self.theme.text if size is None else size), bold)
+    def measure_text(self, text: str, size: float | None = None, bold: bool = False) -> int:
+        """Return the width of a line of text, px; `size` is px at scale 1."""
+        pixels = self.scale_text_size(self.theme.text if size is None else size)
+        return measure_text(text, pixels, bold)

@@ -1,4 +1,4 @@
-"""Text: DejaVu Sans, which comes with matplotlib (a bare Linux has no fonts), and rendered labels."""
+"""Text in DejaVu Sans, the font of matplotlib: a bare Linux has no fonts."""
 
 import importlib.util
 from functools import lru_cache
@@ -9,15 +9,22 @@ import pygame
 from robocov.text import escape_controls
 from robocov_app.look.colors import Color
 from robocov_app.look.labels import shorten_text
-from robocov_app.render.surface_cache import kept
+from robocov_app.render.surface_cache import cache_surfaces
+
+_CACHE_BYTES = 8_000_000
 
 
 @lru_cache(maxsize=2)
-def font_path(bold: bool = False) -> Path | None:
-    """Return the font's file; matplotlib, which has it, is located, not imported: that takes long."""
-    spec = importlib.util.find_spec("matplotlib")
+def find_font_file(bold: bool = False) -> Path | None:
+    """Return the path of the font in the installation of matplotlib; None if there is none.
+
+    Importing matplotlib would take long, so it is only located.
+    """
+    matplotlib = importlib.util.find_spec("matplotlib")
+    if matplotlib is None:
+        return None
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    for folder in (spec.submodule_search_locations or []) if spec else []:
+    for folder in matplotlib.submodule_search_locations or []:
         path = Path(folder) / "mpl-data" / "fonts" / "ttf" / name
         if path.is_file():
             return path
@@ -25,30 +32,45 @@ def font_path(bold: bool = False) -> Path | None:
 
 
 @lru_cache(maxsize=64)
-def _font(size: int, bold: bool) -> pygame.font.Font:
-    return pygame.font.Font(font_path(bold), size)
+def _open_font(size: int, bold: bool) -> pygame.font.Font:
+    return pygame.font.Font(find_font_file(bold), size)
 
 
-@kept(8_000_000)
-def label(text: str, size: int, color: Color, bold: bool = False) -> pygame.Surface:
-    """Return a line of text as a picture, `size` px high; kept, rendering costs more than blitting."""
-    return _living(size, bold).render(escape_controls(text, single_line=True), True, color)
-
-
-def _living(size: int, bold: bool) -> pygame.font.Font:
-    """Return the font; a new one where the font module was shut down in between: its fonts are dead."""
+def _get_font(size: int, bold: bool) -> pygame.font.Font:
+    """Return the font of a size, px. Fonts are opened again after pygame's font module was shut down."""
     try:
-        _font(size, bold).get_height()
+        _open_font(size, bold).get_height()
     except pygame.error:
         pygame.font.init()
-        _font.cache_clear()
-    return _font(size, bold)
+        _open_font.cache_clear()
+    return _open_font(size, bold)
 
 
-def text_width(text: str, size: int, bold: bool = False) -> int:
-    return _living(size, bold).size(escape_controls(text, single_line=True))[0]
+@cache_surfaces(_CACHE_BYTES)
+def render_text(text: str, size: int, color: Color, bold: bool = False) -> pygame.Surface:
+    """Render one line of text on a transparent surface.
+
+    Parameters
+    ----------
+    text : str
+        Control characters are escaped.
+    size : int, px
+    color : Color
+    bold : bool
+
+    Returns
+    -------
+    pygame.Surface
+        It is cached: do not draw on it.
+    """
+    return _get_font(size, bold).render(escape_controls(text, single_line=True), True, color)
 
 
-def shortened(text: str, size: int, width: float, bold: bool = False) -> str:
-    """Return a text, shortened to a width, px."""
-    return shorten_text(text, lambda candidate: text_width(candidate, size, bold), width)
+def measure_text(text: str, size: int, bold: bool = False) -> int:
+    """Return the width of one line of text of a size, px."""
+    return _get_font(size, bold).size(escape_controls(text, single_line=True))[0]
+
+
+def shorten_to_width(text: str, size: int, width: float, bold: bool = False) -> str:
+    """Shorten a text of a size, px, to a width, px; an ellipsis replaces its end."""
+    return shorten_text(text, lambda candidate: measure_text(candidate, size, bold), width)

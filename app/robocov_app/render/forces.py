@@ -9,7 +9,7 @@ from robocov.arrays import Array
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas
+from robocov_app.render.canvas import ArrowHead, Canvas
 from robocov_app.render.layers import Layer, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
@@ -25,7 +25,7 @@ def _arrow_layer(
     words: str,
     vectors_of: Callable[[Scene, float], Array | None],
     style: Callable[[Theme], tuple[Color, float]],
-    head: str,
+    head: ArrowHead,
 ) -> Layer:
     """Return arrows that begin at the edges of the discs; those below 3 px are left out.
 
@@ -34,7 +34,7 @@ def _arrow_layer(
 
     def arrow(canvas: Canvas, start: Pixel, end: Pixel) -> None:
         color, width = style(canvas.theme)
-        canvas.arrow(start, end, color, canvas.scale * width, head)
+        canvas.draw_arrow(start, end, color, canvas.scale * width, head)
 
     def draw(canvas: Canvas, scene: Scene) -> None:
         vectors = vectors_of(scene, canvas.scale)
@@ -50,13 +50,13 @@ def _arrow_layer(
 
     legend = says(
         words,
-        lambda canvas, x, y: arrow(canvas, *canvas.level(x, y, 9)),
+        lambda canvas, x, y: arrow(canvas, *canvas.get_symbol_line(x, y, 9)),
         lambda scene: vectors_of(scene, 1.0) is not None,
     )
     return Layer(name, title, draw, ("snapshot",), legend, default=False)
 
 
-def force_layer(term: str, title: str, head: str) -> Layer:
+def force_layer(term: str, title: str, head: ArrowHead) -> Layer:
     """Return arrows of a term of the force: the largest acceleration has 63 % of `FORCE_LENGTH`."""
 
     def vectors(scene: Scene, scale: float) -> Array | None:
@@ -101,11 +101,13 @@ def range_layer(kind: str, title: str) -> Layer:
         for center, reach, hue in zip(centers, ranges(scene).tolist(), canvas.hues.tolist(), strict=True):
             if np.isfinite(reach):
                 color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
-                canvas.circle(center, reach * canvas.camera.zoom, color, dashed)
+                canvas.draw_circle(center, reach * canvas.camera.zoom, color, is_dashed=dashed)
 
     legend = says(
         f"{kind} range",
-        lambda canvas, x, y: canvas.circle((x, y), 6.5 * canvas.scale, canvas.theme.ink, dashed),
+        lambda canvas, x, y: canvas.draw_circle(
+            (x, y), 6.5 * canvas.scale, canvas.theme.ink, is_dashed=dashed
+        ),
         lambda scene: bool(np.isfinite(ranges(scene)).any()),
     )
     return Layer(kind, title, draw, ("snapshot",), legend, default=False)
@@ -125,10 +127,10 @@ def draw_links(canvas: Canvas, scene: Scene) -> None:
 
 def _link(canvas: Canvas, start: Pixel, end: Pixel) -> None:
     color = mix(canvas.theme.background, canvas.theme.final, 0.7)
-    canvas.line(start, end, color, canvas.width(canvas.theme.line))
+    canvas.draw_line(start, end, color, canvas.scale_width(canvas.theme.line))
 
 
-links_legend = says("neighbors", lambda canvas, x, y: _link(canvas, *canvas.level(x, y, 9)))
+links_legend = says("neighbors", lambda canvas, x, y: _link(canvas, *canvas.get_symbol_line(x, y, 9)))
 
 
 def draw_points(canvas: Canvas, scene: Scene) -> None:
@@ -136,12 +138,14 @@ def draw_points(canvas: Canvas, scene: Scene) -> None:
     centers = canvas.camera.to_pixels(scene.now.positions)
     there = np.isfinite(points).all(axis=1)
     for point, center in zip(points[there].tolist(), centers[there].tolist(), strict=True):
-        canvas.dashes(center, point, canvas.theme.forces["repulsion_obstacle"], dash=3.0)
+        canvas.draw_dashed_line(center, point, canvas.theme.forces["repulsion_obstacle"], dash=3.0)
         _point_glyph(canvas, *point)
 
 
 def _point_glyph(canvas: Canvas, x: float, y: float) -> None:
-    canvas.stamp(partial(sprites.dot, 3.0 * canvas.scale, canvas.theme.forces["repulsion_obstacle"]), (x, y))
+    canvas.draw_sprite(
+        partial(sprites.render_dot, 3.0 * canvas.scale, canvas.theme.forces["repulsion_obstacle"]), (x, y)
+    )
 
 
 points_legend = says("nearest obstacle point", _point_glyph)

@@ -18,13 +18,16 @@ from robocov_app.render.density import colors, density_label, parts
 from robocov_app.render.distance_field import Field, levels, middles, palette, strength, ticks
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 _DOTS = 60_000  # about so many places of a surface at most where the density is looked at, not interpolated
 
 
 def draw_density(canvas: Canvas, scene: Scene) -> None:
-    density, hidden = scene.environment.density, scene.field is not None and "distances" in canvas.shown
+    density, hidden = (
+        scene.environment.density,
+        scene.field is not None and "distances" in canvas.visible_layers,
+    )
     if density is not None and not density.is_uniform and not hidden:
         draw_shading(canvas, density, scene.environment.region.vertices)
 
@@ -99,7 +102,7 @@ def field_drawing(
     draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface],
 ) -> Callable[[Canvas, Scene], None]:
     """Return what draws a field, by `draw_picture` at (w,) x and (h,) y m, when field or view change."""
-    kept = Latest[pygame.Surface]()
+    kept = LatestValue[pygame.Surface]()
 
     def draw(canvas: Canvas, scene: Scene) -> None:
         field, camera = scene.field, canvas.camera
@@ -117,8 +120,8 @@ def field_drawing(
             x, y = _to_world(canvas, np.arange(begin[0], end[0]), np.arange(begin[1], end[1]))
             return draw_picture(canvas, scene, field, x, y)
 
-        look = (*key, canvas.hues.tolist(), "distances" in canvas.shown)
-        canvas.surface.blit(kept.of(field, look, picture), corner)
+        look = (*key, canvas.hues.tolist(), "distances" in canvas.visible_layers)
+        canvas.surface.blit(kept.get(field, look, picture), corner)
         # cover what lies outside the region, one edge after the other
         corners = camera.to_pixels(scene.environment.region.vertices)
         far = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
@@ -127,7 +130,7 @@ def field_drawing(
             # pixels run downwards, so that outside is on the other hand
             outward = np.array([-along[1], along[0]])
             ring = [start - along, stop + along, stop + along + outward, start - along + outward]
-            canvas.polygon(np.array(ring), canvas.theme.background)
+            canvas.fill_polygon(np.array(ring), canvas.theme.background)
 
     return draw
 
@@ -142,7 +145,7 @@ def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Arra
 
 unreached_legend = says(
     legend.UNREACHED,
-    lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge),
+    lambda canvas, x, y: canvas.draw_swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge),
     lambda scene: scene.field is not None and bool((scene.field.result.owner < 0).any()),
 )
 
@@ -155,7 +158,7 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
     """Return which robot is nearest, around obstacles: the cells that the coverage cost really sums over."""
     theme, zoom, width = canvas.theme, canvas.camera.zoom, _BORDER * canvas.scale
     within = (0.5 * width + 1.0) / zoom
-    if "distances" in canvas.shown:
+    if "distances" in canvas.visible_layers:
         borders = field.borders(x, y, within)
         lines = pygame.Surface((len(x), len(y)), pygame.SRCALPHA, 32)
         lines.fill((*theme.geodesic_border, 0))
@@ -179,16 +182,16 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
 
 geodesic_legend = says(
     legend.GEODESIC_BORDER,
-    lambda canvas, x, y: canvas.line(
-        *canvas.level(x, y, 8), canvas.theme.geodesic_border, canvas.width(_BORDER)
+    lambda canvas, x, y: canvas.draw_line(
+        *canvas.get_symbol_line(x, y, 8), canvas.theme.geodesic_border, canvas.scale_width(_BORDER)
     ),
 )
 
 
 def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
-    if "distances" not in canvas.shown:
+    if "distances" not in canvas.visible_layers:
         return
-    scale, theme, width = canvas.scale, canvas.theme, canvas.width(1.0)
+    scale, theme, width = canvas.scale, canvas.theme, canvas.scale_width(1.0)
     _, top, _, height = canvas.camera.view
     room = canvas.surface.get_height() - STRIP * scale - top
     high = max(round(min(0.72 * min(height, room), 300 * scale)), 2)
@@ -201,14 +204,14 @@ def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
     for mark, text in _marks(scene):
         y = upper + high * (1.0 - mark / scene.field_limit)
         canvas.surface.fill(theme.faint, (left + wide, round(y - 0.5 * width), round(4 * scale), width))
-        canvas.text(text, (left + wide + _BESIDE * scale, y), size=theme.small_text)
+        canvas.draw_text(text, (left + wide + _BESIDE * scale, y), size=theme.small_text)
 
 
 def bar_room(canvas: Canvas, scene: Scene) -> float:
     """Return how many pixels the scale of colors takes at the right, 0 where it is not shown."""
-    if scene.field is None or not {"distances", "color_bar"} <= canvas.shown:
+    if scene.field is None or not {"distances", "color_bar"} <= canvas.visible_layers:
         return 0.0
-    words = max(canvas.text_width(text, canvas.theme.small_text) for _, text in _marks(scene))
+    words = max(canvas.measure_text(text, canvas.theme.small_text) for _, text in _marks(scene))
     return (_BAR + 3.0 * _BESIDE) * canvas.scale + words
 
 

@@ -11,7 +11,8 @@ from robocov.arrays import Array
 from robocov.planning.discovered_map import PRESUMED_WALL, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
+from robocov_app.render.canvas import Canvas, premultiply
+from robocov_app.render.clipping import clip_polygon, clip_segment, limit_pixels
 from robocov_app.render.layers import draw_blocked, draw_boundary, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
@@ -37,7 +38,7 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
     for value, opacity in _OPACITY.items():
         color = canvas.theme.obstacle if value == UNKNOWN else canvas.theme.forces["repulsion_obstacle"]
-        pixels[(state == value) & ~outside] = premultiplied(color, opacity)
+        pixels[(state == value) & ~outside] = premultiply(color, opacity)
     ends = np.array([[column.min(), row.min()], [column.max() + 1, row.max() + 1]])
     ends = canvas.camera.to_pixels(np.array(raster.origin) + ends * raster.cell_size)
     (left, bottom), (right, top) = ends.round().astype(int).tolist()
@@ -59,29 +60,31 @@ _HIT = 1.5  # radius of the end of a ray in pixels at scale 1
 
 def _dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> None:
     """Draw a dot at each of (n, 2) px; thousands at once, and one only where several are the same."""
-    different = np.unique(np.rint((centers + 0.5) * sprites.FINE), axis=0) / sprites.FINE - 0.5
-    canvas.stamps([partial(sprites.dot, radius, color)], different)
+    different = np.unique(np.rint((centers + 0.5) * sprites.FINENESS), axis=0) / sprites.FINENESS - 0.5
+    canvas.draw_sprites([partial(sprites.render_dot, radius, color)], different)
 
 
 def draw_scans(canvas: Canvas, scene: Scene) -> None:
     """Draw what a range sensor measures all around: what it looks over, its rays, and dots where they hit."""
     camera, color = canvas.camera, canvas.theme.final
     scans = [(camera.to_pixels(place), camera.to_pixels(ends)) for place, ends in scene.scans]
-    box = sprites.visible_box(bounded(np.concatenate([ends for _, ends in scans])), 3.0, canvas.surface)
+    box = sprites.find_visible_box(
+        limit_pixels(np.concatenate([ends for _, ends in scans])), 3.0, canvas.surface
+    )
     if box is None:
         return
     sketch = sprites.Sketch(box, _FINE)
     # drawing replaces what is there: where scans overlap nothing gets darker
     corner = np.array(box.topleft) - 0.5
     fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
-    outlines = [ring for _, ends in fine for ring in clipped_polygon(ends)]
+    outlines = [ring for _, ends in fine for ring in clip_polygon(ends)]
     for ring in outlines:
-        pygame.draw.polygon(sketch.large, premultiplied(color, 0.11), np.rint(ring).tolist())
+        pygame.draw.polygon(sketch.large, premultiply(color, 0.11), np.rint(ring).tolist())
     for place, ends in fine:
         _draw_rays(sketch.large, place, ends, canvas)
     for ring in outlines:
-        pygame.draw.lines(sketch.large, premultiplied(color, 0.4), True, ring.tolist(), _FINE)
-    sketch.onto(canvas.surface)
+        pygame.draw.lines(sketch.large, premultiply(color, 0.4), True, ring.tolist(), _FINE)
+    sketch.draw_on(canvas.surface)
     far = [np.hypot(*(ends - place).T) for place, ends in scans]
     hits = [ends[length < length.max() * (1.0 - 1e-6)] for (_, ends), length in zip(scans, far, strict=True)]
     _dots(canvas, np.concatenate(hits), _HIT * canvas.scale, color)
@@ -97,10 +100,10 @@ def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas)
     begin = np.maximum(begin, 12.0) * canvas.scale * _FINE
     shown = length > begin + _FINE
     first = place + along[shown] * (begin[shown] / length[shown])[:, None]
-    color = premultiplied(canvas.theme.final, 0.3)
+    color = premultiply(canvas.theme.final, 0.3)
     width = max(1, round(0.5 * canvas.scale * _FINE))
     for line in zip(first.tolist(), ends[shown].tolist(), strict=True):
-        if seen := clipped_segment(*line):
+        if seen := clip_segment(*line):
             pygame.draw.line(large, color, seen[0], seen[1], width)
 
 
@@ -109,7 +112,7 @@ def _scan_glyph(canvas: Canvas, x: float, y: float) -> None:
     angle = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
     ends = np.column_stack([x - size + 2 * size * np.cos(angle), y + 1.15 * size * np.sin(angle)])
     for end in ends.tolist():
-        canvas.line((x - size, y), end, mix(canvas.theme.background, color, 0.55))
+        canvas.draw_line((x - size, y), end, mix(canvas.theme.background, color, 0.55))
     _dots(canvas, ends, _HIT * canvas.scale, color)
 
 
@@ -130,17 +133,17 @@ class SensedObstacles:
         points, robots = scene.sensed.get_until(scene.now.time)
         asked = None if scene.selected is None else scene.get_number(scene.selected)
         size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
-        key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.shown, asked
+        key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.visible_layers, asked
         # objects rather than their ids, which others may get when these are gone
         known = self._of[0] is scene.environment and self._of[1] is scene.sensed
         begin = len(self._drawn)
         if not known or self._key != key or not np.array_equal(points[begin - 1 : begin], self._drawn[-1:]):
             self._page, begin = pygame.Surface(size, pygame.SRCALPHA, 32), 0
             self._page.set_clip(clip)
-            if "obstacles" in canvas.shown:
+            if "obstacles" in canvas.visible_layers:
                 fill, edge = _pale_colors(canvas)
                 draw_blocked(replace(canvas, surface=self._page), scene, fill, fill, edge)
-                if "boundary" in canvas.shown:  # what of it was covered
+                if "boundary" in canvas.visible_layers:  # what of it was covered
                     draw_boundary(replace(canvas, surface=self._page), scene)
         if begin < len(points):
             fresh = points[begin:] if asked is None else points[begin:][robots[begin:] == asked]
@@ -163,7 +166,7 @@ def _sensed_glyph(canvas: Canvas, x: float, y: float) -> None:
     fill, edge = _pale_colors(canvas)
     box = pygame.Rect(round(x - half), round(top), round(2 * half), round(6 * canvas.scale))
     pygame.draw.rect(canvas.surface, fill, box)
-    pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
+    pygame.draw.rect(canvas.surface, edge, box, canvas.scale_width(1.0))
     dots = np.column_stack([x + half * np.array([-0.9, -0.3, 0.3, 0.9]), np.full(4, top)])
     _dots(canvas, dots, _DOT * canvas.scale, canvas.theme.forces["repulsion_obstacle"])
 
@@ -177,17 +180,17 @@ def draw_path(canvas: Canvas, scene: Scene) -> None:
         return
     corners, theme = canvas.camera.to_pixels(scene.path), canvas.theme
     # the light around it parts it from whatever it crosses
-    canvas.outline(corners, theme.background, canvas.width(4.5), closed=False)
-    canvas.outline(corners, theme.final, canvas.width(2.0), closed=False)
+    canvas.draw_outline(corners, theme.background, canvas.scale_width(4.5), is_closed=False)
+    canvas.draw_outline(corners, theme.final, canvas.scale_width(2.0), is_closed=False)
     _draw_path_begin(canvas, *corners[0].tolist())
     length = float(np.hypot(*np.diff(scene.path, axis=0).T).sum())
     words = f"{length:.2f} m" if length < 100 else f"{length:.0f} m"
-    box = _tag_box(canvas, scene, corners, canvas.text_width(words, bold=True))
+    box = _tag_box(canvas, scene, corners, canvas.measure_text(words, bold=True))
     radius = round(4 * canvas.scale)
     pygame.draw.rect(canvas.surface, theme.background, box, border_radius=radius)
     edge = mix(theme.background, theme.final, 0.5)
-    pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0), border_radius=radius)
-    canvas.text(words, box.center, color=theme.final, bold=True, anchor="middle")
+    pygame.draw.rect(canvas.surface, edge, box, canvas.scale_width(1.0), border_radius=radius)
+    canvas.draw_text(words, box.center, color=theme.final, bold=True, anchor="middle")
 
 
 def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.Rect:
@@ -197,7 +200,7 @@ def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.
     x, y = corners[0].tolist()
     radii = drawn_radii(canvas, scene)
     centers = canvas.camera.to_pixels(scene.snapshot.positions if scene.snapshot else np.empty((0, 2)))
-    path = bounded(corners).tolist()
+    path = limit_pixels(corners).tolist()
     places = []
     # not below at the right first: the arrow of the cursor is there
     for side, up in ((1, -1), (-1, -1), (-1, 1), (1, 1)):
@@ -214,12 +217,12 @@ def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.
 
 
 def _draw_path_begin(canvas: Canvas, x: float, y: float) -> None:
-    canvas.stamp(partial(sprites.dot, 5.0 * canvas.scale, canvas.theme.background), (x, y))
-    canvas.stamp(partial(sprites.dot, 3.6 * canvas.scale, canvas.theme.final), (x, y))
+    canvas.draw_sprite(partial(sprites.render_dot, 5.0 * canvas.scale, canvas.theme.background), (x, y))
+    canvas.draw_sprite(partial(sprites.render_dot, 3.6 * canvas.scale, canvas.theme.final), (x, y))
 
 
 def _path_glyph(canvas: Canvas, x: float, y: float) -> None:
-    canvas.line(*canvas.level(x, y, 9), canvas.theme.final, canvas.width(2.0))
+    canvas.draw_line(*canvas.get_symbol_line(x, y, 9), canvas.theme.final, canvas.scale_width(2.0))
     _draw_path_begin(canvas, x - 9 * canvas.scale + 2 * canvas.scale, y)
 
 

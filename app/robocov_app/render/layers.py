@@ -12,7 +12,7 @@ import shapely
 from robocov_app.look.colors import Color
 from robocov_app.look.legend import MOVING_OBSTACLE, UNKNOWN_OBSTACLE
 from robocov_app.look.lengths import round_down
-from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiply
 from robocov_app.render.moving_obstacles import MovingObstacle
 from robocov_app.render.scene import Scene
 
@@ -49,7 +49,7 @@ class Layer:
 
 
 def _colors_mean_distance(canvas: Canvas, scene: Scene) -> bool:
-    return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.shown)
+    return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.visible_layers)
 
 
 def draw_cells(canvas: Canvas, scene: Scene) -> None:
@@ -64,13 +64,13 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
         fills = [tints[hue] for hue in hues.tolist()]
     edge = canvas.theme.cell_edge
     narrow = canvas.camera.zoom * (scene.environment.region.area / len(sizes)) ** 0.5 < NARROW * canvas.scale
-    canvas.polygons(corners, ends.tolist(), fills, edge if narrow else None)
+    canvas.draw_polygons(corners, ends.tolist(), fills, edge if narrow else None)
     if narrow:
         return
     following = np.arange(1, len(corners) + 1)
     following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
     edges = np.hstack([corners, corners[following]])
-    if "boundary" in canvas.shown:
+    if "boundary" in canvas.visible_layers:
         # one of the two cells beside has it to the right or straight down; what lies on the rim is drawn over
         x1, y1, x2, y2 = np.rint(edges * 16.0).T
         edges = edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))]
@@ -78,13 +78,13 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
         turned = (edges[:, 0] > edges[:, 2]) | ((edges[:, 0] == edges[:, 2]) & (edges[:, 1] > edges[:, 3]))
         edges = np.where(turned[:, None], edges[:, [2, 3, 0, 1]], edges)
         edges = edges[np.unique(np.rint(edges * 16.0), axis=0, return_index=True)[1]]
-    canvas.segments(edges, edge, canvas.width(canvas.theme.line))
+    canvas.draw_segments(edges, edge, canvas.scale_width(canvas.theme.line))
 
 
 def cells_legend(scene: Scene) -> list[LegendEntry]:
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         fill = None if _colors_mean_distance(canvas, scene) else canvas.theme.get_cell_color(0)
-        canvas.swatch(x, y, fill, canvas.theme.cell_edge)
+        canvas.draw_swatch(x, y, fill, canvas.theme.cell_edge)
 
     return [LegendEntry("Voronoi cell", glyph)]
 
@@ -95,7 +95,7 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
     step = round_down(least)
     step = step if step >= least else round_down(2.5001 * step)
     region, seen = scene.environment.region, canvas.camera.compute_visible_bounds()
-    color, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
+    color, width = premultiply(canvas.theme.grid, 0.5), canvas.scale_width(canvas.theme.line)
     for axis in (0, 1):
         low, high = max(region.bounds[axis], seen[axis]), min(region.bounds[axis + 2], seen[axis + 2])
         for place in np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step:
@@ -119,9 +119,9 @@ def draw_blocked(canvas: Canvas, scene: Scene, fill: Color, moving: Color, edge:
         colors = [(*fill, 255), *[(0, 0, 0, 0)] * len(part.interiors)]
         for ring, color in zip((part.exterior, *part.interiors), colors, strict=True):
             rings.append(canvas.camera.to_pixels(np.asarray(ring.coords)[:-1]))
-            canvas.polygon(rings[-1], color)
+            canvas.fill_polygon(rings[-1], color)
     for corners in rings:
-        canvas.outline(corners, edge, canvas.width(canvas.theme.line))
+        canvas.draw_outline(corners, edge, canvas.scale_width(canvas.theme.line))
     for obstacle in scene.moving:
         draw_motion(canvas, scene, obstacle, moving, edge)
 
@@ -136,29 +136,29 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
 
 
 def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Color, edge: Color) -> None:
-    theme, camera, width = canvas.theme, canvas.camera, canvas.width(canvas.theme.line)
+    theme, camera, width = canvas.theme, canvas.camera, canvas.scale_width(canvas.theme.line)
     for part in shapely.get_parts(shapely.intersection(obstacle.polygon, scene.environment.region.polygon)):
         if not isinstance(part, shapely.Polygon):
             continue
         corners = camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
         if not part.interiors:
-            canvas.polygon(corners, (*fill, 255))
-        canvas.outline(corners, edge, 2 * width)
+            canvas.fill_polygon(corners, (*fill, 255))
+        canvas.draw_outline(corners, edge, 2 * width)
     for start, end in pairwise(camera.to_pixels(obstacle.path).tolist()):
-        canvas.dashes(start, end, theme.ink, width)
+        canvas.draw_dashed_line(start, end, theme.ink, width)
     middle = camera.to_pixels(obstacle.middle)
     along = 11.0 * canvas.scale * obstacle.heading * np.array([1.0, -1.0])
-    canvas.arrow((middle - along).tolist(), (middle + along).tolist(), theme.ink, 2.0 * canvas.scale)
+    canvas.draw_arrow((middle - along).tolist(), (middle + along).tolist(), theme.ink, 2.0 * canvas.scale)
 
 
 def _moving_glyph(canvas: Canvas, x: float, y: float) -> None:
-    canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
-    canvas.arrow(*canvas.level(x, y, 10.0), canvas.theme.ink, 1.6 * canvas.scale)
+    canvas.draw_swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
+    canvas.draw_arrow(*canvas.get_symbol_line(x, y, 10.0), canvas.theme.ink, 1.6 * canvas.scale)
 
 
 obstacles_legend = says(
     UNKNOWN_OBSTACLE,
-    lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge),
+    lambda canvas, x, y: canvas.draw_swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge),
     lambda scene: not scene.environment.blocked.is_empty,
 )
 moving_legend = says(MOVING_OBSTACLE, _moving_glyph, lambda scene: bool(scene.moving))
@@ -166,4 +166,4 @@ moving_legend = says(MOVING_OBSTACLE, _moving_glyph, lambda scene: bool(scene.mo
 
 def draw_boundary(canvas: Canvas, scene: Scene) -> None:
     corners = canvas.camera.to_pixels(scene.environment.region.vertices)
-    canvas.outline(corners, canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))
+    canvas.draw_outline(corners, canvas.theme.boundary, canvas.scale_width(canvas.theme.boundary_line))

@@ -12,11 +12,11 @@ from robocov_app.look import legend
 from robocov_app.look.colors import mix
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, Placed, Sprite
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, PlacedSprites, Sprite
 from robocov_app.render.layers import says
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import Scene, are_centroids
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 READABLE = 9.0  # radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it
 SMALLEST_NUMBER = 6.6  # least size of a robot's number in pixels at scale 1
@@ -46,25 +46,25 @@ class Starts:
     """Green rings where the robots began; their places are kept until the view changes."""
 
     def __init__(self) -> None:
-        self._rings = Latest[Placed]()
+        self._rings = LatestValue[PlacedSprites]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        def rings() -> Placed:
+        def rings() -> PlacedSprites:
             assert scene.starts is not None
             centers = canvas.camera.to_pixels(scene.starts)
             radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
-            return canvas.placed([_ring(canvas, radius)], centers)
+            return canvas.place_sprites([_ring(canvas, radius)], centers)
 
         view = canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size()
-        canvas.surface.fblits(self._rings.of(scene.starts, view, rings), pygame.BLEND_PREMULTIPLIED)
+        canvas.surface.fblits(self._rings.get(scene.starts, view, rings), pygame.BLEND_PREMULTIPLIED)
 
 
 def _ring(canvas: Canvas, radius: float) -> Sprite:
-    return partial(sprites.ring, radius, canvas.theme.start, min(1.6 * canvas.scale, 0.4 * radius))
+    return partial(sprites.render_ring, radius, canvas.theme.start, min(1.6 * canvas.scale, 0.4 * radius))
 
 
 starts_legend = says(
-    legend.START, lambda canvas, x, y: canvas.stamp(_ring(canvas, 4.5 * canvas.scale), (x, y))
+    legend.START, lambda canvas, x, y: canvas.draw_sprite(_ring(canvas, 4.5 * canvas.scale), (x, y))
 )
 
 
@@ -72,7 +72,7 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
     scale, radii = canvas.scale, drawn_radii(canvas, scene)
     numbers = np.arange(len(radii)) + 1 if scene.numbers is None else np.array(scene.numbers)
     rings = np.minimum(1.6 * scale, rounded(0.3 * radii))
-    sizes = sprites.number_size(radii - rings, 1 + np.digitize(numbers, [10, 100, 1000]))
+    sizes = sprites.choose_number_size(radii - rings, 1 + np.digitize(numbers, [10, 100, 1000]))
     written = np.where(sizes < SMALLEST_NUMBER * scale, 0, numbers)
     # in a crowd many look the same
     looks: dict[tuple[float, float, int, int], int] = {}
@@ -81,24 +81,40 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
     discs = [_disc(canvas, radius, ring, hue, str(number or "")) for radius, ring, hue, number in looks]
     centers = canvas.camera.to_pixels(scene.now.positions)
     if scene.now.steering is not None:
-        turns = np.rint(scene.now.steering[:, 0] * (sprites.NOSE_TURNS / (2.0 * np.pi))).astype(int)
+        turns = np.rint(scene.now.steering[:, 0] * (sprites.N_NOSE_DIRECTIONS / (2.0 * np.pi))).astype(int)
         noses = [
-            partial(sprites.nose, min(radius, sprites.LARGE), canvas.theme.ink, canvas.theme.background, turn)
-            for radius, turn in zip(radii.tolist(), (turns % sprites.NOSE_TURNS).tolist(), strict=True)
+            partial(
+                sprites.render_nose,
+                min(radius, sprites.MAX_FINE_RADIUS_PX),
+                canvas.theme.ink,
+                canvas.theme.background,
+                turn,
+            )
+            for radius, turn in zip(radii.tolist(), (turns % sprites.N_NOSE_DIRECTIONS).tolist(), strict=True)
         ]
         unicycles = np.flatnonzero(scene.team.is_unicycle)
-        canvas.stamps(noses, centers[unicycles], unicycles)
-    canvas.stamps(discs, centers, np.array(which, dtype=int))
+        canvas.draw_sprites(noses, centers[unicycles], unicycles)
+    canvas.draw_sprites(discs, centers, np.array(which, dtype=int))
 
 
 def _disc(canvas: Canvas, radius: float, ring: float, hue: int, number: str) -> Sprite:
     theme, edge = canvas.theme, mix(canvas.theme.background, canvas.theme.ink, 0.55)
-    return partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, number)
+    return partial(
+        sprites.render_disc,
+        radius,
+        fill=theme.robots[hue],
+        ring=theme.robot_ring,
+        ring_width=ring,
+        edge=edge,
+        text=number,
+    )
 
 
 robots_legend = says(
     "robot",
-    lambda canvas, x, y: canvas.stamp(_disc(canvas, 6.5 * canvas.scale, 1.4 * canvas.scale, 0, ""), (x, y)),
+    lambda canvas, x, y: canvas.draw_sprite(
+        _disc(canvas, 6.5 * canvas.scale, 1.4 * canvas.scale, 0, ""), (x, y)
+    ),
 )
 
 
@@ -111,7 +127,7 @@ def draw_centroids(canvas: Canvas, scene: Scene) -> None:
     away = np.hypot(*(centers - canvas.camera.to_pixels(scene.now.positions)).T)
     there = np.isfinite(away)
     arm = rounded(0.5 * mark_size(centers[there], 5.0 * canvas.scale, 11.0 * canvas.scale))
-    canvas.stamps([_cross(canvas, kind, arm)], centers[there & (away > drawn_radii(canvas, scene))])
+    canvas.draw_sprites([_cross(canvas, kind, arm)], centers[there & (away > drawn_radii(canvas, scene))])
 
 
 def centroids_legend(scene: Scene) -> list[LegendEntry]:
@@ -126,8 +142,8 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
     centers = canvas.camera.to_pixels(scene.now.positions)
     there = np.isfinite(goals).all(axis=1)
     for center, goal in zip(centers[there].tolist(), goals[there].tolist(), strict=True):
-        canvas.dashes(center, goal, canvas.theme.faint)
-    canvas.stamps([_cross(canvas, legend.GOAL)], goals)
+        canvas.draw_dashed_line(center, goal, canvas.theme.faint)
+    canvas.draw_sprites([_cross(canvas, legend.GOAL)], goals)
 
 
 def _aims(scene: Scene) -> tuple[str, Array]:
@@ -148,11 +164,18 @@ def _cross(canvas: Canvas, kind: str, arm: float | None = None) -> Sprite:
     arm, theme = 5.5 * canvas.scale if arm is None else arm, canvas.theme
     color, width, part = (theme.final, 1.8, 0.4) if kind == legend.GOAL else (theme.ink, 1.3, 0.3)
     width = min(width * canvas.scale, part * arm)
-    return partial(sprites.cross, arm, color, theme.background, width, kind == legend.GOAL)
+    return partial(
+        sprites.render_cross,
+        arm,
+        color=color,
+        halo=theme.background,
+        width=width,
+        is_diagonal=kind == legend.GOAL,
+    )
 
 
 def _aim_glyph(kind: str) -> Glyph:
-    return lambda canvas, x, y: canvas.stamp(_cross(canvas, kind), (x, y))
+    return lambda canvas, x, y: canvas.draw_sprite(_cross(canvas, kind), (x, y))
 
 
 goals_legend = says(legend.GOAL, _aim_glyph(legend.GOAL), lambda scene: scene.now.decision.goals is not None)
@@ -174,7 +197,7 @@ def draw_failed(canvas: Canvas, scene: Scene) -> None:
 
 def _label(canvas: Canvas, text: str, at: Array, radius: float, centers: Array, around: Array) -> None:
     size = canvas.theme.small_text
-    wide, high = canvas.text_width(text, size, bold=True), canvas.text_size(size)
+    wide, high = canvas.measure_text(text, size, bold=True), canvas.scale_text_size(size)
     gap = 3.0 * canvas.scale
     rooms = []
     for side, up in ((1, 0), (-1, 0), (0, -1), (0, 1)):
@@ -183,16 +206,21 @@ def _label(canvas: Canvas, text: str, at: Array, radius: float, centers: Array, 
         room = float((np.hypot(apart[:, 0], apart[:, 1]) - around).min())
         # the first that is good enough: numbers do not hop as others pass by
         rooms.append((min(room, 0.5 * gap), middle.tolist()))
-    canvas.text(text, max(rooms, key=lambda each: each[0])[1], size=size, bold=True, anchor="middle")
+    canvas.draw_text(text, max(rooms, key=lambda each: each[0])[1], size=size, bold=True, anchor="middle")
 
 
 def _draw_wreck(canvas: Canvas, x: float, y: float, radius: float) -> None:
     theme, scale = canvas.theme, canvas.scale
     fill, edge = mix(theme.background, theme.ink, 0.3), mix(theme.background, theme.ink, 0.75)
-    canvas.stamp(partial(sprites.disc, radius, fill, edge, min(1.2 * scale, 0.25 * radius), edge, ""), (x, y))
+    ring_width = min(1.2 * scale, 0.25 * radius)
+    disc = partial(sprites.render_disc, radius, fill=fill, ring=edge, ring_width=ring_width, edge=edge)
+    canvas.draw_sprite(disc, (x, y))
     # beyond the edge: crossed out, not a sign on a button
     arm, width = rounded(1.1 * radius), min(1.7 * scale, 0.35 * radius)
-    canvas.stamp(partial(sprites.cross, arm, theme.ink, theme.background, width, True), (x, y))
+    cross = partial(
+        sprites.render_cross, arm, color=theme.ink, halo=theme.background, width=width, is_diagonal=True
+    )
+    canvas.draw_sprite(cross, (x, y))
 
 
 failed_legend = says(legend.FAILED_ROBOT, lambda canvas, x, y: _draw_wreck(canvas, x, y, 6.0 * canvas.scale))
@@ -206,15 +234,15 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
     if seen.reported_positions is not None:
         if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
             corners = canvas.camera.to_pixels(cells.polygons[robot])
-            canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
+            canvas.draw_outline(corners, theme.ink, canvas.scale_width(1.6 * theme.line))
         known = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
         places = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])
         for other, place in zip(known, canvas.camera.to_pixels(places).tolist(), strict=True):
             hue = int(canvas.hues[other])
-            canvas.dashes(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)
+            canvas.draw_dashed_line(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)
             _stamp_belief(canvas, hue, place)
     radius = drawn_radii(canvas, scene)[robot] + 4.0 * canvas.scale
-    canvas.stamp(partial(sprites.ring, radius, theme.ink, 2.2 * canvas.scale), there[robot])
+    canvas.draw_sprite(partial(sprites.render_ring, radius, theme.ink, 2.2 * canvas.scale), there[robot])
 
 
 def belief_legend(scene: Scene) -> list[LegendEntry]:
@@ -227,4 +255,4 @@ def belief_legend(scene: Scene) -> list[LegendEntry]:
 
 def _stamp_belief(canvas: Canvas, hue: int, place: list[float]) -> None:
     color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
-    canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, color, 1.6 * canvas.scale), place)
+    canvas.draw_sprite(partial(sprites.render_ring, 5.0 * canvas.scale, color, 1.6 * canvas.scale), place)

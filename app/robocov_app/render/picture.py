@@ -20,7 +20,7 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.layers import Layer
 from robocov_app.render.scene import Scene
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 from robocov_app.render.trajectories import Trajectories
 
 _UNIT_WIDTH_PX = 1024
@@ -187,7 +187,7 @@ class Painter:
         self.visible = {layer.name for layer in self.layers if layer.default}
         self._camera: Camera | None = None  # None shows the whole region.
         self._hues = choose_robot_hues(0)
-        self._static = Latest[pygame.Surface]()
+        self._static = LatestValue[pygame.Surface]()
         self._own_surface: pygame.Surface | None = None
         self._margins = _Margins(None, 0, 0.0)
 
@@ -307,7 +307,7 @@ class Painter:
         elif "legend" in names:
             rows = len(annotations.legend_rows(canvas, canvas.legend))
         color_bar_width = heatmaps.bar_room(canvas, scene)
-        key = (self.size, self.scale, canvas.shown)
+        key = (self.size, self.scale, canvas.visible_layers)
         if key == self._margins.key:
             rows = max(rows, self._margins.legend_rows)
             color_bar_width = max(color_bar_width, self._margins.color_bar_width)
@@ -340,7 +340,7 @@ class Painter:
     ) -> pygame.Surface:
         """Return a page with neighboring static layers, which is drawn again after a change."""
         # The density is not drawn below a distance map.
-        has_distances = scene.field is not None and "distances" in canvas.shown
+        has_distances = scene.field is not None and "distances" in canvas.visible_layers
         names = [layer.name for layer in layers]
         key = (names, canvas.camera, self.theme.name, self.scale, self.size, has_distances)
 
@@ -352,4 +352,4 @@ class Painter:
                     layer.draw(replace(canvas, surface=page), scene)
             return page
 
-        return self._static.of(scene.environment, key, draw_page)
+        return self._static.get(scene.environment, key, draw_page)

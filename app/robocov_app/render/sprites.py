@@ -1,7 +1,7 @@
-"""Anti-aliased strokes and small pictures: drawn large, and shrunk.
+"""Smooth shapes: sketches, which are drawn larger and shrunk, and sprites, small cached pictures of marks.
 
-Discs with numbers, rings and crosses are kept, for each quarter of a pixel's shift, so that slow
-robots glide in films instead of hopping. All is premultiplied: blit with ``BLEND_PREMULTIPLIED``.
+Sprites are cached for each quarter of a pixel, so that slow robots glide in videos instead of hopping. All
+colors are premultiplied: blit with ``pygame.BLEND_PREMULTIPLIED``.
 """
 
 import math
@@ -13,161 +13,356 @@ import pygame
 
 from robocov.arrays import Array
 from robocov_app.look.colors import Color, choose_text_color
-from robocov_app.render.fonts import label
-from robocov_app.render.surface_cache import kept
+from robocov_app.render.fonts import render_text
+from robocov_app.render.surface_cache import cache_surfaces
 
-FINE = 4  # each sprite is drawn so many times larger; also the number of shifts within a pixel
-LARGE = 60.0  # radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes
-STROKE_FINE = 3  # the same for strokes, which may span the whole picture
-Shift: TypeAlias = tuple[int, int]  # quarters of a pixel to the right and down
-Pixel: TypeAlias = Sequence[float]  # x to the right and y down from the surface's corner
+FINENESS = 4
+"""Sprites are drawn this many times larger, and there are as many shifts within a pixel."""
+SKETCH_FINENESS = 3
+"""The same for sketches, which may be as large as the whole picture."""
+MAX_FINE_RADIUS_PX = 60.0
+"""Larger sprites have no shifts, which nobody would see, and half the fineness: they take megabytes."""
+NOSE_LENGTH = 1.65
+"""Distance of the tip of a nose from the center of its disc, in radii."""
+N_NOSE_DIRECTIONS = 96
+_NOSE_HALF_ANGLE = 0.5
+"""Angle at the center between the tip of a nose and each end of its base, rad."""
+_EDGE_PX = 0.6
+"""Width of the edge around discs and noses."""
+_CROSS_HALO_PX = 1.6
+"""How much wider than a cross its halo is."""
+_DIAGONAL_ARM = 0.75
+"""Length of the arms of a times sign, as a fraction of those of a plus."""
+_DIGIT_SIZES = (1.5, 1.22, 0.92, 0.72)
+"""Text sizes of numbers with 1, 2, 3 and 4 digits in a disc of radius 1."""
+_AXIS_DIRECTIONS = ((1, 0), (0, 1))
+_DIAGONAL_DIRECTIONS = ((-1, -1), (1, -1))
+_MAX_SKETCH_PX = 4000
+
+Shift: TypeAlias = tuple[int, int]
+"""Shift of a sprite to the right and down, in quarters of a pixel."""
+Pixel: TypeAlias = Sequence[float]
+"""Position on a surface, px: x to the right and y down."""
 
 
-def visible_box(points: Array, margin: float, surface: pygame.Surface) -> pygame.Rect | None:
-    """Return what of the surroundings of (..., 2) px points can be seen on a surface; None for nothing."""
+def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> pygame.Rect | None:
+    """Return the visible part of the box around points.
+
+    Parameters
+    ----------
+    points : (..., 2) array, px
+        May contain nan.
+    margin : float, px
+        Space around the points.
+    surface : pygame.Surface
+        Only the part within its clip is visible.
+
+    Returns
+    -------
+    pygame.Rect or None
+        None if nothing is visible.
+    """
     flat = points.reshape(-1, 2)
     flat = flat[np.isfinite(flat[:, 0])]
     if not len(flat):
         return None
-    low, high = np.floor(flat.min(axis=0) - margin), np.ceil(flat.max(axis=0) + margin)
-    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist()).clip(surface.get_clip())
-    return box if box.width and box.height else None
+    low = np.floor(flat.min(axis=0) - margin)
+    high = np.ceil(flat.max(axis=0) + margin)
+    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist())
+    visible = box.clip(surface.get_clip())
+    return visible if visible.width and visible.height else None
 
 
 class Sketch:
-    """A `box` of a surface, drawn larger, `fine` times, and shrunk: pieces that overlap show no seams."""
+    """A part of a surface that is drawn larger and then shrunk: overlapping strokes show no seams.
 
-    def __init__(self, box: pygame.Rect, fine: int = STROKE_FINE) -> None:
+    Parameters
+    ----------
+    box : pygame.Rect, px
+        The part of the surface.
+    fineness : int
+        Factor by which the drawing is larger.
+
+    Attributes
+    ----------
+    box : pygame.Rect, px
+    large : pygame.Surface
+        The enlarged drawing.
+    """
+
+    def __init__(self, box: pygame.Rect, fineness: int = SKETCH_FINENESS) -> None:
         self.box = box
-        self.large = pygame.Surface((box.width * fine, box.height * fine), pygame.SRCALPHA, 32)
+        self.large = pygame.Surface((box.width * fineness, box.height * fineness), pygame.SRCALPHA, 32)
+        self._fineness = fineness
 
     @classmethod
-    def around(cls, points: Sequence[Pixel], margin: float) -> "Sketch | None":
-        """Return a sketch that holds `points` and `margin` pixels around; None where it would be huge."""
-        xs, ys = [point[0] for point in points], [point[1] for point in points]
-        left, top = int(min(xs) - margin) - 1, int(min(ys) - margin) - 1
-        width, height = int(max(xs) + margin) + 2 - left, int(max(ys) + margin) + 2 - top
-        return cls(pygame.Rect(left, top, width, height)) if max(width, height) <= 4000 else None
+    def from_points(cls, points: Sequence[Pixel], margin: float) -> "Sketch | None":
+        """Build a sketch that contains points with a margin around them, px.
 
-    def _large_points(self, points: Sequence[Pixel]) -> list[tuple[float, float]]:
-        # pixels are squares around their whole numbers: their middle is not at a corner of the large ones
-        x, y = self.box.x - 0.5, self.box.y - 0.5
-        return [((point[0] - x) * STROKE_FINE, (point[1] - y) * STROKE_FINE) for point in points]
+        Returns
+        -------
+        Sketch or None
+            None if it would be huge.
+        """
+        xs = [point[0] for point in points]
+        ys = [point[1] for point in points]
+        left = int(min(xs) - margin) - 1
+        top = int(min(ys) - margin) - 1
+        width = int(max(xs) + margin) + 2 - left
+        height = int(max(ys) + margin) + 2 - top
+        if max(width, height) > _MAX_SKETCH_PX:
+            return None
+        return cls(pygame.Rect(left, top, width, height))
 
-    def path(self, points: Sequence[Pixel], color: Color, width: float) -> None:
-        wide = max(width * STROKE_FINE, 1.0)
-        large = self._large_points(points)
-        pygame.draw.lines(self.large, color, False, large, round(wide))
-        for point in large:
-            pygame.draw.circle(self.large, color, point, wide / 2)
+    def to_large(self, points: Sequence[Pixel]) -> list[tuple[float, float]]:
+        """Convert pixels of the surface to pixels of the enlarged drawing."""
+        # Pixels are squares around whole numbers, so their middles are not at corners of the large ones.
+        left = self.box.x - 0.5
+        top = self.box.y - 0.5
+        fineness = self._fineness
+        return [((point[0] - left) * fineness, (point[1] - top) * fineness) for point in points]
 
-    def polygon(self, corners: Sequence[Pixel], color: Color) -> None:
-        pygame.draw.polygon(self.large, color, self._large_points(corners))
+    def draw_path(self, points: Sequence[Pixel], color: Color, width: float) -> None:
+        """Draw a line of a width, px, with round joints and ends."""
+        large_width = max(width * self._fineness, 1.0)
+        large_points = self.to_large(points)
+        pygame.draw.lines(self.large, color, False, large_points, round(large_width))
+        for point in large_points:
+            pygame.draw.circle(self.large, color, point, large_width / 2)
 
-    def dot(self, center: Pixel, radius: float, color: Color) -> None:
-        pygame.draw.circle(self.large, color, self._large_points([center])[0], radius * STROKE_FINE)
+    def fill_polygon(self, corners: Sequence[Pixel], color: Color) -> None:
+        """Fill a polygon."""
+        pygame.draw.polygon(self.large, color, self.to_large(corners))
 
-    def onto(self, surface: pygame.Surface) -> None:
+    def draw_dot(self, center: Pixel, radius: float, color: Color) -> None:
+        """Draw a dot of a radius, px."""
+        large_center = self.to_large([center])[0]
+        pygame.draw.circle(self.large, color, large_center, radius * self._fineness)
+
+    def draw_on(self, surface: pygame.Surface) -> None:
+        """Shrink the drawing, and draw it on the surface."""
         picture = pygame.transform.smoothscale(self.large, self.box.size)
         surface.blit(picture, self.box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _blank(radius: float, shift: Shift, fine: int = FINE) -> tuple[pygame.Surface, tuple[int, int]]:
-    """Return a large transparent square for a sprite of `radius` pixels, and where its middle is."""
-    half = (int(radius) + 2) * fine
-    return pygame.Surface((2 * half, 2 * half), pygame.SRCALPHA, 32), (half + shift[0], half + shift[1])
+def _create_large(radius: float, shift: Shift, fineness: int) -> tuple[pygame.Surface, tuple[int, int]]:
+    """Return a transparent square for a sprite with a radius, px, and its center, both enlarged."""
+    half = (int(radius) + 2) * fineness
+    surface = pygame.Surface((2 * half, 2 * half), pygame.SRCALPHA, 32)
+    return surface, (half + shift[0], half + shift[1])
 
 
-def _shrunk(large: pygame.Surface, fine: int = FINE) -> pygame.Surface:
+def _shrink(large: pygame.Surface, fineness: int) -> pygame.Surface:
     width, height = large.get_size()
-    return pygame.transform.smoothscale(large, (width // fine, height // fine))
+    return pygame.transform.smoothscale(large, (width // fineness, height // fineness))
 
 
-def number_size(inside: Any, digits: Any) -> Any:
-    """Return the text sizes at which 1 to 4 digits fill discs of radius `inside`, in their unit."""
-    return inside * np.array([1.5, 1.22, 0.92, 0.72])[digits - 1]
+def _choose_fineness(radius: float) -> int:
+    return FINENESS if radius <= MAX_FINE_RADIUS_PX else FINENESS // 2
 
 
-def disc(
-    radius: float, fill: Color, ring: Color, ring_width: float, edge: Color, text: str, shift: Shift
+def _choose_shift(radius: float, shift: Shift) -> Shift:
+    return shift if radius <= MAX_FINE_RADIUS_PX else (0, 0)
+
+
+def choose_number_size(radius: Any, n_digits: Any) -> Any:
+    """Return the text size at which a number fills a disc.
+
+    Parameters
+    ----------
+    radius : float or (n,) array
+    n_digits : int or (n,) int array
+        From 1 to 4.
+
+    Returns
+    -------
+    float or (n,) array
+        In the unit of the radius.
+    """
+    return radius * np.array(_DIGIT_SIZES)[n_digits - 1]
+
+
+def render_disc(
+    radius: float,
+    shift: Shift,
+    *,
+    fill: Color,
+    ring: Color,
+    ring_width: float,
+    edge: Color,
+    text: str = "",
 ) -> pygame.Surface:
-    """Return a disc of `radius` px with a ring in it, a hair line around, and a number."""
-    return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
+    """Render a disc.
+
+    Parameters
+    ----------
+    radius : float, px
+    shift : Shift
+    fill : Color
+    ring : Color
+        Color of the ring at the rim of the disc.
+    ring_width : float, px
+    edge : Color
+        Color of the thin edge around the ring.
+    text : str
+        Number at the center, of up to four digits.
+
+    Returns
+    -------
+    pygame.Surface
+    """
+    return _render_disc(
+        radius,
+        _choose_shift(radius, shift),
+        fill=fill,
+        ring=ring,
+        ring_width=ring_width,
+        edge=edge,
+        text=text,
+    )
 
 
-@kept(24_000_000)
-def _disc(
-    radius: float, fill: Color, ring: Color, ring_width: float, edge: Color, text: str, shift: Shift
+@cache_surfaces(24_000_000)
+def _render_disc(
+    radius: float,
+    shift: Shift,
+    *,
+    fill: Color,
+    ring: Color,
+    ring_width: float,
+    edge: Color,
+    text: str,
 ) -> pygame.Surface:
-    fine = _fineness(radius)
-    large, center = _blank(radius + 1, shift, fine)
-    pygame.draw.circle(large, edge, center, (radius + 0.6) * fine)
-    pygame.draw.circle(large, ring, center, radius * fine)
-    pygame.draw.circle(large, fill, center, (radius - ring_width) * fine)
+    fineness = _choose_fineness(radius)
+    large, center = _create_large(radius + 1, shift, fineness)
+    pygame.draw.circle(large, edge, center, (radius + _EDGE_PX) * fineness)
+    pygame.draw.circle(large, ring, center, radius * fineness)
+    pygame.draw.circle(large, fill, center, (radius - ring_width) * fineness)
     if text:
-        size = number_size(radius - ring_width, min(len(text), 4))
-        number = label(text, round(size * fine), choose_text_color(fill), True)
-        # the ink of digits, without the room for ascenders and descenders, goes to the middle
+        size = choose_number_size(radius - ring_width, min(len(text), len(_DIGIT_SIZES)))
+        number = render_text(text, round(size * fineness), choose_text_color(fill), True)
+        # The ink of the digits is centered, without the space for ascenders and descenders.
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))
-    return _shrunk(large, fine)
+    return _shrink(large, fineness)
 
 
-NOSE = 1.65  # how far the tip of a nose is from the middle of the disc, in its radii
-NOSE_TURNS = 96  # so many directions of noses are told apart
+@cache_surfaces(12_000_000)
+def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: Shift) -> pygame.Surface:
+    """Render the tip that shows the heading of a disc; it is drawn below the disc.
+
+    Parameters
+    ----------
+    radius : float, px
+        Radius of the disc.
+    fill, edge : Color
+    direction : int
+        Counterclockwise from the right, in steps of 2 pi / `N_NOSE_DIRECTIONS`.
+    shift : Shift
+
+    Returns
+    -------
+    pygame.Surface
+    """
+    fineness = _choose_fineness(radius)
+    large, center = _create_large(NOSE_LENGTH * radius + 1, shift, fineness)
+    heading = 2 * math.pi * direction / N_NOSE_DIRECTIONS
+    for color, margin in ((edge, _EDGE_PX), (fill, 0.0)):
+        base = radius + margin
+        # The tip is sharp, so a uniform edge reaches farther there.
+        tip = NOSE_LENGTH * radius + 1.5 * margin
+        corners = []
+        for distance, angle in ((tip, 0.0), (base, _NOSE_HALF_ANGLE), (base, -_NOSE_HALF_ANGLE)):
+            dx = distance * math.cos(heading + angle)
+            dy = distance * math.sin(heading + angle)
+            corners.append((center[0] + fineness * dx, center[1] - fineness * dy))
+        pygame.draw.polygon(large, color, corners)
+    return _shrink(large, fineness)
 
 
-@kept(12_000_000)
-def nose(radius: float, fill: Color, edge: Color, turn: int, shift: Shift) -> pygame.Surface:
-    """Return what points where a disc faces, to be put under it; `turn` is of `NOSE_TURNS`, 0 right."""
-    fine = _fineness(radius)
-    large, (x, y) = _blank(NOSE * radius + 1, shift, fine)
-    angle, apart = 2 * math.pi * turn / NOSE_TURNS, 0.5
-    for color, more in ((edge, 0.6), (fill, 0.0)):
-        reach = [(NOSE * radius + 1.5 * more, 0.0), (radius + more, apart), (radius + more, -apart)]
-        corners = [(far * math.cos(angle + side), far * math.sin(angle + side)) for far, side in reach]
-        pygame.draw.polygon(large, color, [(x + fine * dx, y - fine * dy) for dx, dy in corners])
-    return _shrunk(large, fine)
+def render_ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
+    """Render a ring.
+
+    Parameters
+    ----------
+    radius : float, px
+        Of the middle of the stroke.
+    color : Color
+    width : float, px
+    shift : Shift
+
+    Returns
+    -------
+    pygame.Surface
+    """
+    return _render_ring(radius, color, width, _choose_shift(radius, shift))
 
 
-def ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
-    return _ring(radius, color, width, shift if radius <= LARGE else (0, 0))
+@cache_surfaces(6_000_000)
+def _render_ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
+    fineness = _choose_fineness(radius)
+    large, center = _create_large(radius + width / 2, shift, fineness)
+    pygame.draw.circle(large, color, center, (radius + width / 2) * fineness)
+    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fineness)
+    return _shrink(large, fineness)
 
 
-@kept(6_000_000)
-def _ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
-    fine = _fineness(radius)
-    large, center = _blank(radius + width / 2, shift, fine)
-    pygame.draw.circle(large, color, center, (radius + width / 2) * fine)
-    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fine)
-    return _shrunk(large, fine)
+@cache_surfaces(4_000_000)
+def render_dot(radius: float, color: Color, shift: Shift) -> pygame.Surface:
+    """Render a dot of a radius, px."""
+    large, center = _create_large(radius, shift, FINENESS)
+    pygame.draw.circle(large, color, center, radius * FINENESS)
+    return _shrink(large, FINENESS)
 
 
-def _fineness(radius: float) -> int:
-    return FINE if radius <= LARGE else FINE // 2
-
-
-@kept(4_000_000)
-def dot(radius: float, color: Color, shift: Shift) -> pygame.Surface:
-    large, center = _blank(radius, shift)
-    pygame.draw.circle(large, color, center, radius * FINE)
-    return _shrunk(large)
-
-
-@kept(4_000_000)
-def cross(
-    arm: float, color: Color, halo: Color, width: float, diagonal: bool, shift: Shift
+@cache_surfaces(4_000_000)
+def render_cross(
+    arm: float, shift: Shift, *, color: Color, halo: Color, width: float, is_diagonal: bool
 ) -> pygame.Surface:
-    """Return a plus, or a times sign, with a thin halo that keeps it readable on any fill."""
-    large, (x, y) = _blank(arm + width, shift)
-    reach = arm * FINE * (0.75 if diagonal else 1.0)
-    turned = ((-1, -1), (1, -1)) if diagonal else ((1, 0), (0, 1))
-    for shade, thick in ((halo, width * FINE + FINE * 1.6), (color, width * FINE)):
-        more = reach + (FINE * 0.8 if shade is halo else 0.0)
-        for dx, dy in turned:
-            half_thick = thick / 2 / (2**0.5 if diagonal else 1.0)
-            nx, ny = -dy * half_thick, dx * half_thick
-            a, b = (x - dx * more, y - dy * more), (x + dx * more, y + dy * more)
-            ends = (a, 1), (b, 1), (b, -1), (a, -1)
-            pygame.draw.polygon(large, shade, [(px + side * nx, py + side * ny) for (px, py), side in ends])
-    return _shrunk(large)
+    """Render a plus or a times sign, with a thin halo that keeps it readable on any background.
+
+    Parameters
+    ----------
+    arm : float, px
+        Length of the arms of a plus; those of a times sign are a little shorter.
+    shift : Shift
+    color, halo : Color
+    width : float, px
+    is_diagonal : bool
+        Whether it is a times sign.
+
+    Returns
+    -------
+    pygame.Surface
+    """
+    large, center = _create_large(arm + width, shift, FINENESS)
+    length = arm * FINENESS * (_DIAGONAL_ARM if is_diagonal else 1.0)
+    large_width = width * FINENESS
+    halo_px = _CROSS_HALO_PX * FINENESS
+    directions = _DIAGONAL_DIRECTIONS if is_diagonal else _AXIS_DIRECTIONS
+    for shade, reach, shade_width in (
+        (halo, length + halo_px / 2, large_width + halo_px),
+        (color, length, large_width),
+    ):
+        for direction in directions:
+            pygame.draw.polygon(large, shade, _build_bar(center, direction, reach, shade_width))
+    return _shrink(large, FINENESS)
+
+
+def _build_bar(
+    center: tuple[int, int], direction: tuple[int, int], reach: float, width: float
+) -> list[tuple[float, float]]:
+    """Return the corners of a bar whose ends are at the center plus and minus `reach` times a direction."""
+    x, y = center
+    dx, dy = direction
+    half_width = width / 2 / (dx * dx + dy * dy) ** 0.5
+    side_x = -dy * half_width
+    side_y = dx * half_width
+    start_x, start_y = x - dx * reach, y - dy * reach
+    end_x, end_y = x + dx * reach, y + dy * reach
+    return [
+        (start_x + side_x, start_y + side_y),
+        (end_x + side_x, end_y + side_y),
+        (end_x - side_x, end_y - side_y),
+        (start_x - side_x, start_y - side_y),
+    ]

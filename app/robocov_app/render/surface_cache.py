@@ -1,4 +1,4 @@
-"""Caches: pictures as long as there is room, so many bytes, and what was made last."""
+"""Caches of what is drawn: many small surfaces in bounded memory, or the latest value of one kind."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -7,51 +7,106 @@ from typing import Generic, ParamSpec, TypeVar
 import pygame
 
 Arguments = ParamSpec("Arguments")
-_Made = TypeVar("_Made")
+_Value = TypeVar("_Value")
 
 
-class Kept(Generic[Arguments]):
-    """A function that draws each picture once, and forgets those that were not used for the longest time."""
+class CachedRenderer(Generic[Arguments]):
+    """A function that renders surfaces, and returns those it has rendered before.
 
-    def __init__(self, draw: Callable[Arguments, pygame.Surface], most_bytes: int) -> None:
-        self._draw, self._most_bytes, self._taken = draw, most_bytes, 0
-        self.pictures: OrderedDict[object, pygame.Surface] = OrderedDict()
+    The surfaces that have not been used for the longest time are dropped first.
+
+    Parameters
+    ----------
+    render : callable
+        Returns a surface; its arguments must be hashable.
+    max_bytes : int
+        Maximum memory of all cached surfaces.
+
+    Attributes
+    ----------
+    surfaces : OrderedDict
+        The cached surfaces by their arguments, the least recently used first.
+    """
+
+    def __init__(self, render: Callable[Arguments, pygame.Surface], max_bytes: int) -> None:
+        self.surfaces: OrderedDict[object, pygame.Surface] = OrderedDict()
+        self._render = render
+        self._max_bytes = max_bytes
+        self._used_bytes = 0
 
     def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> pygame.Surface:
+        """Return the surface for some arguments."""
         key = (args, tuple(kwargs.items())) if kwargs else args
-        if (picture := self.pictures.get(key)) is not None:
-            self.pictures.move_to_end(key)
-            return picture
-        picture = self._draw(*args, **kwargs)
-        if _bytes(picture) <= self._most_bytes:
-            self.pictures[key] = picture
-            self._taken += _bytes(picture)
-            while self._taken > self._most_bytes:
-                self._taken -= _bytes(self.pictures.popitem(last=False)[1])
-        return picture
+        cached = self.surfaces.get(key)
+        if cached is not None:
+            self.surfaces.move_to_end(key)
+            return cached
+        surface = self._render(*args, **kwargs)
+        self._add(key, surface)
+        return surface
+
+    def _add(self, key: object, surface: pygame.Surface) -> None:
+        size = _count_bytes(surface)
+        if size > self._max_bytes:
+            return
+        self.surfaces[key] = surface
+        self._used_bytes += size
+        while self._used_bytes > self._max_bytes:
+            _, dropped = self.surfaces.popitem(last=False)
+            self._used_bytes -= _count_bytes(dropped)
 
     def cache_clear(self) -> None:
-        self.pictures.clear()
-        self._taken = 0
+        """Drop all surfaces."""
+        self.surfaces.clear()
+        self._used_bytes = 0
 
 
-def kept(most_bytes: int) -> Callable[[Callable[Arguments, pygame.Surface]], Kept[Arguments]]:
-    """Let a function keep pictures of so many bytes together: magnified, a single disc takes megabytes."""
-    return lambda draw: Kept(draw, most_bytes)
+def cache_surfaces(
+    max_bytes: int,
+) -> Callable[[Callable[Arguments, pygame.Surface]], CachedRenderer[Arguments]]:
+    """Decorate a function so that the surfaces that it returns are cached.
+
+    Memory is limited in bytes, not in surfaces, since a single magnified disc may take megabytes.
+
+    Parameters
+    ----------
+    max_bytes : int
+        Maximum memory of all cached surfaces.
+
+    Returns
+    -------
+    callable
+        The decorator.
+    """
+    return lambda render: CachedRenderer(render, max_bytes)
 
 
-def _bytes(picture: pygame.Surface) -> int:
-    return picture.get_pitch() * picture.get_height()
+def _count_bytes(surface: pygame.Surface) -> int:
+    return surface.get_pitch() * surface.get_height()
 
 
-class Latest(Generic[_Made]):
-    """Keeps what was made last."""
+class LatestValue(Generic[_Value]):
+    """Cache of one value, which is computed again when its source or its key changes."""
 
     def __init__(self) -> None:
-        self._kept: tuple[object, object, _Made] | None = None
+        self._cached: tuple[object, object, _Value] | None = None
 
-    def of(self, source: object, look: object, make: Callable[[], _Made]) -> _Made:
-        """Return what `make` makes of a source, anew for another object, or a look that is not equal."""
-        if self._kept is None or self._kept[0] is not source or self._kept[1] != look:
-            self._kept = source, look, make()
-        return self._kept[2]
+    def get(self, source: object, key: object, compute: Callable[[], _Value]) -> _Value:
+        """Return the value, computed again if needed.
+
+        Parameters
+        ----------
+        source : object
+            The value is valid for this very object only, since comparing large ones takes long.
+        key : object
+            What else the value depends on; compared by equality.
+        compute : callable
+            Returns the value.
+
+        Returns
+        -------
+        object
+        """
+        if self._cached is None or self._cached[0] is not source or self._cached[1] != key:
+            self._cached = (source, key, compute())
+        return self._cached[2]

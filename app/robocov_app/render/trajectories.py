@@ -10,11 +10,12 @@ from robocov.arrays import Array, IntArray
 from robocov_app.look import legend
 from robocov_app.look.colors import Color
 from robocov_app.look.robot_colors import ColorScheme, choose_trail_colors
-from robocov_app.render.canvas import Canvas, LegendEntry, bounded, premultiplied
+from robocov_app.render.canvas import Canvas, LegendEntry, premultiply
+from robocov_app.render.clipping import limit_pixels
 from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
-from robocov_app.render.sprites import Sketch, visible_box
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.sprites import Sketch, find_visible_box
+from robocov_app.render.surface_cache import LatestValue
 
 PIECE = 2.0  # pixels between the corners of a drawn trajectory
 SECTION = 16.0  # pixels of path that are added to the page at once; what is newer is drawn anew each time
@@ -37,7 +38,7 @@ class Trajectories:
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
         self._ended: list[tuple[int, list[list[float]]]] = []
-        self._trail_colors = Latest[list[Color]]()
+        self._trail_colors = LatestValue[list[Color]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         trail = scene.trail
@@ -46,12 +47,12 @@ class Trajectories:
         colors = self._of_robots(canvas)
         width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
         continues = self._continued(canvas, scene, trail, (colors, width))
-        self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
+        self._lengthen(limit_pixels(canvas.camera.to_pixels(trail[self._drawn :])))
         self._drawn, self._last_row = len(trail), trail[-1].copy()
         self._finish_sections((colors, width), together=not continues)
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
-        whole = canvas.width(width / canvas.scale)
+        ends = limit_pixels(canvas.camera.to_pixels(trail[-1])).tolist()
+        whole = canvas.scale_width(width / canvas.scale)
         # mostly below the robot's disc, where seams do not show, nor steps in a crowd
         smooth = len(ends) < CROWD
         for path, end, color in zip(self._open, ends, colors, strict=True):
@@ -59,11 +60,11 @@ class Trajectories:
             if still or path[-1][0] != path[-1][0]:  # nan: not there yet
                 continue
             if whole == 1 and smooth:
-                canvas.thin_path([*path, end], color)
+                canvas.draw_thin_path([*path, end], color)
             elif whole == 1:
                 pygame.draw.lines(canvas.surface, color, False, [*path, end])
             else:
-                canvas.outline(np.array([*path, end]), color, whole, closed=False)
+                canvas.draw_outline(np.array([*path, end]), color, whole, is_closed=False)
 
     def _lengthen(self, rows: Array) -> None:
         last = np.array([path[-1] for path in self._open])
@@ -100,12 +101,12 @@ class Trajectories:
             if box is not None:
                 sketch = Sketch(box)
                 for robot, path in group:
-                    sketch.path(path, colors[robot], width)
-                sketch.onto(self._page)
+                    sketch.draw_path(path, colors[robot], width)
+                sketch.draw_on(self._page)
 
     def _box(self, group: list[tuple[int, list[list[float]]]], width: float) -> pygame.Rect | None:
         points = np.concatenate([np.empty((0, 2)), *(path for _, path in group)])
-        return visible_box(points, 5.0 + width, self._page)
+        return find_visible_box(points, 5.0 + width, self._page)
 
     def _continued(self, canvas: Canvas, scene: Scene, trail: Array, pen: Pen) -> bool:
         """Return whether a trail continues the page of old sections; if not, that is fresh from now on."""
@@ -125,7 +126,7 @@ class Trajectories:
                 _fade_on(self._page, canvas, trail, time, fade, pen)
                 self._drawn, continues = len(trail), True
             row = trail[self._drawn - 1 if self._drawn else 0]
-            self._open = [[point] for point in bounded(canvas.camera.to_pixels(row)).tolist()]
+            self._open = [[point] for point in limit_pixels(canvas.camera.to_pixels(row)).tolist()]
         return continues
 
     def _found(self, trail: Array) -> bool:
@@ -140,25 +141,27 @@ class Trajectories:
     def _of_robots(self, canvas: Canvas) -> list[Color]:
         hues = canvas.hues.tolist()
         look = canvas.theme.name, hues
-        return self._trail_colors.of(None, look, lambda: choose_trail_colors(canvas.theme, hues, self.colors))
+        return self._trail_colors.get(
+            None, look, lambda: choose_trail_colors(canvas.theme, hues, self.colors)
+        )
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             angle = np.linspace(-np.pi, np.pi, 24)
             wave = np.column_stack([x + angle * 2.9 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
-            sketch = Sketch.around(wave.tolist(), 3.0)
+            sketch = Sketch.from_points(wave.tolist(), 3.0)
             if sketch is not None:
                 width = canvas.theme.trajectory_line * canvas.scale
-                sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
-                sketch.onto(canvas.surface)
+                sketch.draw_path(wave.tolist(), self._of_robots(canvas)[0], width)
+                sketch.draw_on(canvas.surface)
 
         return [LegendEntry(legend.TRAJECTORY, glyph, self.colors)]
 
 
 def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fade: float, pen: Pen) -> None:
     begin, (colors, width) = int(np.searchsorted(time, time[-1] - fade)), pen
-    points = bounded(canvas.camera.to_pixels(trail[begin:]))
-    box = visible_box(points, 5.0 + width, page)
+    points = limit_pixels(canvas.camera.to_pixels(trail[begin:]))
+    box = find_visible_box(points, 5.0 + width, page)
     if box is None:
         return
     shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
@@ -173,7 +176,7 @@ def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fa
     for first, last in pairwise([0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]):
         # slowly at first: what is half forgotten can still be followed
         part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
-        shades = {color: premultiplied(color, part) for color in set(colors)}
+        shades = {color: premultiply(color, part) for color in set(colors)}
         paths = points[first : last + 1]
         moves = ~(np.abs(paths - tips).max(axis=(0, 2)) < _FADE_FINE)
         gone = np.isnan(paths).any(axis=(0, 2)).tolist()
@@ -189,7 +192,7 @@ def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fa
                 for point in run if len(run) > 1 and wide > 2.5 * _FADE_FINE else ():
                     pygame.draw.circle(sketch.large, color, point, wide / 2)
         tips[moves] = paths[-1, moves]
-    sketch.onto(page)
+    sketch.draw_on(page)
 
 
 def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:

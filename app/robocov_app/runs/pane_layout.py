@@ -13,7 +13,6 @@ from robocov_app.look.colors import Color
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
-from robocov_app.render.canvas import LegendEntry
 from robocov_app.render.distance_field import Fields
 from robocov_app.render.layout import columns_for
 from robocov_app.render.picture import Painter, pane_layers, scale_for
@@ -180,7 +179,7 @@ def _draw_legend(
     # The longest legend determines the order, because it usually contains all entries.
     entries.sort(key=len)
     entries.reverse()
-    merged = merge_legends(entries, LegendEntry.key)
+    merged = merge_legends(entries, lambda entry: entry.key)
     return legend_picture(merged, width, settings.color_theme, scale, settings.shown_layers)
 
 

@@ -8,7 +8,7 @@ from pygame import Rect, Surface
 
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
-from robocov_app.render.fonts import label, shortened
+from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.command import Command
 from robocov_app.toolkit.input import format_key
 from robocov_app.toolkit.overlay import draw_card, draw_veil
@@ -87,7 +87,7 @@ def draw_help_page(
     for line, x, y in _place_lines(lines, columns):
         if isinstance(line, str):
             size = max(_MIN_TEXT_PX, round(columns.text_size * 0.92))
-            screen.blit(label(line.upper(), size, theme.final, True), (round(x), round(y)))
+            screen.blit(render_text(line.upper(), size, theme.final, True), (round(x), round(y)))
         else:
             _draw_command(screen, theme, columns, line, x, y)
 
@@ -117,9 +117,9 @@ def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
 def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> None:
     scale = columns.scale
     box = columns.box
-    title = label("Keys", round(_TITLE_SIZE_PX * scale), theme.ink, True)
+    title = render_text("Keys", round(_TITLE_SIZE_PX * scale), theme.ink, True)
     screen.blit(title, (box.left + round(_MARGIN_PX * scale), box.top + round(12 * scale)))
-    image = label(hint, round(_HINT_SIZE_PX * scale), theme.faint)
+    image = render_text(hint, round(_HINT_SIZE_PX * scale), theme.faint)
     right_end = box.right - round(_MARGIN_PX * scale), box.top + round(22 * scale)
     screen.blit(image, image.get_rect(midright=right_end))
 
@@ -146,8 +146,8 @@ def _draw_command(
     screen: Surface, theme: Theme, columns: _Columns, command: Command, x: float, y: float
 ) -> None:
     size = columns.text_size
-    screen.blit(label(format_key(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
+    screen.blit(render_text(format_key(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
     max_width = columns.width - (_KEY_WIDTH_PX + 8) * columns.scale
-    title = shortened(command.title.partition(":")[0], size, max_width)
-    image = label(title, size, mix(theme.panel, theme.ink, 0.8))
+    title = shorten_to_width(command.title.partition(":")[0], size, max_width)
+    image = render_text(title, size, mix(theme.panel, theme.ink, 0.8))
     screen.blit(image, (round(x + _KEY_WIDTH_PX * columns.scale), round(y)))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from pygame import Rect
 
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.command import Command
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.input import ENTER_KEYS
@@ -95,7 +95,7 @@ class Menu(Dialog):
         title_size = round(TEXT_PX * scale)
         key_size = round(SMALL_TEXT_PX * scale)
         widths = [
-            text_width(command.title, title_size) + text_width(command.key_text, key_size)
+            measure_text(command.title, title_size) + measure_text(command.key_text, key_size)
             for command in self.rows
             if command is not None
         ]

@@ -8,7 +8,7 @@ from pygame import Rect, Surface
 
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
-from robocov_app.render.fonts import label, shortened
+from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.input import ENTER_KEYS, get_key_name, get_wheel_notches, is_function_key
 from robocov_app.toolkit.overlay import draw_rounded_box, get_field_color
 
@@ -144,7 +144,7 @@ class OpenList:
                 continue
             if number == self.chosen:
                 screen.fill(mix(field, theme.final, 0.25), item)
-            text = label(shortened(option, size, item.width - text_margin), size, theme.ink)
+            text = render_text(shorten_to_width(option, size, item.width - text_margin), size, theme.ink)
             screen.blit(text, text.get_rect(midleft=(item.left + round(8 * scale), item.centery)))
         if self.max_top:
             self._draw_scroll_bar(screen, inner, theme, scale)

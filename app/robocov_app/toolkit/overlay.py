@@ -8,8 +8,8 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.surface_cache import kept
+from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
+from robocov_app.render.surface_cache import cache_surfaces
 from robocov_app.toolkit.layout import Box
 
 _FINE = 4
@@ -32,7 +32,7 @@ def create_flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
     return Canvas(surface, camera, theme, scale, np.zeros(1, dtype=np.intp))
 
 
-@kept(_BOX_CACHE_BYTES)
+@cache_surfaces(_BOX_CACHE_BYTES)
 def _render_rounded_box(size: tuple[int, int], fill: Color, edge: Color, radius: int, width: int) -> Surface:
     large = Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
     box = large.get_rect()
@@ -90,12 +90,12 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
     """
     lines: list[str] = []
     for word in text.split():
-        if lines and text_width(f"{lines[-1]} {word}", size, bold) <= width:
+        if lines and measure_text(f"{lines[-1]} {word}", size, bold) <= width:
             lines[-1] += f" {word}"
             continue
         lines.append("")
         for letter in word:
-            if lines[-1] and text_width(lines[-1] + letter, size, bold) > width:
+            if lines[-1] and measure_text(lines[-1] + letter, size, bold) > width:
                 lines.append("")
             lines[-1] += letter
     return lines
@@ -129,12 +129,12 @@ def draw_tag(screen: Surface, text: str, position: tuple[float, float], theme: T
         Size of text and box.
     """
     size = round(theme.text * scale)
-    box = Rect(0, 0, text_width(text, size) + round(12 * scale), round(20 * scale))
+    box = Rect(0, 0, measure_text(text, size) + round(12 * scale), round(20 * scale))
     box.midleft = round(position[0] - 6 * scale), round(position[1])
     box.clamp_ip(screen.get_rect())
     edge = mix(theme.background, theme.ink, 0.3)
     draw_rounded_box(screen, box, theme.background, edge=edge, radius=round(4 * scale))
-    image = label(text, size, theme.ink)
+    image = render_text(text, size, theme.ink)
     screen.blit(image, image.get_rect(center=box.center))
 
 
@@ -160,14 +160,14 @@ def draw_status(
     canvas = create_flat_canvas(screen, theme, scale)
     size = theme.small_text
     y = top + height / 2
-    max_width = width - 44 * scale - canvas.text_width(hint, size)
+    max_width = width - 44 * scale - canvas.measure_text(hint, size)
     count = len(facts)
-    while count > 1 and canvas.text_width(_FACT_SEPARATOR.join(facts[:count]), size) > max_width:
+    while count > 1 and canvas.measure_text(_FACT_SEPARATOR.join(facts[:count]), size) > max_width:
         count -= 1
-    text = shortened(_FACT_SEPARATOR.join(facts[:count]), canvas.text_size(size), max_width)
-    canvas.text(text, (left + _STATUS_MARGIN_PX * scale, y), size=size)
+    text = shorten_to_width(_FACT_SEPARATOR.join(facts[:count]), canvas.scale_text_size(size), max_width)
+    canvas.draw_text(text, (left + _STATUS_MARGIN_PX * scale, y), size=size)
     right = left + width - _STATUS_MARGIN_PX * scale
-    canvas.text(hint, (right, y), size=size, color=theme.faint, anchor="right")
+    canvas.draw_text(hint, (right, y), size=size, color=theme.faint, anchor="right")
 
 
 def draw_message(
@@ -195,7 +195,7 @@ def draw_message(
     lines: list[str] = []
     for paragraph in text.split("\n"):
         lines += wrap_text(paragraph, size, max_width)
-    box_width = max(text_width(line, size) for line in lines) + 28 * scale
+    box_width = max(measure_text(line, size) for line in lines) + 28 * scale
     box = Rect(0, 0, round(box_width), round((len(lines) * _MESSAGE_LINE_PX + 14) * scale))
     box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
     fill = mix(theme.panel, theme.trajectory, 0.14) if is_error else theme.panel
@@ -203,6 +203,6 @@ def draw_message(
     radius = round(_CARD_RADIUS_PX * scale)
     draw_rounded_box(screen, box, fill, edge=edge, radius=radius, width=max(1, round(scale)))
     for number, line in enumerate(lines):
-        image = label(line, size, theme.ink)
+        image = render_text(line, size, theme.ink)
         y = round(box.top + (16 + _MESSAGE_LINE_PX * number) * scale)
         screen.blit(image, image.get_rect(center=(box.centerx, y)))

@@ -6,7 +6,7 @@ from pygame import Rect, Surface
 
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.render.fonts import label, text_width
+from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.overlay import draw_rounded_box, wrap_text
 
 TIP_DELAY_S = 0.6
@@ -69,7 +69,7 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
     size = round(_TEXT_PX * scale)
     line_height = round(_LINE_PX * scale)
     lines = wrap_text(text, size, round(_MAX_WIDTH_PX * scale))
-    width = max(text_width(line, size) for line in lines) + round(14 * scale)
+    width = max(measure_text(line, size) for line in lines) + round(14 * scale)
     box = Rect(0, 0, width, line_height * len(lines) + round(9 * scale))
     box.topleft = x, widget.bottom + round(_DISTANCE_PX * scale)
     if box.bottom > screen.get_height():
@@ -79,4 +79,4 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
     draw_rounded_box(screen, box, fill, edge=mix(theme.panel, theme.ink, 0.24), radius=round(4 * scale))
     for number, line in enumerate(lines):
         top = box.top + round(_DISTANCE_PX * scale) + number * line_height
-        screen.blit(label(line, size, _TEXT_COLOR), (box.left + round(7 * scale), top))
+        screen.blit(render_text(line, size, _TEXT_COLOR), (box.left + round(7 * scale), top))

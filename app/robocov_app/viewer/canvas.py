@@ -303,4 +303,6 @@ class ViewerCanvas:
     def _list_legend_entries(self) -> list[LegendEntry]:
         # A pane that was just added has no scene yet.
         pairs = zip(self._painters, self._scenes, strict=False)
-        return merge_legends((painter.legend_entries(scene) for painter, scene in pairs), LegendEntry.key)
+        return merge_legends(
+            (painter.legend_entries(scene) for painter, scene in pairs), lambda entry: entry.key
+        )

@@ -16,7 +16,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
-from robocov_app.render.fonts import shortened
+from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.layout import Box, Layout, is_inside
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_tag
 from robocov_app.viewer.chart_scale import (
@@ -225,13 +225,13 @@ class Chart:
         density = density_label(self.viewer.session.displayed.environment)
         weighted = ", weighed by φ" if density else ""
         title = f"{self.plotted.title}{weighted}, {self.plotted.unit}"
-        canvas.text(title, (12 * scale, row), bold=True)
-        title_end = 12 * scale + canvas.text_width(title, bold=True)
+        canvas.draw_text(title, (12 * scale, row), bold=True)
+        title_end = 12 * scale + canvas.measure_text(title, bold=True)
         self._draw_switch(canvas, title_end + 16 * scale)
         state = self.viewer.costs.state
         right = self._scale.times.right
-        if state and right - canvas.text_width(state) > title_end:
-            canvas.text(state, (right, row), color=self.theme.faint, anchor="right")
+        if state and right - canvas.measure_text(state) > title_end:
+            canvas.draw_text(state, (right, row), color=self.theme.faint, anchor="right")
 
     def _draw_switch(self, canvas: Canvas, left: float) -> None:
         """Write the name of the other quantity next to the title, if there is one; a click plots it."""
@@ -242,9 +242,9 @@ class Chart:
         size = self.theme.small_text
         other = DISTANCE if self.plotted is TIME else TIME
         text = f"{other.short_title} ›"
-        canvas.text(text, (left, 0.5 * TOP_PX * scale), color=self.theme.faint, size=size)
+        canvas.draw_text(text, (left, 0.5 * TOP_PX * scale), color=self.theme.faint, size=size)
         chart_left, chart_top, _, _ = self.layout.chart
-        width = canvas.text_width(text, size) + 12 * scale
+        width = canvas.measure_text(text, size) + 12 * scale
         self.switch_box = (
             round(chart_left + left - 6 * scale),
             chart_top,
@@ -263,14 +263,14 @@ class Chart:
             row = self._scale.to_row(value)
             canvas.surface.fill(line_color, (round(times.left), round(row), round(times.width), 1))
             label = f"{value:.6g}"
-            canvas.text(label, (times.left - 7 * scale, row), size=size, color=faint, anchor="right")
-        label_width = canvas.text_width(f"{times.end:.0f} s", size) + 4 * scale
+            canvas.draw_text(label, (times.left - 7 * scale, row), size=size, color=faint, anchor="right")
+        label_width = canvas.measure_text(f"{times.end:.0f} s", size) + 4 * scale
         max_intervals = min(MAX_TIME_INTERVALS, times.width / label_width)
         step = max(choose_tick_step(times.end, max_intervals), 1.0)
         row = self.layout.chart[3] - 0.5 * BOTTOM_PX * scale
         for time in list_ticks(0.0, times.end, step).tolist():
             center = (times.to_column(time), row)
-            canvas.text(f"{time:g} s", center, size=size, color=faint, anchor="middle")
+            canvas.draw_text(f"{time:g} s", center, size=size, color=faint, anchor="middle")
 
     def _draw_events(self, canvas: Canvas) -> None:
         """Draw a line for each event, with its text if there is space, otherwise with its sign alone."""
@@ -286,12 +286,12 @@ class Chart:
             column = self.to_column(event.time)
             glyph = _EVENT_GLYPHS.get(event.kind, _OTHER_EVENT_GLYPH)
             text = f"{glyph} {event.text}"
-            width = canvas.text_width(text, size)
+            width = canvas.measure_text(text, size)
             if column + width > self._scale.times.right:
                 text = glyph
                 width = round(8 * scale)
             if column >= free_from:
-                canvas.text(text, (column + 3 * scale, row), size=size, color=self.theme.faint)
+                canvas.draw_text(text, (column + 3 * scale, row), size=size, color=self.theme.faint)
                 free_from = column + width + 8 * scale
 
     def _draw_ghosts(self, canvas: Canvas) -> None:
@@ -306,12 +306,12 @@ class Chart:
             is_dashed = len(points) >= MAX_GHOST_POINTS_WITHOUT_GAPS
             for k in range(len(points) - 1):
                 if not is_dashed or k % 4 < 3:
-                    canvas.line(points[k].tolist(), points[k + 1].tolist(), color)
+                    canvas.draw_line(points[k].tolist(), points[k + 1].tolist(), color)
             if len(points):
-                name_width = canvas.text_width(ghost.description, size)
+                name_width = canvas.measure_text(ghost.description, size)
                 right = max(points[-1][0] - 4 * scale, self._scale.times.left + name_width)
                 place = (right, points[-1][1] - 9 * scale)
-                canvas.text(ghost.description, place, size=size, color=color, anchor="right")
+                canvas.draw_text(ghost.description, place, size=size, color=color, anchor="right")
 
     def _draw_curves(self, canvas: Canvas) -> None:
         """Draw the curve of each pane."""
@@ -322,7 +322,7 @@ class Chart:
             points = thin_points(self._scale.to_points(curve.times, curve.values))
             if len(points) > 1:
                 segments = np.hstack([points[:-1], points[1:]])
-                canvas.segments(segments, colors[pane.number], canvas.width(1.8))
+                canvas.draw_segments(segments, colors[pane.number], canvas.scale_width(1.8))
 
     def _draw_time_line(self, canvas: Canvas) -> None:
         """Draw the empty bar of the time line, and whether the present or the past is shown."""
@@ -338,7 +338,7 @@ class Chart:
         )
         bar_color = mix(theme.panel, theme.ink, 0.13)
         pygame.draw.rect(canvas.surface, bar_color, bar, border_radius=thickness)
-        canvas.text("time", (12 * scale, middle), color=theme.faint, size=theme.small_text)
+        canvas.draw_text("time", (12 * scale, middle), color=theme.faint, size=theme.small_text)
         self._draw_state(canvas, times.right + 9 * scale, middle)
 
     def _draw_state(self, canvas: Canvas, left: float, middle: float) -> None:
@@ -346,15 +346,15 @@ class Chart:
         timeline = self.viewer.session.timeline
         size = self.theme.small_text
         if not timeline.is_live:
-            canvas.text("past", (left, middle), color=self.theme.final, bold=True, size=size)
+            canvas.draw_text("past", (left, middle), color=self.theme.final, bold=True, size=size)
             return
         if not timeline.history.thinned:
-            canvas.text("live", (left, middle), color=self.theme.start, bold=True, size=size)
+            canvas.draw_text("live", (left, middle), color=self.theme.start, bold=True, size=size)
             return
         text = "live · past thinned"
-        if left + canvas.text_width(text, size=size) > self.layout.track[2]:
+        if left + canvas.measure_text(text, size=size) > self.layout.track[2]:
             text = "thinned"
-        canvas.text(text, (left, middle), color=self.theme.start, size=size)
+        canvas.draw_text(text, (left, middle), color=self.theme.start, size=size)
 
     @property
     def _bar_thickness(self) -> int:
@@ -388,13 +388,13 @@ class Chart:
                 free_width = chart.get_width() - left - 6 * scale
                 text = self._add_name(canvas, pane.controller.label, text, free_width)
             color = colors[pane.number]
-            canvas.text(text, (left, row), color=color, bold=True, size=self.theme.small_text)
+            canvas.draw_text(text, (left, row), color=color, bold=True, size=self.theme.small_text)
 
     def _add_name(self, canvas: Canvas, name: str, text: str, width: float) -> str:
         """Return a name and a text, the name shortened so that both fit into a width, px."""
         size = self.theme.small_text
-        name_width = width - canvas.text_width(f"  {text}", size, bold=True)
-        return f"{shortened(name, canvas.text_size(size), name_width, True)}  {text}"
+        name_width = width - canvas.measure_text(f"  {text}", size, bold=True)
+        return f"{shorten_to_width(name, canvas.scale_text_size(size), name_width, True)}  {text}"
 
     def _draw_rule(self, surface: pygame.Surface, column: float, color: Color, *, top: int) -> None:
         """Draw a vertical line over the curves; the chart is at row `top` of the surface."""
@@ -415,13 +415,20 @@ class Chart:
         if not timeline.is_live:
             self._draw_bar(screen, column, middle, theme.final)
             self._draw_rule(screen, column, theme.final, top=self.layout.chart[1])
-        dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
+        dot = partial(sprites.render_dot, max(2.0, round(5 * scale) / 2), theme.ink)
         for event in timeline.events:
-            canvas.stamp(dot, (self.to_column(event.time), middle))
+            canvas.draw_sprite(dot, (self.to_column(event.time), middle))
         fill = theme.ink if timeline.is_live else theme.final
         radius = round(2 * 6.5 * scale) / 2
-        handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
-        canvas.stamp(handle, (column, middle))
+        handle = partial(
+            sprites.render_disc,
+            radius,
+            fill=fill,
+            ring=theme.background,
+            ring_width=2.0 * scale,
+            edge=theme.faint,
+        )
+        canvas.draw_sprite(handle, (column, middle))
 
     def _draw_bar(self, screen: pygame.Surface, end: float, middle: float, color: Color) -> None:
         """Fill the time line from its start to a column."""
@@ -442,7 +449,7 @@ class Chart:
         text = self._describe_events(self.hover[0]) or self._describe_values(time)
         column = round(self.to_column(time))
         self._draw_rule(screen, column, mix(theme.panel, theme.ink, 0.35), top=top)
-        text_width = create_flat_canvas(screen, theme, scale).text_width(text)
+        text_width = create_flat_canvas(screen, theme, scale).measure_text(text)
         left = min(column + 12 * scale, self.times.right - text_width)
         draw_tag(screen, text, (left, top + (TOP_PX + 16) * scale), theme, scale)
 

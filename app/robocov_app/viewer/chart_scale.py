@@ -7,7 +7,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.look.axes import Axis, choose_growing_time_limit, choose_growing_value_axis
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.layout import Layout
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.timeline import Timeline
@@ -84,7 +84,7 @@ def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> Ti
 
 def _measure_captions(panes: Sequence[Pane], text_size: int) -> int:
     """Return the width of the longest name with its value, px."""
-    return max(text_width(f"{pane.controller.label}{_WIDEST_VALUE}", text_size, True) for pane in panes)
+    return max(measure_text(f"{pane.controller.label}{_WIDEST_VALUE}", text_size, True) for pane in panes)
 
 
 @dataclass(frozen=True)

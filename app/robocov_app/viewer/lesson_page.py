@@ -10,7 +10,7 @@ import pygame
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
-from robocov_app.render.fonts import label, shortened
+from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_card, wrap_text
 from robocov_app.viewer.lessons import LessonPlayer, LessonState
@@ -61,10 +61,10 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     draw_card(screen, box, theme, scale)
     x = box.left + round(22 * scale)
     title = f"{lesson.number + 1}  {lesson.chapter.title}"
-    screen.blit(label(title, title_size, theme.final, True), (x, box.top + round(11 * scale)))
+    screen.blit(render_text(title, title_size, theme.final, True), (x, box.top + round(11 * scale)))
     for k, line in enumerate(lines):
         y = box.top + round((35 + _CAPTION_LINE_PX * k) * scale)
-        screen.blit(label(line, text_size, theme.ink), (x, y))
+        screen.blit(render_text(line, text_size, theme.ink), (x, y))
     bar_top = box.bottom - max(3, round(3 * scale))
     bar = pygame.Rect(box.left + 8, bar_top, box.width - 16, max(2, round(2 * scale)))
     screen.fill(mix(theme.panel, theme.ink, 0.15), bar)
@@ -132,7 +132,7 @@ class _LessonPage:
     def _write(
         self, text: str, size: float, color: Color, *, indent: float = 0.0, bold: bool = False
     ) -> None:
-        picture = label(text, round(size * self.scale), color, bold)
+        picture = render_text(text, round(size * self.scale), color, bold)
         self.screen.blit(picture, (round(self.x + indent * self.scale), round(self.y)))
 
     def _write_paragraph(self, text: str, color: Color, *, indent: float = 0.0) -> None:
@@ -172,9 +172,13 @@ class _LessonPage:
         is_current = number == lesson.number
         fill = theme.final if number <= lesson.number else mix(theme.panel, theme.ink, 0.25)
         canvas = create_flat_canvas(self.screen, theme, scale)
-        canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (self.x + 4 * scale, self.y + 8 * scale))
+        canvas.draw_sprite(
+            partial(sprites.render_dot, 3.5 * scale, fill), (self.x + 4 * scale, self.y + 8 * scale)
+        )
         size = round(_CHAPTER_TEXT_PX * scale)
-        title = shortened(lesson.lesson.chapters[number].title, size, self.width - 18 * scale, is_current)
+        title = shorten_to_width(
+            lesson.lesson.chapters[number].title, size, self.width - 18 * scale, is_current
+        )
         color = theme.ink if is_current else theme.faint
         self._write(title, _CHAPTER_TEXT_PX, color, indent=16, bold=is_current)
         box = pygame.Rect(round(self.x), round(self.y - 3 * scale), round(self.width), round(row))

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.controllers import get_controller_label, load_controller_class
 from robocov.errors import ParameterError
-from robocov_app.render.fonts import shortened
+from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.toolkit.ui import SidePanel, Ui
@@ -281,7 +281,7 @@ class ViewerPanel(SidePanel):
         choices = parameter.choices
         free = ui.width - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
         width = (free - _PARAMETER_GAP_PX * (len(choices) - 1)) / len(choices)
-        fits = all(shortened(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
+        fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
         columns = [0.0] * (len(choices) if fits else 1)
         ui.row(_LABEL_PX, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
         ui.label(parameter.label, tip=parameter.meaning)
@@ -372,7 +372,7 @@ def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
     center = np.array(ui.rest.topleft) + np.array(_ARROW_CENTER_PX) * ui.scale
     canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
     color = ui.theme.forces.get(line.kind, ui.theme.ink)
-    canvas.arrow((center - half).tolist(), (center + half).tolist(), color, 2 * ui.scale)
+    canvas.draw_arrow((center - half).tolist(), (center + half).tolist(), color, 2 * ui.scale)
 
 
 def shorten_names(files: list[str]) -> dict[str, str]:

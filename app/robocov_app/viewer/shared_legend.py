@@ -47,7 +47,7 @@ class SharedLegend:
     ) -> None:
         """Draw the legend at its place in the layout."""
         x, y, width, height = layout.legend
-        key = (tuple(entry.key() for entry in entries), layout.legend, self.theme.name, layout.scale)
+        key = (tuple(entry.key for entry in entries), layout.legend, self.theme.name, layout.scale)
         if key != self._picture_key:
             page = pygame.Surface((width, max(height, 1)), 0, 32)
             page.fill(self.theme.background)

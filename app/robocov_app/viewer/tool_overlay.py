@@ -33,7 +33,7 @@ def draw_drag(canvas: Canvas, scene: Scene, drag: tuple[int, Point] | None) -> N
     number, target = drag
     position = scene.now.positions[numbers.index(number)]
     start, end = canvas.camera.to_pixels(np.array([position, target])).tolist()
-    canvas.dashes(start, end, canvas.theme.ink, canvas.width(1.5), dash=3.0)
+    canvas.draw_dashed_line(start, end, canvas.theme.ink, canvas.scale_width(1.5), dash=3.0)
 
 
 def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) -> None:
@@ -42,8 +42,10 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
         return
     radius = scene.get_failed_radius(selected) * canvas.camera.zoom
     radius = max(radius, FAILED_RADIUS_PX * canvas.scale)
-    ring = partial(sprites.ring, round(radius) + 4.0 * canvas.scale, canvas.theme.ink, 2.2 * canvas.scale)
-    canvas.stamp(ring, canvas.camera.to_pixels(np.array(scene.failed[selected])).tolist())
+    ring = partial(
+        sprites.render_ring, round(radius) + 4.0 * canvas.scale, canvas.theme.ink, 2.2 * canvas.scale
+    )
+    canvas.draw_sprite(ring, canvas.camera.to_pixels(np.array(scene.failed[selected])).tolist())
 
 
 def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
@@ -56,7 +58,7 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
         return
     radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
     center = canvas.camera.to_pixels(scene.now.positions[row]).tolist()
-    canvas.stamp(partial(sprites.ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
+    canvas.draw_sprite(partial(sprites.render_ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
 
 
 def draw_tool_state(canvas: Canvas, state: ViewerDrawState) -> None:
@@ -85,15 +87,17 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
         page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        canvas.outline(corners, canvas.theme.final, canvas.width(1.5))
+        canvas.draw_outline(corners, canvas.theme.final, canvas.scale_width(1.5))
 
 
 def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
     if len(points) < 2:
         return
-    canvas.outline(points, canvas.theme.final, canvas.width(1.5), closed=False)
+    canvas.draw_outline(points, canvas.theme.final, canvas.scale_width(1.5), is_closed=False)
     if is_closed:
-        canvas.dashes(points[-1].tolist(), points[0].tolist(), canvas.theme.final, canvas.width(1.0))
+        canvas.draw_dashed_line(
+            points[-1].tolist(), points[0].tolist(), canvas.theme.final, canvas.scale_width(1.0)
+        )
 
 
 def _draw_marks(canvas: Canvas, points: Array) -> None:
@@ -101,4 +105,4 @@ def _draw_marks(canvas: Canvas, points: Array) -> None:
     for x, y in points.tolist():
         box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
         pygame.draw.rect(canvas.surface, canvas.theme.background, box)
-        pygame.draw.rect(canvas.surface, canvas.theme.final, box, canvas.width(1.5))
+        pygame.draw.rect(canvas.surface, canvas.theme.final, box, canvas.scale_width(1.5))

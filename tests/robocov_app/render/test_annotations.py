@@ -8,7 +8,7 @@ from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from robocov.voronoi import partition
 from robocov_app.look.theme import LIGHT
 from robocov_app.render.annotations import fitting_status
-from robocov_app.render.fonts import label, text_width
+from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 
 
@@ -40,7 +40,7 @@ def test_the_status_leaves_out_whole_facts_the_least_important_first():
     found = []
     for room in range(600, 0, -5):
         text = fitting_status(scene, size, room)
-        assert text_width(text, size) <= room
+        assert measure_text(text, size) <= room
         if not found or found[-1] != text:
             found.append(text)
     lead = "   ·   "
@@ -52,7 +52,7 @@ def test_the_status_leaves_out_whole_facts_the_least_important_first():
 def test_the_width_of_a_text_is_that_of_its_picture():
     for text in ("", "RAPF", "mean distance 1.234 m · Museum", "…"):
         for bold in (False, True):
-            assert text_width(text, 17, bold) == label(text, 17, (0, 0, 0), bold).get_width()
+            assert measure_text(text, 17, bold) == render_text(text, 17, (0, 0, 0), bold).get_width()
 
 
 def test_a_caption_has_what_the_brief_status_leaves_out():

@@ -148,7 +148,7 @@ def test_the_scale_says_when_there_is_more(monkeypatch):
     from robocov_app.render import canvas
 
     said = []
-    monkeypatch.setattr(canvas.Canvas, "text", lambda self, text, at, **style: said.append(text) or 0)
+    monkeypatch.setattr(canvas.Canvas, "draw_text", lambda self, text, at, **style: said.append(text) or 0)
     for limit, last in ((50.0, "50 m"), (2.0, "≥ 2 m"), (2500.0, "2.5 km")):
         said.clear()
         _, what = scene(limit=limit)

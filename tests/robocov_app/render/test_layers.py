@@ -189,13 +189,13 @@ class TestCrowds:
         from robocov_app.render import sprites
 
         seen = {}
-        disc = sprites.disc
+        disc = sprites.render_disc
 
-        def watched(radius, fill, ring, width, edge, text, shift):
-            seen[text] = radius - width
-            return disc(radius, fill, ring, width, edge, text, shift)
+        def watched(radius, shift, *, ring_width, text, **colors):
+            seen[text] = radius - ring_width
+            return disc(radius, shift, ring_width=ring_width, text=text, **colors)
 
-        monkeypatch.setattr(sprites, "disc", watched)
+        monkeypatch.setattr(sprites, "render_disc", watched)
         positions = np.vstack([4.0 + 0.06 * np.arange(16).reshape(8, 2), [[1.0, 1.0], [7.0, 1.0]]])
         scene = explained(positions)
         scene = replace(scene, team=Team.homogeneous(10, radius=0.01))
@@ -236,8 +236,12 @@ class TestRobots:
     def test_the_test_for_numbers_sees_their_absence(self, monkeypatch):
         from robocov_app.render import sprites
 
-        with_numbers = sprites.disc
-        monkeypatch.setattr(sprites, "disc", lambda *given: with_numbers(*given[:5], "", given[6]))
+        render_disc = sprites.render_disc
+
+        def render_without_number(radius, shift, *, text, **style):
+            return render_disc(radius, shift, **style)
+
+        monkeypatch.setattr(sprites, "render_disc", render_without_number)
         scene = scene_of(run_of(SQUARE, 9, seed=3))
         frame, painter = drawn(scene, "robots")
         assert max(self.ink_of_numbers(frame, painter, scene)) == 0
@@ -249,14 +253,20 @@ class TestRobots:
         scene = scene_of(run_of(SQUARE, 9, seed=3))
         frame, painter = drawn(scene, "robots")
         for robot, pixel in enumerate(painter.camera.to_pixels(scene.snapshot.positions)):
-            quarters = np.rint((pixel + 0.5) * sprites.FINE).astype(int)
-            (x, y), shift = quarters // sprites.FINE, tuple((quarters % sprites.FINE).tolist())
+            quarters = np.rint((pixel + 0.5) * sprites.FINENESS).astype(int)
+            (x, y), shift = quarters // sprites.FINENESS, tuple((quarters % sprites.FINENESS).tolist())
             fill = LIGHT.robots[painter._hues[robot]]
             misses = []
             for number in range(1, 10):
                 radius = round(9.0 * painter.scale * 2) / 2
-                sprite = sprites.disc(
-                    radius, fill, (255,) * 3, 1.6 * painter.scale, (0,) * 3, str(number), shift
+                sprite = sprites.render_disc(
+                    radius,
+                    shift,
+                    fill=fill,
+                    ring=(255,) * 3,
+                    ring_width=1.6 * painter.scale,
+                    edge=(0,) * 3,
+                    text=str(number),
                 )
                 pixels = np.frombuffer(pygame.image.tobytes(sprite, "RGB"), np.uint8)
                 pixels = pixels.reshape(sprite.get_height(), sprite.get_width(), 3).astype(int)

@@ -184,29 +184,29 @@ def test_the_scale_grows_with_the_picture():
 
 
 def test_labels_outlive_a_restart_of_the_font_module():
-    before = pygame.image.tobytes(fonts.label("robots 12", 14, (10, 20, 30)), "RGBA")
+    before = pygame.image.tobytes(fonts.render_text("robots 12", 14, (10, 20, 30)), "RGBA")
     pygame.font.quit()
-    fonts.label.cache_clear()
-    assert pygame.image.tobytes(fonts.label("robots 12", 14, (10, 20, 30)), "RGBA") == before
+    fonts.render_text.cache_clear()
+    assert pygame.image.tobytes(fonts.render_text("robots 12", 14, (10, 20, 30)), "RGBA") == before
     pygame.font.quit()
     pygame.font.init()
-    fonts.label.cache_clear()
-    assert pygame.image.tobytes(fonts.label("robots 12", 14, (10, 20, 30)), "RGBA") == before
+    fonts.render_text.cache_clear()
+    assert pygame.image.tobytes(fonts.render_text("robots 12", 14, (10, 20, 30)), "RGBA") == before
 
 
 def test_the_fonts_are_there():
     for bold in (False, True):
-        path = fonts.font_path(bold)
+        path = fonts.find_font_file(bold)
         assert path is not None and path.is_file()
 
 
 def test_text_is_cut_to_the_width_given():
     text = "a rather long name of a map"
-    assert fonts.shortened(text, 12, 1000) == text
-    cut = fonts.shortened(text, 12, 90)
-    assert cut.endswith("…") and fonts.text_width(cut, 12) <= 90
-    assert fonts.text_width(fonts.shortened(text, 12, 91)[:-1] + "xxx…", 12) > 90
-    assert fonts.shortened(text, 12, 1) in ("", "…")
+    assert fonts.shorten_to_width(text, 12, 1000) == text
+    cut = fonts.shorten_to_width(text, 12, 90)
+    assert cut.endswith("…") and fonts.measure_text(cut, 12) <= 90
+    assert fonts.measure_text(fonts.shorten_to_width(text, 12, 91)[:-1] + "xxx…", 12) > 90
+    assert fonts.shorten_to_width(text, 12, 1) in ("", "…")
 
 
 _HEADLESS = """

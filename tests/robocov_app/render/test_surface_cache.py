@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.render.surface_cache import kept
+from robocov_app.render.surface_cache import cache_surfaces
 
 
 def drawing(most_bytes: int):
     drawn: list[int] = []
 
-    @kept(most_bytes)
+    @cache_surfaces(most_bytes)
     def page(side: int, name: str = "") -> pygame.Surface:
         drawn.append(side)
         return pygame.Surface((side, side), 0, 32)
@@ -24,7 +24,7 @@ def test_no_more_bytes_are_kept_than_allowed(sides: list[int]) -> None:
     page, _ = drawing(4000)
     for side in sides:
         assert page(side).get_size() == (side, side)
-        assert sum(picture.get_pitch() * picture.get_height() for picture in page.pictures.values()) <= 4000
+        assert sum(picture.get_pitch() * picture.get_height() for picture in page.surfaces.values()) <= 4000
 
 
 def test_what_is_asked_for_often_stays() -> None:

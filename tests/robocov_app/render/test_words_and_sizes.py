@@ -6,11 +6,11 @@ import pytest
 
 from robocov_app.look.colors import mix, parse_hex_color
 from robocov_app.look.lengths import format_scale_length, round_down
-from robocov_app.render.canvas import clipped_polygon, clipped_segment
+from robocov_app.render.canvas import clip_polygon, clip_segment
 from robocov_app.render.density import cost_label
 from robocov_app.render.distance_field import round_limit, ticks
 from robocov_app.render.layout import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
-from robocov_app.render.surface_cache import Latest, kept
+from robocov_app.render.surface_cache import LatestValue, cache_surfaces
 
 
 def test_colors() -> None:
@@ -29,11 +29,11 @@ def test_round_lengths() -> None:
 
 
 def test_what_is_far_away_is_clipped() -> None:
-    assert len(clipped_polygon(np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]]))) == 1
-    assert clipped_segment((0.0, 0.0), (40000.0, 20000.0)) == [[0.0, 0.0], [20000.0, 10000.0]]
-    assert clipped_segment((40000.0, 20000.0), (0.0, 0.0)) == [[20000.0, 10000.0], [0.0, 0.0]]
-    assert clipped_segment((0.0, 30000.0), (9.0, 30000.0)) == []
-    assert clipped_segment((1.0, 2.0), (3.0, 4.0)) == ((1.0, 2.0), (3.0, 4.0))
+    assert len(clip_polygon(np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]]))) == 1
+    assert clip_segment((0.0, 0.0), (40000.0, 20000.0)) == [[0.0, 0.0], [20000.0, 10000.0]]
+    assert clip_segment((40000.0, 20000.0), (0.0, 0.0)) == [[20000.0, 10000.0], [0.0, 0.0]]
+    assert clip_segment((0.0, 30000.0), (9.0, 30000.0)) == []
+    assert clip_segment((1.0, 2.0), (3.0, 4.0)) == ((1.0, 2.0), (3.0, 4.0))
 
 
 def test_costs_in_words() -> None:
@@ -57,12 +57,12 @@ def test_columns(aspect: float, columns: int) -> None:
 
 
 def test_what_is_kept() -> None:
-    @kept(1000)
+    @cache_surfaces(1000)
     def page(side: int) -> pygame.Surface:
         return pygame.Surface((side, side), 0, 32)
 
     assert page(9) is page(9)
     assert page(99) is not page(99)
-    made, size = Latest[object](), [1, 2]
-    assert made.of(size, "light", object) is made.of(size, "light", object)
-    assert made.of(size, "light", object) is not made.of(size, "dark", object)
+    made, size = LatestValue[object](), [1, 2]
+    assert made.get(size, "light", object) is made.get(size, "light", object)
+    assert made.get(size, "light", object) is not made.get(size, "dark", object)

@@ -35,7 +35,7 @@ def test_times_keep_apart_in_a_narrow_chart(
     tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ends: list[tuple[float, float]] = []
-    write = Canvas.text
+    write = Canvas.draw_text
 
     def noted(canvas: Canvas, text: str, at: Any, **how: Any) -> int:
         wide = write(canvas, text, at, **how)
@@ -43,7 +43,7 @@ def test_times_keep_apart_in_a_narrow_chart(
             ends.append((at[0] - wide / 2, at[0] + wide / 2))
         return wide
 
-    monkeypatch.setattr(Canvas, "text", noted)
+    monkeypatch.setattr(Canvas, "draw_text", noted)
     with opened(tmp_path, size=(width, 1200), scale=3.0) as driver:
         ends.clear()
         driver.window.chart._page = None

@@ -12,7 +12,7 @@ from sample_sessions import HALL, RAPF, advance_session, start_session
 
 from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, load_settings
 from robocov_app.toolkit.dialogs import Choice, Question
@@ -30,13 +30,13 @@ FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoi
 def words(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Everything that is written on canvases from now on."""
     written: list[str] = []
-    text = Canvas.text
+    text = Canvas.draw_text
 
     def noted(canvas: Canvas, words: str, *args: object, **kwargs: object) -> float:
         written.append(words)
         return text(canvas, words, *args, **kwargs)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Canvas, "text", noted)
+    monkeypatch.setattr(Canvas, "draw_text", noted)
     return written
 
 
@@ -122,7 +122,8 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
         room = left + width - driver.window.chart.times.right - 9 * scale
         name = max((pane.controller.label for pane in driver.session.timeline.panes), key=len)
         assert (
-            text_width(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True) <= room
+            measure_text(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True)
+            <= room
         )
 
 

@@ -11,7 +11,7 @@ from driven_window import opened
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit import help_page as keys_page
 from robocov_app.toolkit.overlay import wrap_text
 from robocov_app.viewer.commands import GROUPS
@@ -22,7 +22,7 @@ from robocov_app.viewer.screen_video import copy_pixels
 def test_wrapped_words_are_all_there_and_fit(text: str, width: int) -> None:
     lines = wrap_text(text, 12, width)
     assert "".join("".join(lines).split()) == "".join(text.split())
-    assert all(text_width(line, 12) <= width for line in lines), "a word that is too wide is broken"
+    assert all(measure_text(line, 12) <= width for line in lines), "a word that is too wide is broken"
 
 
 @pytest.mark.slow

@@ -27,8 +27,8 @@ from robocov_app.render import annotations, heatmaps
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import range_label, value_range
-from robocov_app.render.fonts import shortened
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.fonts import shorten_to_width
+from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.layout import Layout, is_inside
 
 # Lengths in pixels at scale 1.
@@ -96,8 +96,8 @@ class EditorCanvas:
         self._layers = build_layers(self.sheet)
         self._legend_rows = 1
         self._legend_key: object = None
-        self._legend: Latest[Surface] = Latest()
-        self._has_hull_excess: Latest[bool] = Latest()
+        self._legend: LatestValue[Surface] = LatestValue()
+        self._has_hull_excess: LatestValue[bool] = LatestValue()
         self._fitted: tuple[Point, float] | None = None  # center and zoom of the camera that shows all
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
@@ -131,7 +131,7 @@ class EditorCanvas:
     def _build_legend_entries(self) -> list[LegendEntry]:
         editor = self.editor
         sketch = editor.sketch
-        has_excess = self._has_hull_excess.of(
+        has_excess = self._has_hull_excess.get(
             sketch.boundary, None, lambda: compute_hull_excess(sketch).area > MIN_HULL_EXCESS_M2
         )
         team = self.team
@@ -291,7 +291,7 @@ class EditorCanvas:
         labels = tuple(entry.text for entry in self.entries)
         key = (labels, box.width, canvas.theme.name, canvas.scale)
         strip = replace(canvas, surface=Surface((box.width, 1)))
-        legend = self._legend.of(None, key, lambda: annotations.legend_strip(self.entries, strip))
+        legend = self._legend.get(None, key, lambda: annotations.legend_strip(self.entries, strip))
         scene.screen.blit(legend, box)
 
     def _draw_foot(self, scene: Scene) -> None:
@@ -304,9 +304,9 @@ class EditorCanvas:
         annotations.draw_scale_bar(canvas)
         bar_width = annotations.bar_length(canvas) * canvas.camera.zoom
         free_width = box.width - (annotations.EDGE + SCALE_BAR_LABEL_PX) * scale - bar_width
-        text_size = canvas.text_size(canvas.theme.text)
-        text = shortened(describe_map(self.editor), text_size, free_width - annotations.EDGE * scale)
-        canvas.text(text, (box.width - annotations.EDGE * scale, height / 2), anchor="right")
+        text_size = canvas.scale_text_size(canvas.theme.text)
+        text = shorten_to_width(describe_map(self.editor), text_size, free_width - annotations.EDGE * scale)
+        canvas.draw_text(text, (box.width - annotations.EDGE * scale, height / 2), anchor="right")
 
 
 def _find_lifted(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:

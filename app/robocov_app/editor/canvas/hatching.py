@@ -58,16 +58,16 @@ def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tu
     edges = view.build_canvas(patch)
     rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
     for ring, is_outer in zip(rings, outline.outer, strict=True):
-        mask.polygon(ring, (*_WHITE, 255) if is_outer else (0, 0, 0, 0))
+        mask.fill_polygon(ring, (*_WHITE, 255) if is_outer else (0, 0, 0, 0))
         if is_outer:
             # Areas thinner than a pixel become a line.
-            mask.outline(ring, _WHITE, 1)
+            mask.draw_outline(ring, _WHITE, 1)
     lines = draw_hatch_page(box, color, view.scale, strength)
     mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
     patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
     for ring, is_outer in zip(rings, outline.outer, strict=True):
         if is_outer:
-            edges.outline(ring, color, edges.width(1.0))
+            edges.draw_outline(ring, color, edges.scale_width(1.0))
 
 
 def draw_hatch_page(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:

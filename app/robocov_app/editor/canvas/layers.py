@@ -21,7 +21,7 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.render import marks, sprites
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layout import fitted_radii
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 MANY_OBJECTS = 200  # outlines of more selected objects are drawn once, and then as a picture
 DRAGGED_TINT = 0.22  # share of the accent color in obstacles that are dragged
@@ -42,7 +42,7 @@ class DraggedObstacles:
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
-        self._picture: Latest[Surface] = Latest()
+        self._picture: LatestValue[Surface] = LatestValue()
 
     def draw(self, scene: Scene) -> None:
         """Draw the obstacles."""
@@ -56,7 +56,7 @@ class DraggedObstacles:
 
     def _draw_carried(self, scene: Scene, carried: CarriedItems) -> None:
         camera = scene.view.camera
-        picture = self._picture.of(
+        picture = self._picture.get(
             scene.saved,
             (carried.selection, camera, scene.view.theme.name),
             lambda: self._draw_picture(scene, carried.selection),
@@ -80,7 +80,7 @@ class Passages:
     """Areas that robots cannot reach, and the narrowest gap."""
 
     def __init__(self) -> None:
-        self._hatching: Latest[tuple[Surface, Rect] | None] = Latest()
+        self._hatching: LatestValue[tuple[Surface, Rect] | None] = LatestValue()
 
     def draw(self, scene: Scene) -> None:
         """Draw hatching and gap."""
@@ -89,7 +89,7 @@ class Passages:
             return
         view = scene.view
         look = (view.camera, view.theme.name, view.scale, view.size)
-        patch = self._hatching.of(measurement, look, lambda: draw_hatching(view, measurement))
+        patch = self._hatching.get(measurement, look, lambda: draw_hatching(view, measurement))
         if patch is not None:
             surface, position = patch
             scene.screen.blit(surface, position, special_flags=_PREMULTIPLIED)
@@ -147,17 +147,17 @@ class TeamAtStart:
         for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
             size = round(2 * min(radius, MAX_RADIUS_PX)) / 2
             number = str(k + 1)
-            is_legible = sprites.number_size(size, min(len(number), 4)) > MIN_NUMBER_PX * scale
+            is_legible = sprites.choose_number_size(size, min(len(number), 4)) > MIN_NUMBER_PX * scale
             sprite = partial(
-                sprites.disc,
+                sprites.render_disc,
                 size,
-                theme.robots[k % len(theme.robots)],
-                theme.robot_ring,
-                min(1.4 * scale, 0.3 * size),
-                edge,
-                number if is_legible else "",
+                fill=theme.robots[k % len(theme.robots)],
+                ring=theme.robot_ring,
+                ring_width=min(1.4 * scale, 0.3 * size),
+                edge=edge,
+                text=number if is_legible else "",
             )
-            canvas.stamp(sprite, center)
+            canvas.draw_sprite(sprite, center)
 
 
 class SelectedObjects:
@@ -165,7 +165,7 @@ class SelectedObjects:
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
-        self._outlines: Latest[Surface] = Latest()
+        self._outlines: LatestValue[Surface] = LatestValue()
 
     def draw(self, scene: Scene) -> None:
         """Draw outlines and handles."""
@@ -198,7 +198,7 @@ class SelectedObjects:
             return page.surface
 
         look = (selection, scene.view.camera, scene.view.theme.name, scene.view.scale)
-        page = self._outlines.of(scene.sketch, look, draw_page)
+        page = self._outlines.get(scene.sketch, look, draw_page)
         scene.canvas.surface.blit(page, (0, 0), special_flags=_PREMULTIPLIED)
 
     def _draw_all(self, canvas: Canvas, sketch: Sketch, owners: set[Owner]) -> None:
@@ -291,7 +291,7 @@ def draw_object_outline(
         overlay.draw_start(canvas, sketch.get_start(owner), "", is_selected=True, dot_scale=1.3)
     elif owner == BOUNDARY:
         corners = overlay.to_pixels(canvas, sketch.boundary or ())
-        canvas.outline(corners, color, canvas.width(width + 0.5))
+        canvas.draw_outline(corners, color, canvas.scale_width(width + 0.5))
     else:
         for ring in sheet.outlines.get(sketch.get_item(owner)).rings:
-            canvas.outline(canvas.camera.to_pixels(ring), color, canvas.width(width))
+            canvas.draw_outline(canvas.camera.to_pixels(ring), color, canvas.scale_width(width))

@@ -51,19 +51,19 @@ def build_legend_entries(
 
 
 def _draw_obstacle(canvas: Canvas, x: float, y: float) -> None:
-    canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
+    canvas.draw_swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
 
 
 def _draw_boundary(canvas: Canvas, x: float, y: float) -> None:
     half = 9 * canvas.scale
-    width = canvas.width(canvas.theme.boundary_line)
-    canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, width)
+    width = canvas.scale_width(canvas.theme.boundary_line)
+    canvas.draw_line((x - half, y), (x + half, y), canvas.theme.boundary, width)
 
 
 def _draw_hull_excess(canvas: Canvas, x: float, y: float) -> None:
     theme = canvas.theme
     fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
-    canvas.swatch(x, y, fill, mix(fill, theme.obstacle_edge, 0.5))
+    canvas.draw_swatch(x, y, fill, mix(fill, theme.obstacle_edge, 0.5))
 
 
 def _draw_start(canvas: Canvas, x: float, y: float) -> None:

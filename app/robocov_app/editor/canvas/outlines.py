@@ -11,7 +11,7 @@ import shapely
 from robocov.arrays import Array
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 MAX_OUTLINES_PER_OBSTACLE = 4  # kept, among them those of obstacles that may come back by undoing
 SPARE_OUTLINES = 1000
@@ -111,7 +111,7 @@ class Outlines:
 
     def __init__(self) -> None:
         self._outlines: dict[int, tuple[Item, Outline]] = {}  # by the identity of the item
-        self._bounds: Latest[Array] = Latest()
+        self._bounds: LatestValue[Array] = LatestValue()
 
     def get(self, item: Item) -> Outline:
         """Return the outline of an obstacle."""
@@ -123,7 +123,7 @@ class Outlines:
 
     def find_items(self, sketch: Sketch, box: Box) -> list[Item]:
         """Return the visible obstacles whose bounding boxes meet a box, m, from the bottom to the top."""
-        bounds = self._bounds.of(sketch, None, lambda: self._list_bounds(sketch))
+        bounds = self._bounds.get(sketch, None, lambda: self._list_bounds(sketch))
         low_x, low_y, high_x, high_y = bounds.T
         is_near = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
         items = [sketch.obstacles[k] for k in np.flatnonzero(is_near)]

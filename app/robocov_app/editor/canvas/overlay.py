@@ -24,7 +24,7 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import MAX_PIXEL
-from robocov_app.render.canvas import Canvas
+from robocov_app.render.canvas import Canvas, TextAnchor
 from robocov_app.toolkit.overlay import draw_tag
 
 # Lengths in pixels at scale 1.
@@ -84,8 +84,8 @@ def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
 
 def draw_ring(canvas: Canvas, at: Point, radius: float, color: Color, width: float) -> None:
     """Draw a ring at a pixel; radius and width in px at scale 1."""
-    sprite = partial(sprites.ring, radius * canvas.scale, color, width * canvas.scale)
-    canvas.stamp(sprite, at)
+    sprite = partial(sprites.render_ring, radius * canvas.scale, color, width * canvas.scale)
+    canvas.draw_sprite(sprite, at)
 
 
 def draw_disc(
@@ -93,14 +93,22 @@ def draw_disc(
 ) -> None:
     """Draw a disc with a text at a pixel; radius and width of the rim in px at scale 1."""
     scale = canvas.scale
-    sprite = partial(sprites.disc, radius * scale, colors.fill, colors.ring, rim * scale, colors.edge, text)
-    canvas.stamp(sprite, at)
+    sprite = partial(
+        sprites.render_disc,
+        radius * scale,
+        fill=colors.fill,
+        ring=colors.ring,
+        ring_width=rim * scale,
+        edge=colors.edge,
+        text=text,
+    )
+    canvas.draw_sprite(sprite, at)
 
 
 def draw_dashes(canvas: Canvas, points: Iterable[sprites.Pixel], color: Color, dash: float = 4.0) -> None:
     """Draw a dashed line through pixels."""
     for start, end in pairwise(points):
-        canvas.dashes(start, end, color, canvas.width(1.0), dash=dash)
+        canvas.draw_dashed_line(start, end, color, canvas.scale_width(1.0), dash=dash)
 
 
 def draw_handles(
@@ -125,7 +133,7 @@ def draw_handles(
     for handle, (x, y) in zip(handles, positions, strict=True):
         is_large = handle == near
         if handle.kind == "turn":
-            canvas.line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.width(1.0))
+            canvas.draw_line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.scale_width(1.0))
             radius = 5.5 if is_large else 4.5
             draw_disc(canvas, (x, y), radius, DiscColors(floor, accent, accent), rim=1.6)
         elif handle.kind == "scale":
@@ -147,7 +155,7 @@ def _draw_square(
         radius = round(half) if is_rounded else 0
         pygame.draw.rect(canvas.surface, fill, box, border_radius=radius)
         accent = canvas.theme.final
-        pygame.draw.rect(canvas.surface, accent, box, canvas.width(1.5), border_radius=radius)
+        pygame.draw.rect(canvas.surface, accent, box, canvas.scale_width(1.5), border_radius=radius)
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
@@ -166,7 +174,7 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
             labels.append(guide.label)
     if end is not None and labels:
         position = (end[0] + 11 * canvas.scale, end[1] + 15 * canvas.scale)
-        canvas.text(" · ".join(labels), position, size=canvas.theme.small_text, color=color)
+        canvas.draw_text(" · ".join(labels), position, size=canvas.theme.small_text, color=color)
 
 
 def draw_start(
@@ -195,7 +203,7 @@ def draw_start(
         radius = start.radius * canvas.camera.zoom
         _draw_circle(canvas, (x, y), radius, width)
         label_position = (x, y - radius - 10 * scale)
-        anchor = "middle"
+        anchor: TextAnchor = "middle"
     elif isinstance(start, PointsStart) and start.positions:
         positions = to_pixels(canvas, start.positions).tolist()
         for position in positions:
@@ -206,20 +214,20 @@ def draw_start(
         return
     if label:
         color = mix(theme.start, theme.ink, 0.45)
-        canvas.text(label, label_position, size=theme.small_text, color=color, anchor=anchor)
+        canvas.draw_text(label, label_position, size=theme.small_text, color=color, anchor=anchor)
 
 
 def _draw_circle(canvas: Canvas, center: Point, radius: float, width: float) -> None:
     """Draw the circle of a start; center and radius in px, width in px at scale 1."""
     color = canvas.theme.start
     if radius < MAX_SPRITE_RADIUS_PX:
-        sprite = partial(sprites.ring, round(2 * radius) / 2, color, width * canvas.scale)
-        canvas.stamp(sprite, center)
+        sprite = partial(sprites.render_ring, round(2 * radius) / 2, color, width * canvas.scale)
+        canvas.draw_sprite(sprite, center)
         return
     sides = int(min(radius, MAX_CIRCLE_SIDES))
     angles = np.arange(sides) * (2 * np.pi / sides)
     corners = center + radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    canvas.outline(corners, color, canvas.width(width))
+    canvas.draw_outline(corners, color, canvas.scale_width(width))
 
 
 def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
@@ -230,11 +238,11 @@ def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
         legs.append((points[-1], points[0]))
     for number, (start, end) in enumerate(legs):
         is_closing = number == len(points) - 1
-        width = canvas.width(1.0 if is_closing else 1.6)
-        canvas.dashes(start.tolist(), end.tolist(), color, width, dash=4.0)
+        width = canvas.scale_width(1.0 if is_closing else 1.6)
+        canvas.draw_dashed_line(start.tolist(), end.tolist(), color, width, dash=4.0)
         _draw_arrow(canvas, start, end, color)
     for point in points.tolist():
-        canvas.stamp(partial(sprites.dot, 2.5 * canvas.scale, color), point)
+        canvas.draw_sprite(partial(sprites.render_dot, 2.5 * canvas.scale, color), point)
 
 
 def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
@@ -248,7 +256,7 @@ def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
     tip = (start + end) / 2 + 4 * scale * along
     for side in (1.0, -1.0):
         wing = tip - 7 * scale * along + side * 4 * scale * across
-        canvas.line(tip.tolist(), wing.tolist(), color, canvas.width(1.6))
+        canvas.draw_line(tip.tolist(), wing.tolist(), color, canvas.scale_width(1.6))
 
 
 def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
@@ -264,7 +272,7 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
             shifted = np.clip(corners - np.array(box.topleft), -MAX_POLYGON_PX, MAX_POLYGON_PX)
             pygame.draw.polygon(page, fill, np.rint(shifted).tolist())
             canvas.surface.blit(page, box)
-        canvas.outline(corners, accent, canvas.width(1.5))
+        canvas.draw_outline(corners, accent, canvas.scale_width(1.5))
 
 
 def draw_preview(canvas: Canvas, state: EditorDrawState, cursor: Point | None) -> None:
@@ -278,7 +286,7 @@ def draw_preview(canvas: Canvas, state: EditorDrawState, cursor: Point | None) -
     _draw_preview_line(canvas, state)
     for number, ring in enumerate(state.rings):
         width = 2.2 if number == state.chosen else 1.2
-        canvas.outline(to_pixels(canvas, ring), accent, canvas.width(width))
+        canvas.draw_outline(to_pixels(canvas, ring), accent, canvas.scale_width(width))
     for number, (x, y) in enumerate(to_pixels(canvas, state.dots).tolist()):
         _draw_square(canvas, (x, y), floor, is_large=number == state.chosen, is_rounded=True)
     if state.box is not None:
@@ -297,9 +305,9 @@ def _draw_preview_line(canvas: Canvas, state: EditorDrawState) -> None:
     accent = canvas.theme.final
     line = to_pixels(canvas, state.line)
     if len(line) > 1:
-        canvas.outline(line, accent, canvas.width(1.5), closed=False)
+        canvas.draw_outline(line, accent, canvas.scale_width(1.5), is_closed=False)
         if state.is_closed:
-            canvas.dashes(line[-1].tolist(), line[0].tolist(), accent, canvas.width(1.0))
+            canvas.draw_dashed_line(line[-1].tolist(), line[0].tolist(), accent, canvas.scale_width(1.0))
     for x, y in line.tolist():
         _draw_square(canvas, (x, y), canvas.theme.background, is_rounded=True)
     if state.shows_lengths:
@@ -314,7 +322,7 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
         start_pixel, end_pixel = to_pixels(canvas, (start, end))
         along = end_pixel - start_pixel
         label = format_length(distance(start, end))
-        label_width = canvas.text_width(label, size)
+        label_width = canvas.measure_text(label, size)
         length = float(np.hypot(*along))
         if length < label_width:
             continue
@@ -324,7 +332,7 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
             across = -across
         offset = 9 * canvas.scale + abs(float(across[0])) * label_width / 2
         position = (start_pixel + end_pixel) / 2 + offset * across
-        canvas.text(label, position.tolist(), size=size, color=color, anchor="middle")
+        canvas.draw_text(label, position.tolist(), size=size, color=color, anchor="middle")
 
 
 def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects_touched: bool) -> None:
@@ -342,7 +350,7 @@ def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects
     if selects_touched:
         draw_dashes(canvas, outline.tolist(), color)
     else:
-        canvas.outline(outline, color, canvas.width(1.0), closed=False)
+        canvas.draw_outline(outline, color, canvas.scale_width(1.0), is_closed=False)
 
 
 def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
@@ -353,17 +361,17 @@ def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
     value = f"{text}▏"
     hint = "Enter"
     value_size = theme.text * 1.1
-    width = canvas.text_width(value, value_size, bold=True) + canvas.text_width(hint, theme.small_text)
+    width = canvas.measure_text(value, value_size, bold=True) + canvas.measure_text(hint, theme.small_text)
     box = Rect(0, 0, width + round(26 * scale), round(26 * scale))
     box.topleft = (round(at[0] + 14 * scale), round(at[1] + 14 * scale))
     box.clamp_ip(surface.get_rect())
     pygame.draw.rect(surface, theme.panel, box, border_radius=round(5 * scale))
-    pygame.draw.rect(surface, theme.final, box, canvas.width(1.5), border_radius=round(5 * scale))
-    size = canvas.text_size(value_size) / scale
+    pygame.draw.rect(surface, theme.final, box, canvas.scale_width(1.5), border_radius=round(5 * scale))
+    size = canvas.scale_text_size(value_size) / scale
     y = box.centery
-    canvas.text(value, (box.left + 8 * scale, y), size=size, bold=True)
+    canvas.draw_text(value, (box.left + 8 * scale, y), size=size, bold=True)
     hint_position = (box.right - 8 * scale, y)
-    canvas.text(hint, hint_position, size=theme.small_text, color=theme.faint, anchor="right")
+    canvas.draw_text(hint, hint_position, size=theme.small_text, color=theme.faint, anchor="right")
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
@@ -371,9 +379,9 @@ def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
     start, end, across = _locate_gap(canvas, gap)
     color = canvas.theme.trajectory if gap.width < 2 * radius else canvas.theme.start
     for a, b in ((start, end), (start - across, start + across), (end - across, end + across)):
-        canvas.line(a.tolist(), b.tolist(), color, canvas.width(2))
+        canvas.draw_line(a.tolist(), b.tolist(), color, canvas.scale_width(2))
     for point in (start, end):
-        canvas.stamp(partial(sprites.dot, 2.2 * canvas.scale, color), point.tolist())
+        canvas.draw_sprite(partial(sprites.render_dot, 2.2 * canvas.scale, color), point.tolist())
 
 
 def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None = None) -> None:
@@ -401,7 +409,7 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     y = float(position[1]) - 16 * scale
     if cursor is not None:
         cursor_x, cursor_y = _place_cursor_label(canvas, cursor)
-        low_x = cursor_x - canvas.text_width(label) - 20 * scale
+        low_x = cursor_x - canvas.measure_text(label) - 20 * scale
         if low_x < x < cursor_x + 200 * scale and abs(y - cursor_y) < 24 * scale:
             y = cursor_y - 24 * scale
     draw_tag(canvas.surface, label, (x, y), canvas.theme, scale)
@@ -442,8 +450,8 @@ def draw_problems(
     for problem, (x, y) in reversed(badges):
         color = choose_problem_color(canvas.theme, is_error=problem.is_error)
         foot = y + STEM_PX * canvas.scale
-        canvas.line((x, y), (x, foot), color, canvas.width(1.5))
-        canvas.stamp(partial(sprites.dot, 1.8 * canvas.scale, color), (x, foot))
+        canvas.draw_line((x, y), (x, foot), color, canvas.scale_width(1.5))
+        canvas.draw_sprite(partial(sprites.render_dot, 1.8 * canvas.scale, color), (x, foot))
         draw_badge(canvas, x, y, is_error=problem.is_error)
     only_error = problems[0] if len(problems) == 1 and problems[0].is_error else None
     for problem, position in badges:
@@ -462,7 +470,7 @@ def _draw_problem_outline(canvas: Canvas, problem: Problem) -> None:
         for line in lines:
             points = canvas.camera.to_pixels(shapely.get_coordinates(line))
             if len(points) > 1:
-                canvas.outline(points, color, canvas.width(2), closed=False)
+                canvas.draw_outline(points, color, canvas.scale_width(2), is_closed=False)
 
 
 def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> None:
@@ -471,7 +479,7 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
     scale = canvas.scale
     text_x = x + (BADGE_RADIUS_PX + 10) * scale
     free_width = canvas.surface.get_width() - text_x - 8 * scale
-    is_wide_enough = free_width > canvas.text_width(problem.message)
+    is_wide_enough = free_width > canvas.measure_text(problem.message)
     text_y = y if is_wide_enough else y - (BADGE_RADIUS_PX + 14) * scale
     draw_tag(canvas.surface, problem.message, (text_x, text_y), canvas.theme, scale)
 

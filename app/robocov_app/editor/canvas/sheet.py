@@ -19,8 +19,9 @@ from robocov_app.look.lengths import round_down
 from robocov_app.look.theme import LIGHT
 from robocov_app.render import fonts, heatmaps
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import FAR, Canvas
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.clipping import is_within_limit
+from robocov_app.render.surface_cache import LatestValue
 
 # Lengths in pixels at scale 1.
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
@@ -61,7 +62,7 @@ class Sheet:
         self.reference_image = ReferenceImage()
         self._page: Surface | None = None
         self._state: _PageState | None = None
-        self._hull_excess: Latest[shapely.Geometry] = Latest()
+        self._hull_excess: LatestValue[shapely.Geometry] = LatestValue()
 
     def draw(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> Surface:
         """Draw the sheet.
@@ -156,7 +157,7 @@ class Sheet:
         boundary = None
         if sketch.boundary is not None and len(sketch.boundary) > 2:
             boundary = view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
-            canvas.polygon(boundary, theme.background)
+            canvas.fill_polygon(boundary, theme.background)
         background = sketch.background if "picture" in view.shown else None
         has_picture = background is not None and background.shown
         if background is not None:
@@ -173,7 +174,7 @@ class Sheet:
         else:
             self.draw_items(canvas, visible)
         if boundary is not None:
-            canvas.outline(boundary, theme.boundary, canvas.width(theme.boundary_line))
+            canvas.draw_outline(boundary, theme.boundary, canvas.scale_width(theme.boundary_line))
         if "names" in view.shown:
             self._draw_names(canvas, visible)
         page.set_clip(None)
@@ -181,13 +182,13 @@ class Sheet:
     def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw what robots take for free although it lies outside the boundary: their hull contains it."""
         theme = canvas.theme
-        excess = self._hull_excess.of(sketch.boundary, None, lambda: compute_hull_excess(sketch))
+        excess = self._hull_excess.get(sketch.boundary, None, lambda: compute_hull_excess(sketch))
         fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
         for part in shapely.get_parts(excess):
             if isinstance(part, shapely.Polygon):
                 corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
-                canvas.polygon(corners, fill)
-                canvas.outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
+                canvas.fill_polygon(corners, fill)
+                canvas.draw_outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
 
     def _draw_translucent_items(self, canvas: Canvas, items: list[Item], box: Rect) -> None:
         """Draw obstacles so that the picture under them stays visible."""
@@ -212,7 +213,7 @@ class Sheet:
             fills: list[Color | None] = []
             for outline in outlines:
                 fills += [None if outline.has_holes else fill] * len(outline.rings)
-            canvas.polygons(corners, ends, fills)
+            canvas.draw_polygons(corners, ends, fills)
             for outline in outlines:
                 if outline.has_holes:
                     _fill_with_holes(canvas, outline, fill)
@@ -221,11 +222,13 @@ class Sheet:
             for line in outline.lines:
                 points = canvas.camera.to_pixels(line)
                 if len(points) > 1:
-                    canvas.outline(points, canvas.theme.trajectory, canvas.width(1.5), closed=False)
+                    canvas.draw_outline(
+                        points, canvas.theme.trajectory, canvas.scale_width(1.5), is_closed=False
+                    )
 
     def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
         """Write the names of obstacles that are large enough."""
-        size = canvas.text_size(canvas.theme.small_text)
+        size = canvas.scale_text_size(canvas.theme.small_text)
         color = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
         zoom = canvas.camera.zoom
         for item in items:
@@ -236,11 +239,11 @@ class Sheet:
                 continue
             space = outline.name_space
             width = space.width * zoom - NAME_MARGIN_PX * canvas.scale
-            text = fonts.shortened(name, size, width)
+            text = fonts.shorten_to_width(name, size, width)
             is_readable = text == name or len(text) > MIN_LABEL_CHARACTERS
             if space.height * zoom > size + 2 and is_readable:
                 center = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
-                canvas.text(text, center, size=canvas.theme.small_text, color=color, anchor="middle")
+                canvas.draw_text(text, center, size=canvas.theme.small_text, color=color, anchor="middle")
 
 
 def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:
@@ -351,17 +354,17 @@ def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
     page = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
     for ring, is_outer in zip(outline.rings, outline.outer, strict=True):
         corners = canvas.camera.to_pixels(ring) - np.array(clip.topleft)
-        page.polygon(corners, (*fill, 255) if is_outer else (0, 0, 0, 0))
+        page.fill_polygon(corners, (*fill, 255) if is_outer else (0, 0, 0, 0))
     canvas.surface.blit(page.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -> None:
     """Draw closed lines; the (k, 2) corners, px, of all lines follow each other, and `ends` divides them."""
-    width = canvas.width(canvas.theme.line)
-    if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
+    width = canvas.scale_width(canvas.theme.line)
+    if width == 1 and is_within_limit(corners):
         for start, end in pairwise((0, *ends)):
             if end - start > 1:
-                canvas.thin_path(corners[start:end].tolist(), color, closed=True)
+                canvas.draw_thin_path(corners[start:end].tolist(), color, is_closed=True)
         return
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
@@ -372,7 +375,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
     high = np.maximum(edges[:, :2], edges[:, 2:])
     is_visible = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
     is_visible &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
-    canvas.segments(edges[is_visible], color, width)
+    canvas.draw_segments(edges[is_visible], color, width)
 
 
 def _merge_boxes(boxes: list[Rect]) -> list[Rect]:

@@ -14,7 +14,7 @@ from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, R
 from robocov_app.editor.model.geometry import find_nearest_on_edges, to_array
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.sketch import Owner, Sketch, build_geometry
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
 PointKind: TypeAlias = Literal["vertex", "center", "middle"]
@@ -164,7 +164,7 @@ class Snapper:
 
     def __init__(self) -> None:
         self.patient = False
-        self._latest: Latest[Future[SnapTargets]] = Latest()
+        self._latest: LatestValue[Future[SnapTargets]] = LatestValue()
         self._pool = ThreadPoolExecutor(1, "targets")
 
     def find_targets(
@@ -173,7 +173,7 @@ class Snapper:
         """Return the snap targets of a map, None while they are being computed; see `SnapTargets`."""
         dragged = frozenset(without)
         points = tuple(more)
-        future = self._latest.of(
+        future = self._latest.get(
             sketch, (dragged, points), lambda: self._pool.submit(SnapTargets, sketch, dragged, points)
         )
         if future.done() or self.patient or count_vertices(sketch) < MANY_VERTICES:

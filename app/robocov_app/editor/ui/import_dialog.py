@@ -24,7 +24,7 @@ from robocov_app.editor.ui.importing import Imported, ImportOption, list_options
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.colors import Color, name_color
 from robocov_app.jobs.workers import Worker
-from robocov_app.render.fonts import label
+from robocov_app.render.fonts import render_text
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrap_text
 from robocov_app.toolkit.text_edit import TextEdit
@@ -223,7 +223,7 @@ class ImportDialog(Dialog):
             ui.space(MAPS_GAP_PX)
             if ui.surface is not None:
                 text = "nothing to show" if self.trouble else "reading…"
-                words = label(text, ui.px(13), ui.theme.faint)
+                words = render_text(text, ui.px(13), ui.theme.faint)
                 ui.surface.blit(words, words.get_rect(center=box.center))
             return
         maps_height = self.preview.arrange(box, self.imported, ui.scale)
@@ -363,7 +363,7 @@ class ImportDialog(Dialog):
         if ui.surface is not None:
             color = ui.theme.trajectory if self.trouble else ui.theme.ink
             for line in lines:
-                ui.surface.blit(label(line, ui.px(SMALL_TEXT_PX), color), ui.cell())
+                ui.surface.blit(render_text(line, ui.px(SMALL_TEXT_PX), color), ui.cell())
         ui.end_row()
         ui.y = foot - REPORT_LINE_PX
         hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOR]

@@ -18,8 +18,8 @@ from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
 from robocov_app.render import layout
 from robocov_app.render.camera import Camera
-from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
+from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 
 # Lengths in pixels at scale 1.
@@ -54,7 +54,7 @@ class ImportPreview:
     def __init__(self) -> None:
         self.cameras: list[Camera] = []
         self._width = 0  # for a caption, px
-        self._picture: Latest[Surface] = Latest()
+        self._picture: LatestValue[Surface] = LatestValue()
 
     def arrange(self, box: Rect, imported: Imported, scale: float) -> float:
         """Place the two maps at the top of a box, next to or below each other.
@@ -105,7 +105,7 @@ class ImportPreview:
                 sheet.draw(picture, self.cameras[0])
             return picture
 
-        screen.blit(self._picture.of(imported, look, draw_maps), (0, 0))
+        screen.blit(self._picture.get(imported, look, draw_maps), (0, 0))
         captions = _list_captions(imported, theme, has_own_colors=sheet is not None)
         for camera, caption in zip(self.cameras, captions, strict=True):
             self._draw_caption(screen, camera, caption, scale, theme)
@@ -117,15 +117,15 @@ class ImportPreview:
         text_size = round(SMALL_TEXT_PX * scale)
         x = round(camera.view[0])
         y = round(camera.view[1] - CAPTION_HEIGHT_PX * scale)
-        screen.blit(label(caption.title, title_size, theme.ink, True), (x, y))
+        screen.blit(render_text(caption.title, title_size, theme.ink, True), (x, y))
         if caption.mark:
-            left = x + text_width(caption.title, title_size, True) + round(10 * scale)
+            left = x + measure_text(caption.title, title_size, True) + round(10 * scale)
             square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
             pygame.draw.rect(screen, caption.mark_color, square)
-            mark = label(caption.mark, text_size, theme.ink)
+            mark = render_text(caption.mark, text_size, theme.ink)
             screen.blit(mark, (left + round(14 * scale), y + round(2 * scale)))
-        facts = shortened(caption.facts, text_size, self._width)
-        screen.blit(label(facts, text_size, theme.faint), (x, y + round(20 * scale)))
+        facts = shorten_to_width(caption.facts, text_size, self._width)
+        screen.blit(render_text(facts, text_size, theme.faint), (x, y + round(20 * scale)))
 
     def mark(self, screen: Surface, position: Point, scale: float, theme: Theme) -> None:
         """Draw a cross at a position, m, of both maps."""

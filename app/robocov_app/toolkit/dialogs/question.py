@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.dialogs.dialog import Dialog
 from robocov_app.toolkit.input import ENTER_KEYS
 from robocov_app.toolkit.overlay import wrap_text
@@ -71,7 +71,7 @@ class Question(Dialog):
         ui.space(6)
         self._show_text(ui)
         ui.space(12)
-        widths = [text_width(answer.text, ui.px(TEXT_PX), True) / ui.scale + 36 for answer in self.answers]
+        widths = [measure_text(answer.text, ui.px(TEXT_PX), True) / ui.scale + 36 for answer in self.answers]
         free_width = max(ui.width - sum(widths) - _BUTTON_GAP_PX * len(widths), 1.0)
         ui.row(free_width, *widths, height=30, gap=_BUTTON_GAP_PX, below=0)
         ui.cell()

@@ -4,7 +4,7 @@ import pygame
 from pygame import Rect
 
 from robocov_app.look.colors import Color, mix
-from robocov_app.render.fonts import label, shortened
+from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_field_color
 from robocov_app.toolkit.page import Page
 
@@ -120,7 +120,7 @@ def draw_text(
     if page.surface is None or not text or not is_drawn(page, rect):
         return
     pixels = page.px(size)
-    image = label(shortened(text, pixels, rect.width, bold), pixels, color, bold)
+    image = render_text(shorten_to_width(text, pixels, rect.width, bold), pixels, color, bold)
     place = image.get_rect(midleft=rect.midleft)
     if align == "center":
         place = image.get_rect(center=rect.center)

@@ -8,7 +8,7 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov_app.look.colors import mix
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import get_accent_ink, get_field_color
 from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import (
@@ -110,7 +110,7 @@ def show_option(
     inner = rect.inflate(-page.px(16), 0)
     draw_text(page, note, inner, page.theme.faint, SMALL_TEXT_PX, align="right")
     if note:
-        inner.width -= text_width(note, page.px(SMALL_TEXT_PX)) + page.px(12)
+        inner.width -= measure_text(note, page.px(SMALL_TEXT_PX)) + page.px(12)
     lines = text.split("\n")
     ink = shade(page, 0.45) if disabled_reason else page.theme.ink
     inner.top -= page.px(_LINE_PX * (len(lines) - 1) / 2)

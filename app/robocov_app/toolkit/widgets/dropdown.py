@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pygame
 from pygame import Rect
 
-from robocov_app.render.fonts import text_width
+from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.open_list import LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
 from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_drawn
@@ -63,7 +63,7 @@ def _build_list(page: Page, key: str, options: Sequence[str], value: str, menu: 
     rect = Rect(menu.left, menu.bottom + page.px(2), menu.width, min(height, max(space_below, space_above)))
     if space_below < height and space_above > space_below:
         rect.bottom = menu.top - page.px(2)
-    longest = max((text_width(option, page.px(TEXT_PX)) for option in options), default=0)
+    longest = max((measure_text(option, page.px(TEXT_PX)) for option in options), default=0)
     rect.width = min(max(longest + page.px(34), menu.width), page.box.width - page.px(16))
     rect.right = min(rect.right, page.box.right - page.px(8))
     open_list = OpenList(key, list(options), rect, row_height)

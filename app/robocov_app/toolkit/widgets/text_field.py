@@ -6,7 +6,7 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov_app.look.colors import mix
-from robocov_app.render.fonts import label, text_width
+from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.input import ENTER_KEYS
 from robocov_app.toolkit.overlay import get_field_color
 from robocov_app.toolkit.page import Page, Widget
@@ -104,7 +104,7 @@ def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
     x = page.pointer[0] - rect.left - page.px(_MARGIN_PX) + _compute_shift(page, edit, rect)
 
     def get_width_before(caret: int) -> int:
-        return text_width(edit.text[:caret], page.px(TEXT_PX))
+        return measure_text(edit.text[:caret], page.px(TEXT_PX))
 
     after = bisect_left(range(len(edit.text) + 1), x, key=get_width_before)
     candidates = range(max(after - 1, 0), min(after, len(edit.text)) + 1)
@@ -113,7 +113,7 @@ def _find_caret(page: Page, edit: TextEdit, rect: Rect) -> int:
 
 def _compute_shift(page: Page, edit: TextEdit, rect: Rect) -> int:
     """Return the length by which a long text is moved to the left so that its caret is visible, px."""
-    width_before = text_width(edit.text[: edit.caret] + edit.composed, page.px(TEXT_PX))
+    width_before = measure_text(edit.text[: edit.caret] + edit.composed, page.px(TEXT_PX))
     return max(width_before - (rect.width - page.px(14)), 0)
 
 
@@ -131,18 +131,18 @@ def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placehol
     inner = _get_inner(page, rect)
     screen.set_clip(inner.inflate(page.px(4), 0).clip(clip))
     left = inner.left - _compute_shift(page, edit, rect)
-    start, end = (text_width(edit.text[:position], size) for position in edit.selection)
+    start, end = (measure_text(edit.text[:position], size) for position in edit.selection)
     selection = Rect(left + start, 0, end - start, page.px(_CURSOR_HEIGHT_PX))
     selection.centery = rect.centery
     if start != end:
         screen.fill(mix(get_field_color(theme), theme.final, 0.35), selection)
     text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
-    image = label(text or placeholder, size, theme.ink if text else theme.faint)
+    image = render_text(text or placeholder, size, theme.ink if text else theme.faint)
     screen.blit(image, image.get_rect(midleft=(left, rect.centery)))
-    x = left + text_width(edit.text[: edit.caret], size)
+    x = left + measure_text(edit.text[: edit.caret], size)
     line_width = max(1, page.px(1))
     if edit.composed:
-        width = text_width(edit.composed, size)
+        width = measure_text(edit.composed, size)
         screen.fill(theme.ink, (x, selection.bottom - 1, width, line_width))
         pygame.key.set_text_input_rect(Rect(x, rect.top, width, rect.height))
         x += width

@@ -7,7 +7,7 @@ import numpy as np
 import pygame
 
 from robocov_app.look.theme import Theme
-from robocov_app.render.fonts import label, shortened
+from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.pane_layout import PaneLayout, build_pane_layout
@@ -158,7 +158,7 @@ def _draw_caption(text: str, size: tuple[int, int], theme: Theme) -> Frame:
     strip = pygame.Surface(size, 0, 32)
     strip.fill(theme.panel)
     text_size = round(0.5 * size[1])
-    short_text = shortened(text, text_size, size[0] - 2 * text_size, True)
-    picture = label(short_text, text_size, theme.ink, True)
+    short_text = shorten_to_width(text, text_size, size[0] - 2 * text_size, True)
+    picture = render_text(short_text, text_size, theme.ink, True)
     strip.blit(picture, picture.get_rect(midleft=(text_size, size[1] // 2)))
     return copy_pixels(strip)
