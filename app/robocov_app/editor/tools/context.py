@@ -8,7 +8,7 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Owner, Sketch
 from robocov_app.editor.tools.handles import Handle, list_handles, list_vertex_owners
 from robocov_app.editor.tools.snapping import SNAPS, Dragged, Snap, Snapper, SnapSettings, snap_point
-from robocov_app.render.surface_cache import Latest
+from robocov_app.render.surface_cache import LatestValue
 
 SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a line that is far off must not win over the grid
 
@@ -58,7 +58,7 @@ class EditorContext:
         self.has_error_message = False
         self.now = 0.0
         self.message_time = 0.0
-        self._handles: Latest[tuple[Handle, ...]] = Latest()
+        self._handles: LatestValue[tuple[Handle, ...]] = LatestValue()
 
     @property
     def sketch(self) -> Sketch:
@@ -81,7 +81,7 @@ class EditorContext:
         sketch = self.sketch
         selection = self.selection
         pixel = self.pixel
-        return self._handles.of(sketch, (selection, pixel), lambda: list_handles(sketch, selection, pixel))
+        return self._handles.get(sketch, (selection, pixel), lambda: list_handles(sketch, selection, pixel))
 
     def build_snap_settings(self, reach: float) -> SnapSettings:
         """Return the snap settings for a pointer with a reach, m."""
