@@ -19,7 +19,8 @@ from shapely import affinity, box
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format
-from robocov_app.formats.dxf import UNITS, polyline
+from robocov_app.formats.dxf.curves import flatten_polyline
+from robocov_app.formats.dxf.reading import UNITS
 
 METERS = 6
 Draw = Callable[[Any, Any], Any]
@@ -136,7 +137,7 @@ def test_splines_stay_near_their_curve(tmp_path: Path) -> None:
 def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(
     a: tuple[int, int], b: tuple[int, int], bulge: float
 ) -> None:
-    points = polyline(np.array([a, b], dtype=float), np.array([bulge, 0.0]), 1e-3)
+    points = flatten_polyline(np.array([a, b], dtype=float), np.array([bulge, 0.0]), 1e-3)
     assert points[0].tolist() == list(a)
     assert points[-1].tolist() == list(b)
     chord = math.dist(a, b)

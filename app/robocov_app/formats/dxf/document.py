@@ -1,0 +1,92 @@
+"""Detection and loading of DXF files by ezdxf, within limits that are checked before it parses them."""
+
+import logging
+import re
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from robocov.errors import MapError, RobocovError, to_one_line
+from robocov.optional_imports import import_optional
+from robocov_app.formats import files
+
+MAX_LINES = 8_000_000
+"""Largest number of lines of text: a line of the drawing takes about 24, a vertex 4."""
+MAX_ENTITIES = 50_000
+"""Largest number of entities on all layers: ezdxf takes an eighth of a millisecond and 5 kB for each."""
+BINARY = b"AutoCAD Binary DXF"
+"""First bytes of a binary file."""
+TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
+"""Start of a text file: a section, perhaps after comments."""
+_ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
+_POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
+_MAX_REASON_CHARACTERS = 200
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return head.startswith(BINARY) or TEXT.match(head) is not None
+
+
+def load_document(path: Path, where: str) -> Any:
+    """Load a drawing, and repair it if it is damaged.
+
+    Parameters
+    ----------
+    path : Path
+    where : str
+        The file, for messages.
+
+    Returns
+    -------
+    ezdxf.document.Drawing
+
+    Raises
+    ------
+    MapError
+        If the file cannot be read, is too large, or ezdxf is not installed.
+    """
+    _require_limits(files.read_content(path, files.MAX_TEXT_BYTES), where)
+    try:
+        ezdxf = import_optional("ezdxf", "dxf")
+        recover = import_optional("ezdxf.recover", "dxf")
+    except RobocovError as error:
+        raise MapError(f"{where}: {error}") from None
+    # ezdxf logs what it repairs, which would appear among the messages of a command.
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+
+    def repair(path: Path) -> Any:
+        document, _ = recover.readfile(path)
+        return document
+
+    readers: tuple[Callable[[Path], Any], ...] = (ezdxf.readfile, repair)
+    reason = ""
+    for read in readers:
+        try:
+            return read(path)
+        except OSError as error:
+            raise MapError(f"{where}: cannot be read: {error.strerror or error}") from None
+        except Exception as error:  # ezdxf raises exceptions of any type for a damaged file
+            reason = to_one_line(error) or type(error).__name__
+    raise MapError(f"{where}: no DXF that can be read: {reason[:_MAX_REASON_CHARACTERS]}")
+
+
+def _require_limits(content: bytes, where: str) -> None:
+    """Raise MapError if a file is no DXF, or would take too long to parse."""
+    if not content.startswith(BINARY):
+        if not TEXT.match(content):
+            raise MapError(
+                f"{where}: expected a DXF with sections, got a file that begins with {content[:20]!r}"
+            )
+        if _count_matches(_ENTITY, content, MAX_ENTITIES) > MAX_ENTITIES:
+            raise MapError(f"{where}: expected at most {MAX_ENTITIES} entities, got more")
+        files.require_vertices(_count_matches(_POINT, content, files.MAX_VERTICES), where)
+    lines = content.count(b"\n")
+    if lines > MAX_LINES:
+        raise MapError(f"{where}: expected at most {MAX_LINES}, got {lines} lines")
+
+
+def _count_matches(pattern: re.Pattern[bytes], content: bytes, limit: int) -> int:
+    """Return the number of matches, or `limit` + 1 if there are more."""
+    return sum(1 for _ in islice(pattern.finditer(content), limit + 1))
