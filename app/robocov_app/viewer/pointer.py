@@ -1,18 +1,13 @@
-"""The mouse over the canvas and the plot: tools, panning, the time line."""
+"""The mouse over the viewer's canvas and plot: tools, panning, the time line."""
 
 from collections.abc import Callable
-from math import dist
 
 import pygame
 
-from robocov_app.toolkit.input import (
-    DOUBLE_CLICK_S,
-    MAX_CLICK_MOVE_PX,
-    ZOOM_PER_NOTCH,
-    get_wheel_notches,
-)
+from robocov_app.toolkit.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.layout import is_inside
 from robocov_app.toolkit.mouse_cursor import MouseCursor
+from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
 from robocov_app.toolkit.tool import CursorShape
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
@@ -21,73 +16,11 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.tools.snapping import SNAP_REACH_FRACTION, snap_point
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
 
-LEFT_BUTTON = 1
-RIGHT_BUTTON = 3
-BUTTONS = (1, 2, 3)  # left, middle, right
 _NO_ROBOT = (-1, -1)
 
 
-class DragGesture:
-    """Gesture of a button that is held down: base class of the others."""
-
-    def move(self, event: pygame.event.Event) -> None:
-        """Handle a move of the mouse."""
-
-    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Handle the release; `is_click` if the mouse has not moved since the press."""
-
-
-class PanGesture(DragGesture):
-    """Pans the map. A click instead of a drag completes a drawing (right), or clears the selection (left)."""
-
-    def __init__(self, viewer: Presenter, canvas: ViewerCanvas) -> None:
-        self._viewer = viewer
-        self._canvas = canvas
-
-    def move(self, event: pygame.event.Event) -> None:
-        """Move the map with the mouse."""
-        self._canvas.pan(*event.rel)
-
-    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Complete a drawing, or clear the selection."""
-        if not is_click:
-            return
-        viewer = self._viewer
-        if event.button == RIGHT_BUTTON:
-            viewer.attempt(viewer.finish_drawing)
-        elif event.button == LEFT_BUTTON and viewer.tool is viewer.toolbox.hand:
-            viewer.inspection.selected = None
-            viewer.revision += 1
-
-
-class ToolGesture(DragGesture):
-    """Passes the drag on to the tool, in the pane in which the button was pressed."""
-
-    def __init__(self, viewer: Presenter, canvas: ViewerCanvas, pane: int) -> None:
-        self._viewer = viewer
-        self._canvas = canvas
-        self._pane = pane
-
-    def move(self, event: pygame.event.Event) -> None:
-        """Move the tool."""
-        viewer = self._viewer
-        pointer = self._build_event(event)
-        viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
-
-    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Release the tool."""
-        viewer = self._viewer
-        pointer = self._build_event(event)
-        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
-
-    def _build_event(self, event: pygame.event.Event) -> ViewerPointerEvent:
-        # Panes may have been removed since the press.
-        pane = min(self._pane, len(self._canvas.layout.panes) - 1)
-        return build_pointer_event(self._viewer, self._canvas, event.pos, pane)
-
-
 def build_pointer_event(
-    viewer: Presenter, canvas: ViewerCanvas, pixel: tuple[int, int], pane: int, *, is_right: bool = False
+    viewer: Presenter, canvas: ViewerCanvas, pixel: Pixel, pane: int, *, is_right: bool = False
 ) -> ViewerPointerEvent:
     """Return the pointer at a pixel of a pane, snapped to the map if the tool wants that.
 
@@ -113,20 +46,46 @@ def build_pointer_event(
     return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
 
 
-class TimeGesture(DragGesture):
+class ViewerToolGesture(Gesture):
+    """Passes the drag on to the tool, in the pane in which the button was pressed."""
+
+    def __init__(self, viewer: Presenter, canvas: ViewerCanvas, pane: int) -> None:
+        self._viewer = viewer
+        self._canvas = canvas
+        self._pane = pane
+
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Move the tool."""
+        viewer = self._viewer
+        pointer = self._build_event(event)
+        viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
+
+    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Release the tool."""
+        viewer = self._viewer
+        pointer = self._build_event(event)
+        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
+
+    def _build_event(self, event: pygame.event.Event) -> ViewerPointerEvent:
+        # Panes may have been removed since the press.
+        pane = min(self._pane, len(self._canvas.layout.panes) - 1)
+        return build_pointer_event(self._viewer, self._canvas, event.pos, pane)
+
+
+class TimeGesture(Gesture):
     """Shows the time under the mouse."""
 
     def __init__(self, viewer: Presenter, chart: Chart) -> None:
         self._viewer = viewer
         self._chart = chart
 
-    def move(self, event: pygame.event.Event) -> None:
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
         """Show the time under the mouse."""
         self._viewer.attempt(lambda: self._viewer.playback.look_at(self._chart.to_time(event.pos[0])))
 
 
-class ViewerPointer:
-    """Turns mouse events into actions of panel, canvas, plot and tools.
+class ViewerPointer(Pointer):
+    """Turns mouse events into actions of canvas, plot and tools.
 
     Parameters
     ----------
@@ -140,11 +99,6 @@ class ViewerPointer:
         The panel, which gets events first.
     leave_lesson : callable
         Lets the user take over from a lesson.
-
-    Attributes
-    ----------
-    at : tuple of int
-        Pixel under the mouse.
     """
 
     def __init__(
@@ -155,34 +109,16 @@ class ViewerPointer:
         panel: ViewerPanel,
         leave_lesson: Callable[[], None],
     ) -> None:
-        self.at = (0, 0)
+        super().__init__(panel)
         self._viewer = viewer
         self._canvas = canvas
         self._chart = chart
-        self._panel = panel
+        self._viewer_panel = panel
         self._leave_lesson = leave_lesson
-        self._gesture: DragGesture | None = None
-        self._button = 0
-        self._pressed_at = (0, 0)
-        self._last_click_s = -1.0
-        self._last_click_at = (0, 0)
 
-    def handle_event(self, event: pygame.event.Event, now: float) -> None:
-        """Handle a mouse event at a time, s."""
-        if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
-        is_for_panel = self._gesture is None and self._panel.handle_event(event)
-        if event.type == pygame.MOUSEMOTION:
-            self._move(event)
-        elif event.type == pygame.MOUSEBUTTONUP:
-            self._release(event)
-        elif is_for_panel:
-            self._viewer.inspection.cursor = None
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.ui.stop_typing()
-            self._press(event, now)
-        else:
-            self._turn_wheel(event)
+    def get_scale(self) -> float:
+        """Return the scale of the window."""
+        return self._canvas.layout.scale
 
     def show_action(self, cursor: MouseCursor) -> None:
         """Show the effect of a press: by the cursor's shape, and a ring around the robot under it."""
@@ -216,7 +152,13 @@ class ViewerPointer:
         layout = self._canvas.layout
         return is_inside(layout.track, self.at) or is_inside(layout.chart, self.at)
 
-    def _turn_wheel(self, event: pygame.event.Event) -> None:
+    def leave(self) -> None:
+        """Handle that the mouse has left the panes."""
+        self._viewer.inspection.cursor = None
+        self._chart.hover = None
+
+    def turn_wheel(self, event: pygame.event.Event) -> None:
+        """Zoom, or change the size of the tool."""
         if self._canvas.find_pane(self.at) is None:
             return
         factor = ZOOM_PER_NOTCH ** get_wheel_notches(event)
@@ -225,41 +167,34 @@ class ViewerPointer:
         else:
             self._canvas.zoom(factor, self.at)
 
-    def _press(self, event: pygame.event.Event, now: float) -> None:
-        # While a button is held, others do nothing.
-        if self._gesture is not None:
-            return
-        self._pressed_at = event.pos
-        self._button = event.button
+    def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
+        """Use the plot or the tool, or pan."""
         if self._is_over_time():
-            if event.button == LEFT_BUTTON:
-                self._press_chart(event.pos)
-            return
+            return self._press_chart(event.pos) if event.button == LEFT_BUTTON else None
         pane = self._canvas.find_pane(event.pos)
-        if pane is None or event.button not in BUTTONS:
-            return
-        tool = self._viewer.tool
+        if pane is None:
+            return None
         is_right = event.button == RIGHT_BUTTON
-        if event.button == LEFT_BUTTON or (is_right and tool.uses_right_button):
-            self._press_tool(event.pos, pane, now, is_right=is_right)
-        else:
-            self._gesture = PanGesture(self._viewer, self._canvas)
+        if event.button == LEFT_BUTTON or (is_right and self._viewer.tool.uses_right_button):
+            return self._press_tool(event, pane, now)
+        return PanGesture(self._canvas.pan, self._click_without_tool)
 
-    def _press_chart(self, pixel: tuple[int, int]) -> None:
+    def _press_chart(self, pixel: Pixel) -> Gesture | None:
         viewer = self._viewer
         chart = self._chart
         if chart.is_on_switch(pixel):
             viewer.attempt(chart.switch_quantity)
-            return
+            return None
         node = chart.find_ghost(pixel)
         if node is not None:
             viewer.attempt(lambda: viewer.playback.enter_node(node))
-            return
+            return None
         self._leave_lesson()
-        self._gesture = TimeGesture(viewer, chart)
         viewer.attempt(lambda: viewer.playback.look_at(chart.to_time(pixel[0])))
+        return TimeGesture(viewer, chart)
 
-    def _press_tool(self, pixel: tuple[int, int], pane: int, now: float, *, is_right: bool) -> None:
+    def _press_tool(self, event: pygame.event.Event, pane: int, now: float) -> Gesture:
+        """Use the tool in a pane; the floor under the hand is dragged."""
         viewer = self._viewer
         canvas = self._canvas
         hand = viewer.toolbox.hand
@@ -269,21 +204,30 @@ class ViewerPointer:
         if viewer.active_pane != pane:
             viewer.inspection.active_pane = pane
             viewer.revision += 1
-        is_quick = now - self._last_click_s < DOUBLE_CLICK_S
-        is_double = is_quick and dist(self._last_click_at, pixel) < MAX_CLICK_MOVE_PX
-        self._last_click_s = now
-        self._last_click_at = pixel
-        pointer = build_pointer_event(viewer, canvas, pixel, pane, is_right=is_right)
+        is_right = event.button == RIGHT_BUTTON
+        pointer = build_pointer_event(viewer, canvas, event.pos, pane, is_right=is_right)
+        is_double = self.count_clicks(event, now) > 1
         handle = viewer.tool.double_click if is_double else viewer.tool.press
         viewer.attempt(lambda: handle(viewer.session, pointer))
-        if viewer.tool is hand and pointer.robot is not None:
-            self._panel.show_tab("robot")
-        if viewer.tool is hand and not hand.is_holding:
-            self._gesture = PanGesture(viewer, canvas)
-        else:
-            self._gesture = ToolGesture(viewer, canvas, pane)
+        if viewer.tool is not hand:
+            return ViewerToolGesture(viewer, canvas, pane)
+        if pointer.robot is not None:
+            self._viewer_panel.show_tab("robot")
+        if hand.is_holding:
+            return ViewerToolGesture(viewer, canvas, pane)
+        return PanGesture(canvas.pan, self._click_without_tool)
 
-    def _move(self, event: pygame.event.Event) -> None:
+    def _click_without_tool(self, event: pygame.event.Event) -> None:
+        """Handle a click that did not pan: complete a drawing (right), or clear the selection (left)."""
+        viewer = self._viewer
+        if event.button == RIGHT_BUTTON:
+            viewer.attempt(viewer.finish_drawing)
+        elif event.button == LEFT_BUTTON and viewer.tool is viewer.toolbox.hand:
+            viewer.inspection.selected = None
+            viewer.revision += 1
+
+    def hover(self, event: pygame.event.Event) -> None:
+        """Follow the mouse with the cursor, and with the tool while no button is held down."""
         viewer = self._viewer
         inspection = viewer.inspection
         pane = self._canvas.find_pane(event.pos)
@@ -291,18 +235,7 @@ class ViewerPointer:
         if pane is not None and not is_inside(self._canvas.layout.panel, event.pos):
             inspection.cursor = self._canvas.to_world(event.pos, pane)
             inspection.cursor_pane = pane
-        self._chart.hover = event.pos if self._gesture is None else None
-        if self._gesture is not None:
-            self._gesture.move(event)
-        elif inspection.cursor is not None:
+        self._chart.hover = None if self.is_busy else event.pos
+        if inspection.cursor is not None and not self.is_busy:
             pointer = build_pointer_event(viewer, self._canvas, event.pos, inspection.cursor_pane)
             viewer.tool.move(viewer.session, pointer)
-
-    def _release(self, event: pygame.event.Event) -> None:
-        # Another button than the one that is held does nothing.
-        if event.button != self._button:
-            return
-        gesture = self._gesture
-        self._gesture = None
-        if gesture is not None:
-            gesture.release(event, is_click=dist(event.pos, self._pressed_at) < MAX_CLICK_MOVE_PX)

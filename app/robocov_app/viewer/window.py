@@ -15,6 +15,7 @@ from robocov_app.toolkit.help_page import draw_help_page
 from robocov_app.toolkit.input import MOUSE_EVENTS
 from robocov_app.toolkit.layout import build_layout
 from robocov_app.toolkit.overlay import draw_message, draw_status
+from robocov_app.toolkit.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window import FPS, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
@@ -22,7 +23,7 @@ from robocov_app.viewer.commands import GROUPS, list_parameter_commands, list_vi
 from robocov_app.viewer.cost_curves import CostCurves
 from robocov_app.viewer.lesson_guide import LessonGuide
 from robocov_app.viewer.panel import ViewerPanel
-from robocov_app.viewer.pointer import LEFT_BUTTON, ViewerPointer
+from robocov_app.viewer.pointer import ViewerPointer
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.robot_inspector import RobotInspector
 from robocov_app.viewer.screen_video import ScreenVideo
@@ -370,8 +371,7 @@ class ViewerWindow(BaseWindow):
         elif event.type in MOUSE_EVENTS:
             self._handle_mouse(event)
         elif event.type == pygame.WINDOWLEAVE:
-            self.viewer.inspection.cursor = None
-            self.chart.hover = None
+            self.pointer.leave()
         else:
             self.panel.handle_event(event)
 

@@ -113,6 +113,17 @@ def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Drive
     assert driver.viewer.tool.build_draw_state(driver.session) == ViewerDrawState()
 
 
+def test_panning_back_to_the_start_completes_no_drawing(driver: Driver) -> None:
+    driver.key("p")
+    for corner in ((200, 200), (260, 200), (260, 260)):
+        driver.click(*corner)
+    before = driver.pixel(MIDDLE)
+    driver.drag((200, 200), (230, 190), (200, 200), button=3)
+    assert np.allclose(driver.pixel(MIDDLE), before, atol=1)
+    assert len(driver.viewer.tool.outline.points) == 3
+    driver.key("escape", 2)
+
+
 def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:
     camera = driver.window.canvas._painters[0].camera
     for key in ("ctrl+=", "ctrl+=", "ctrl+left", "ctrl+up", "ctrl+-", "ctrl+right", "ctrl+down"):

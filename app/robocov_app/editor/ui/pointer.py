@@ -1,8 +1,6 @@
-"""The mouse over the map: tools, panning, double clicks, the wheel and the context menu."""
+"""The mouse over the editor's map: tools, panning, double clicks, the wheel and the context menu."""
 
 from collections.abc import Callable
-from enum import Enum
-from math import dist
 
 import pygame
 
@@ -11,21 +9,12 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Snap
 from robocov_app.editor.tools.tool import EditorPointerEvent
-from robocov_app.toolkit.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX, ZOOM_PER_NOTCH, get_wheel_notches
-
-BUTTONS = (1, 2, 3)  # left, middle, right
-_NEVER_S = -1.0
-
-
-class Gesture(Enum):
-    """Action of a mouse button while it is held down."""
-
-    NONE = "none"
-    TOOL = "tool"
-    PAN = "pan"
+from robocov_app.toolkit.input import ZOOM_PER_NOTCH, get_wheel_notches
+from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
+from robocov_app.toolkit.ui import SidePanel
 
 
-class Pointer:
+class EditorPointer(Pointer):
     """Turns mouse events over the map into actions of the tools, and pans.
 
     Parameters
@@ -34,71 +23,58 @@ class Pointer:
         The editor.
     canvas : EditorCanvas
         The view of the map.
+    panel : SidePanel
+        The panel, which gets events first.
     open_menu : callable
         Opens the context menu at a pixel.
 
     Attributes
     ----------
-    gesture : Gesture
-        What the button does that is held down.
     pans_with_left : bool
         Whether the left button pans, because a key is held down.
     """
 
     def __init__(
-        self, editor: Editor, canvas: EditorCanvas, open_menu: Callable[[tuple[int, int]], object]
+        self, editor: Editor, canvas: EditorCanvas, panel: SidePanel, open_menu: Callable[[Pixel], object]
     ) -> None:
+        super().__init__(panel)
         self.editor = editor
         self.canvas = canvas
-        self.gesture = Gesture.NONE
         self.pans_with_left = False
         self._open_menu = open_menu
-        self._button = 0
-        self._has_moved = False  # since the press, farther than a click may move
-        self._pressed_at = (0, 0)
-        self._last_click_s = _NEVER_S
-        self._last_click_at = (0, 0)
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether a button is held down."""
-        return self.gesture is not Gesture.NONE
+    def get_scale(self) -> float:
+        """Return the scale of the window."""
+        return self.canvas.layout.scale
 
     @property
     def is_panning(self) -> bool:
         """Whether dragging pans."""
-        return self.gesture is Gesture.PAN or self.pans_with_left
-
-    def reset(self) -> None:
-        """Forget the button that is held down."""
-        self.gesture = Gesture.NONE
-        self._button = 0
+        return self.pans_with_left or (self.gesture is not None and self.gesture.is_pan)
 
     def hold_pan(self) -> None:
         """Pan with the left button until the key is released."""
         self.pans_with_left = True
 
     def leave(self) -> None:
-        """Handle that the pointer has left the window."""
+        """Handle that the mouse has left the map."""
         self.editor.cursor = None
         self.canvas.at = None
         self.canvas.hovered = None
 
-    def press(self, event: pygame.event.Event) -> None:
-        """Handle a press of a button."""
-        if self.is_busy or not self.canvas.contains(event.pos) or event.button not in BUTTONS:
-            return
-        self._pressed_at = event.pos
-        self._button = event.button
-        self._has_moved = False
-        if event.button != 1 or self.editor.tool.name == "pan" or self.pans_with_left:
-            self.gesture = Gesture.PAN
-            return
+    def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
+        """Pan, show the message of a problem, or use the tool."""
+        if not self.canvas.contains(event.pos):
+            return None
+        tool = self.editor.tool
+        if event.button != LEFT_BUTTON or tool.name == "pan" or self.pans_with_left:
+            return PanGesture(self.canvas.pan, self._click_without_tool)
         problem = self.canvas.find_problem(event.pos)
-        if problem is not None and not self.editor.tool.is_busy:
+        if problem is not None and not tool.is_busy:
             self._toggle_problem(problem)
-            return
-        self._press_tool(event)
+            return None
+        self._press_tool(event, now)
+        return EditorToolGesture(self)
 
     def _toggle_problem(self, problem: Problem) -> None:
         editor = self.editor
@@ -106,41 +82,44 @@ class Pointer:
         editor.show_message(problem.message, is_error=problem.is_error)
         editor.revision += 1
 
-    def _press_tool(self, event: pygame.event.Event) -> None:
+    def _press_tool(self, event: pygame.event.Event, now: float) -> None:
         editor = self.editor
-        max_slip = MAX_CLICK_MOVE_PX * self.canvas.layout.scale
-        is_quick = editor.now - self._last_click_s < DOUBLE_CLICK_S
-        is_double = is_quick and dist(self._last_click_at, event.pos) < max_slip
         # The third of three quick clicks is a single click again.
-        self._last_click_s = _NEVER_S if is_double else editor.now
-        self._last_click_at = event.pos
-        self.gesture = Gesture.TOOL
+        is_double = self.count_clicks(event, now) % 2 == 0
         pointer = self._build_event(event.pos)
         handle = editor.tool.double_click if is_double else editor.tool.press
         editor.attempt(lambda: handle(editor, pointer))
 
-    def move(self, event: pygame.event.Event) -> None:
-        """Handle a move of the mouse."""
+    def _click_without_tool(self, event: pygame.event.Event) -> None:
+        """Handle a click that did not pan: the right button completes a drawing, or opens the menu."""
+        editor = self.editor
+        if event.button != RIGHT_BUTTON:
+            return
+        if editor.tool.is_busy:
+            editor.attempt(lambda: editor.tool.finish(editor))
+        else:
+            self._open_menu(event.pos)
+
+    def hover(self, event: pygame.event.Event) -> None:
+        """Follow the mouse with the cursor, and with the tool while no button is held down."""
         editor = self.editor
         canvas = self.canvas
         is_over_map = canvas.contains(event.pos)
-        is_followed = is_over_map or self.gesture is Gesture.TOOL
+        is_using_tool = self.gesture is not None and not self.gesture.is_pan
+        is_followed = is_over_map or is_using_tool
         editor.cursor = canvas.to_world(event.pos) if is_followed else None
         canvas.at = (float(event.pos[0]), float(event.pos[1])) if is_followed else None
         canvas.hovered = None
-        if is_over_map and not self.is_busy:
+        if self.is_busy:
+            return
+        if is_over_map:
             canvas.hovered = canvas.find_problem(event.pos)
-        if self.is_busy and dist(event.pos, self._pressed_at) >= MAX_CLICK_MOVE_PX * canvas.layout.scale:
-            self._has_moved = True
-        if self.gesture is Gesture.PAN:
-            if self._has_moved:
-                canvas.pan(*event.rel)
-        elif is_followed:
-            self._move_tool(event)
+            self.move_tool(event)
         else:
             editor.tool.guides = ()
 
-    def _move_tool(self, event: pygame.event.Event) -> None:
+    def move_tool(self, event: pygame.event.Event) -> None:
+        """Move the tool to the mouse."""
         editor = self.editor
         pointer = self._build_event(event.pos)
         revision = editor.revision
@@ -148,30 +127,19 @@ class Pointer:
         # The panel need not be drawn again for every move of the mouse.
         editor.revision = revision
 
-    def release(self, event: pygame.event.Event) -> None:
-        """Handle the release of a button."""
-        if event.button != self._button or not self.is_busy:
-            return
+    def release_tool(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Release the tool at the mouse."""
         editor = self.editor
-        gesture = self.gesture
-        self.reset()
-        if gesture is Gesture.TOOL:
-            pointer = self._build_event(event.pos)
-            is_click = not self._has_moved
-            editor.attempt(lambda: editor.tool.release(editor, pointer, clicked=is_click))
-            editor.document.history.starts_new_step = True
-        elif event.button == 3 and not self._has_moved:
-            if editor.tool.is_busy:
-                editor.attempt(lambda: editor.tool.finish(editor))
-            else:
-                self._open_menu(event.pos)
+        pointer = self._build_event(event.pos)
+        editor.attempt(lambda: editor.tool.release(editor, pointer, clicked=is_click))
+        editor.document.history.starts_new_step = True
 
-    def turn_wheel(self, event: pygame.event.Event, pixel: tuple[int, int]) -> None:
-        """Zoom about a pixel by the notches of the wheel."""
-        if self.canvas.contains(pixel):
-            self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), pixel)
+    def turn_wheel(self, event: pygame.event.Event) -> None:
+        """Zoom about the mouse by the notches of the wheel."""
+        if self.canvas.contains(self.at):
+            self.canvas.zoom(ZOOM_PER_NOTCH ** get_wheel_notches(event), self.at)
 
-    def _build_event(self, pixel: tuple[int, int]) -> EditorPointerEvent:
+    def _build_event(self, pixel: Pixel) -> EditorPointerEvent:
         """Return the pointer at a pixel, snapped unless the tool or Ctrl prevents it."""
         editor = self.editor
         tool = editor.tool
@@ -194,3 +162,24 @@ class Pointer:
             alt=bool(modifiers & pygame.KMOD_ALT),
             ctrl=has_ctrl,
         )
+
+
+class EditorToolGesture(Gesture):
+    """Passes a drag on to the tool.
+
+    Parameters
+    ----------
+    pointer : EditorPointer
+        The mouse over the map.
+    """
+
+    def __init__(self, pointer: EditorPointer) -> None:
+        self._pointer = pointer
+
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Move the tool."""
+        self._pointer.move_tool(event)
+
+    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Release the tool."""
+        self._pointer.release_tool(event, is_click=is_click)

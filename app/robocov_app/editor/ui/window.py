@@ -17,7 +17,7 @@ from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, TrialDrafts, build_trial_change, start_trial
-from robocov_app.editor.ui.pointer import Pointer
+from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import type_for_tool
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
@@ -62,14 +62,12 @@ class EditorWindow(BaseWindow):
         All commands.
     panel : Panel
         The panel.
-    pointer : Pointer
+    pointer : EditorPointer
         The mouse over the map.
     trial : PlayWindow or None
         The viewer in which the map is tried.
     help : bool
         Whether the keys are shown.
-    at : tuple of int
-        Position of the mouse, px.
     """
 
     def __init__(
@@ -79,15 +77,14 @@ class EditorWindow(BaseWindow):
         self.editor = editor
         self.scale = scale
         self.help = False
-        self.at = (0, 0)
         self.trial: PlayWindow | None = None
         self.canvas = EditorCanvas(editor)
         self.documents = FileCommands(editor, drafts, self.canvas.fit, patient=patient)
         self.dialogs = editor.dialogs
-        self.pointer = Pointer(editor, self.canvas, self.open_menu)
         commands = list_commands(editor, self.canvas, self.documents, self._list_actions())
         self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
         self.panel = Panel(editor, self.commands, self.do, self._show_problem)
+        self.pointer = EditorPointer(editor, self.canvas, self.panel, self.open_menu)
         self.team_sampler = TeamSampler()
         self._trial_drafts: TrialDrafts | None = None
         self._patient = patient
@@ -103,8 +100,8 @@ class EditorWindow(BaseWindow):
             try_map=self.try_it,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
-            open_menu=lambda: self.open_menu(self.at),
-            hold_pan=self.pointer.hold_pan,
+            open_menu=lambda: self.open_menu(self.pointer.at),
+            hold_pan=lambda: self.pointer.hold_pan(),
             show_next_tab=lambda: self.panel.show_next_tab(),
             toggle_fullscreen=self.toggle_fullscreen,
             toggle_help=self._toggle_help,
@@ -233,7 +230,7 @@ class EditorWindow(BaseWindow):
             editor.show_message(team.message, is_error=True)
 
     def _choose_cursor(self) -> CursorShape:
-        if not self.canvas.contains(self.at):
+        if not self.canvas.contains(self.pointer.at):
             return "arrow"
         if self.pointer.is_panning:
             return "move"
@@ -383,7 +380,7 @@ class EditorWindow(BaseWindow):
             self.do("screenshot")
             return
         if kind in MOUSE_EVENTS and kind != pygame.MOUSEWHEEL:
-            self.at = event.pos
+            self.pointer.at = event.pos
         if kind == pygame.QUIT:
             self._take_quit()
         elif not self.dialogs.handle_event(event):
@@ -405,7 +402,7 @@ class EditorWindow(BaseWindow):
         elif kind == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif kind in MOUSE_EVENTS:
-            self._take_mouse(event)
+            self.pointer.handle_event(event, self.editor.now)
         elif kind == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
@@ -423,17 +420,3 @@ class EditorWindow(BaseWindow):
         if self.trial is not None:
             self.trial.held = event.key
         self.dialogs.ignore_letter(event.unicode)
-
-    def _take_mouse(self, event: pygame.event.Event) -> None:
-        is_taken = not self.pointer.is_busy and self.panel.handle_event(event)
-        if event.type == pygame.MOUSEMOTION:
-            self.pointer.move(event)
-        elif event.type == pygame.MOUSEBUTTONUP:
-            self.pointer.release(event)
-        elif is_taken:
-            self.editor.cursor = None
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            self.panel.ui.stop_typing()
-            self.pointer.press(event)
-        else:
-            self.pointer.turn_wheel(event, self.at)
