@@ -17,11 +17,11 @@ _COLUMNS = {
     "": "{label}",
     "mean distance": "{mean_distance_m:.3f} m",
     "mean time": "{mean_time_s:.3f} s",
-    "above best": "{above_best:.1%}",
+    "above lowest": "{above_best:.1%}",
     "cost": "{cost_m3:.2f} m³",
     "settled": "{settled}",
     "contacts": "{contacts}",
-    "clearance": "{min_clearance_m:.3f} m",
+    "clearance": "{min_clearance_m:z.3f} m",
     "path length": "{mean_path_length_m:.2f} m",
 }
 """Titles of the table's columns, with the formats of their cells."""

@@ -27,8 +27,8 @@ _COLUMNS = {
     "path length": ("path_length_m", "{:.2f} m"),
     "within 5 %": ("near_final_s", "{:.1f} s"),
     "components": ("components", "{:.0f}"),
-    "to walls": ("wall_clearance_m", "{:.3f} m"),
-    "to robots": ("robot_clearance_m", "{:.3f} m"),
+    "to walls": ("wall_clearance_m", "{:z.3f} m"),
+    "to robots": ("robot_clearance_m", "{:z.3f} m"),
 }
 """Titles of the table's columns, with their keys and formats. Areas are fractions of the free area."""
 

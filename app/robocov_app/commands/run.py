@@ -91,7 +91,7 @@ def _describe_run(run: Run) -> list[str]:
         lines.append(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
     lines += [
         f"  settled         {'not yet' if settling_time is None else f'after {settling_time:.1f} s'}",
-        f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:.3f} m)",
+        f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:z.3f} m)",
         f"  path length     {sum(path_lengths) / len(path_lengths):.2f} m per robot",
     ]
     lines += [f"note: {note}" for note in summary.get("notes", ())]

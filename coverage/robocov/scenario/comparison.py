@@ -23,7 +23,7 @@ DEFAULT_CONTROLLERS = ("rapf", "rpf", "lloyd")
 """The controllers of the paper."""
 _COLUMNS = {
     "mean_distance_m": "mean distance (m)",
-    "above_best": "above best",
+    "above_best": "above lowest",
     "settled_at_s": "settled at (s)",
     "contacts": "contacts",
     "mean_path_length_m": "path length (m)",
