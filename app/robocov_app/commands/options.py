@@ -382,6 +382,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         from robocov.team import PARAMETERS, Team
         from robocov.team_files import read_team
 
+        # There is no option for the mass, which is always 1 kg.
         properties: dict[str, Any] = {name: getattr(self, name) for name in PARAMETERS if name != "mass"}
         if self.communication_range is None:
             properties["communication_range"] = math.inf

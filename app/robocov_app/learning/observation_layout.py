@@ -20,6 +20,8 @@ Rows: TypeAlias = NDArray[np.float32]
 """(n, size): one row for each robot."""
 MAX_NEIGHBORS = 1000
 """Maximum number of neighbors in a row."""
+_MAX_NEIGHBOR_DIAMETERS = 4.0
+"""Distance up to which neighbors are searched for, in diameters of the map."""
 _MIN_SENSING_RANGE_M = 1e-9
 _FIXED_SIZE = 7
 """Numbers of a row without neighbors, rays and centroid."""
@@ -152,10 +154,12 @@ class ObservationLayout:
         """Return offset and presence of the nearest neighbors, (n, neighbors, 3)."""
         n = len(seen.positions)
         unit = seen.region.diameter
-        robot, _, offset, distance = seen.find_near_neighbors(4.0 * unit)
+        # Noisy positions may be farther apart than the diameter, but not by much.
+        robot, _, offset, distance = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
         nearest = np.zeros((n, self.neighbors, 3))
         distances = np.full((n, self.neighbors), np.inf)
-        _insert_nearest(robot, offset / -unit, distance, distances, nearest)
+        # The offsets point from the neighbor to the robot, those of the layout the other way.
+        _insert_nearest(robot, -offset / unit, distance, distances, nearest)
         return nearest
 
     def _check_scans(self, scans: Scans | None) -> Scans:

@@ -27,6 +27,10 @@ MAX_TIME_INTERVALS = 8
 """Maximum number of intervals between the ticks of an axis of times."""
 MIN_TIME_LIMIT_S = 10.0
 """A growing axis of times shows at least this many seconds."""
+_FREE_TIME_FRACTION = 0.03
+"""Free space behind the present on a growing axis of times, as a fraction of the time so far."""
+_MIN_TIME_STEP_S = 5.0
+"""A growing axis of times ends at a multiple of at least this step."""
 _MIN_VALUE = 1e-3
 """If all values are equal and nearer to zero than this, the axis is that of this value."""
 
@@ -157,9 +161,10 @@ def choose_growing_time_limit(end_s: float) -> float:
     """
     if end_s <= 0.96 * MIN_TIME_LIMIT_S:
         return MIN_TIME_LIMIT_S
+    # The end is a multiple of a round step of about an eighth of the time so far, then of a fifth.
     if end_s < 40.0:
         step = round_down(max(end_s / 4.0, 1.0)) / 2.0
     else:
         step = round_down(end_s / 5.0)
-    step = max(step, 5.0)
-    return float(math.ceil((end_s * 1.03 + 1e-9) / step) * step)
+    step = max(step, _MIN_TIME_STEP_S)
+    return float(math.ceil((end_s * (1.0 + _FREE_TIME_FRACTION) + 1e-9) / step) * step)

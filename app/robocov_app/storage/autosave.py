@@ -39,6 +39,8 @@ _open_savers_lock = threading.Lock()
 _Work = TypeVar("_Work")
 _Content: TypeAlias = Callable[[], Mapping[str, Any]]
 """Returns the content of a draft."""
+_Job: TypeAlias = tuple[Path | None, _Content | None]
+"""File of a document, and the content of its draft; None if everything is saved."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class Autosaver:
         self._path = path
         self._lock = ExitStack()
         self._changed = threading.Condition()
-        self._pending: tuple[Path | None, _Content | None] | None = None
+        self._pending: _Job | None = None
         self._is_writing = False
         self._is_closed = False
         self._is_hurried = False
@@ -107,7 +109,7 @@ class Autosaver:
         with _open_savers_lock:
             _open_savers.append(self)
         if resumed is None:
-            # Other programs can see that the file is open.
+            # An empty draft shows other programs that the file is open, see `is_open_elsewhere`.
             self.save_draft(None)
 
     def save_draft(self, content: _Content | None) -> None:
@@ -194,15 +196,9 @@ class Autosaver:
         """Write each pending draft; the target of the thread."""
         pause = 0.0
         while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._is_closed or self._is_hurried, pause)
-                self._changed.wait_for(lambda: self._is_closed or self._pending)
-                job = self._pending
-                self._pending = None
-                if job is None:
-                    return
-                self._is_writing = True
-                self._is_hurried = False
+            job = self._wait_for_job(pause)
+            if job is None:
+                return
             start = time.perf_counter()
             trouble = ""
             try:
@@ -218,6 +214,21 @@ class Autosaver:
                     self._pending = job
                     pause = _RETRY_S
                 self._changed.notify_all()
+
+    def _wait_for_job(self, pause: float) -> _Job | None:
+        """Wait for a pause, s, and then for a pending draft; return None if the saver is closed without one.
+
+        `flush` and `close` end the pause.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._is_closed or self._is_hurried, pause)
+            self._changed.wait_for(lambda: self._is_closed or self._pending)
+            job = self._pending
+            self._pending = None
+            if job is not None:
+                self._is_writing = True
+                self._is_hurried = False
+        return job
 
     def _write(self, path: Path | None, content: _Content | None) -> None:
         """Write a draft of a document in a file."""

@@ -43,9 +43,9 @@ def is_ending() -> bool:
 
 @contextmanager
 def ending_on_signals() -> Iterator[None]:
-    """End the process in time at SIGTERM and SIGHUP; signals that are ignored, as under nohup, stay so.
+    """End the process in time at SIGTERM and SIGHUP, unless it ignores them, as under nohup.
 
-    Without effect outside the main thread, and within another such context.
+    The context has no effect outside the main thread, and within another such context.
     """
     global _active
     if _active is not None or threading.current_thread() is not threading.main_thread():
@@ -120,6 +120,7 @@ class _Watcher:
                     self._end()
 
     def _end(self) -> None:
+        """Write the drafts, and end the process if the main thread does not end it in time."""
         start_s = time.monotonic()
         flush_all(_FLUSH_S)
         while time.monotonic() < self._compute_deadline(start_s):

@@ -141,7 +141,7 @@ class BaseWindow:
     # Loop
 
     def run(self) -> None:
-        """Run the window until it is closed or the process is to end."""
+        """Run the window until it is closed or the process has to end."""
         clock = pygame.time.Clock()
         previous_s = perf_counter()
         try:

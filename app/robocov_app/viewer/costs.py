@@ -198,15 +198,15 @@ class Costs:
             if asked is self._map_question:
                 self._is_prepared = answer is not None
                 self.state = "" if self._is_prepared else f"no cost: {self._worker.trouble}"
-            elif answer is None:
-                # Restart the process after it has died, and prepare the map again. If it dies during that,
-                # the branch above reports it.
-                if not self._worker.is_alive:
-                    self._prepare_map()
-            elif self._asked_pane is not None and isinstance(answer, KnownCost):
-                if asked is None or not asked.is_for_curve:
-                    self.known[self._asked_pane] = answer
-                answers.append((self._asked_pane, answer))
+            elif isinstance(answer, KnownCost):
+                if self._asked_pane is not None:
+                    answers.append((self._asked_pane, answer))
+                    if asked is None or not asked.is_for_curve:
+                        self.known[self._asked_pane] = answer
+            elif not self._worker.is_alive:
+                # The process has died. It starts again to prepare the map; if it dies during that, there is
+                # no cost.
+                self._prepare_map()
         return answers
 
     def close(self) -> None:
@@ -318,22 +318,24 @@ class CostService:
         return answer._replace(shared=shared)
 
     def _prepare(self, question: CostQuestion, channel: Channel) -> None:
+        """Build the cost of a map; raise RobocovError as soon as there is a question about a newer map."""
         environment = question.environment
         assert environment is not None
         started_at = time.perf_counter()
         reported_at = started_at
 
-        def check_newer_map(fraction: float) -> None:
+        def stop_for_newer_map(fraction: float) -> None:
             if any(newer.environment is not None for newer in channel.get_newer_questions()):
                 raise RobocovError("there is a newer map")
 
         def report_progress(fraction: float) -> None:
             nonlocal reported_at
-            check_newer_map(fraction)
+            stop_for_newer_map(fraction)
             now = time.perf_counter()
             if now - reported_at > PROGRESS_INTERVAL_S and fraction > 0.0:
                 reported_at = now
-                channel.report_progress((fraction, (now - started_at) * (1.0 - fraction) / fraction))
+                remaining_s = (now - started_at) * (1.0 - fraction) / fraction
+                channel.report_progress((fraction, remaining_s))
 
         self._varying_cost = None
         before = self._cost
@@ -346,7 +348,7 @@ class CostService:
             self._cost = before.with_density(environment)
         else:
             self._cost = CoverageCost(environment, question.lattice, progress=report_progress)
-        self._varying_cost = TimeVaryingCost(self._cost, progress=check_newer_map)
+        self._varying_cost = TimeVaryingCost(self._cost, progress=stop_for_newer_map)
 
 
 def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> _Answer:

@@ -110,7 +110,7 @@ class Launcher:
 
     @contextmanager
     def window(self) -> Iterator[ViewerWindow]:
-        """Open the window with its settings, and keep those that were changed.
+        """Open the window with its settings, and save those that were changed.
 
         Raises
         ------
@@ -201,11 +201,14 @@ class Launcher:
     def _choose_size(self, settings: ViewerSettings, scale: float) -> tuple[int, int]:
         if self.size is not None:
             return self.size
-        size = (settings.width, settings.height)
+        width = settings.width
+        height = settings.height
         if self.scale is not None:
-            # Text of that size needs a window that is large enough for it.
-            size = (max(size[0], round(MIN_SIZE_PX[0] * scale)), max(size[1], round(MIN_SIZE_PX[1] * scale)))
-        return size if self._needs_no_display else fit_to_screen(size)
+            # In a smaller window, the requested scale would be reduced.
+            min_width, min_height = MIN_SIZE_PX
+            width = max(width, round(min_width * scale))
+            height = max(height, round(min_height * scale))
+        return (width, height) if self._needs_no_display else fit_to_screen((width, height))
 
     def _read_settings(self, window: ViewerWindow, before: ViewerSettings) -> ViewerSettings:
         """Return the settings of a window, without the layers chosen on the command line."""

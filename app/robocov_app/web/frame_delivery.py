@@ -60,7 +60,11 @@ class FrameDelivery:
         self._encoder.shutdown(wait=False, cancel_futures=True)
 
     def _choose(self) -> tuple[Page | None, Frame | None]:
-        """Return the page that gets the next frame, and that frame; None if no page is ready."""
+        """Return the page that gets the next frame, and that frame; None if no page is ready.
+
+        The controlling page and the others take turns. Among the others, the page with the oldest frame is
+        the first.
+        """
         controlling = self._pages.controlling
         controlling_is_ready = controlling is not None and controlling.is_ready_for(self.newest)
         if controlling_is_ready and not self._controlling_was_last:

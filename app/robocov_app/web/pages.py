@@ -176,7 +176,7 @@ class Pages:
         self.give_control(self.controlling)
 
     def remove_surplus_teacher(self) -> Page | None:
-        """Remove the oldest page of a teacher that does not control, if there are too many.
+        """Remove the oldest page of a teacher if there are too many. The controlling page stays.
 
         Returns
         -------

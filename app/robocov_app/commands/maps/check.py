@@ -200,7 +200,7 @@ def format_report(report: MapReport, previous: MapReport | None = None) -> Itera
 
 
 def _mark_changed_rows(rows: Mapping[str, str], previous_rows: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return the titles and values of both reports; changed values with the previous ones."""
+    """Return the titles and values of a report; changed values are followed by the previous ones."""
     lines = []
     for title, value in rows.items():
         previous_value = previous_rows.get(title, "none")

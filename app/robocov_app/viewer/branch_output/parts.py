@@ -156,7 +156,8 @@ def split_branch(branch: SelectedBranch) -> list[BranchPart]:
         panes = run.panes
         setups = {pane.number: pane.setup for pane in panes}
         if not parts or parts[-1].setups != setups:
-            # While an edit lasts several steps, each step would be a part of its own.
+            # An edit that lasts several steps may change the setups in each of them. Only the last change
+            # starts a part.
             if parts and parts[-1].node is node and node.scenario is None:
                 parts.pop()
             recorders = {number: _build_recorder(setup, run.scenario.dt) for number, setup in setups.items()}

@@ -66,7 +66,7 @@ def _describe_rest(situation: RobotSituation) -> str:
 
 
 def _describe_pushed(situation: RobotSituation) -> str:
-    """Return the sentence on a robot that has swayed too much to be setting off."""
+    """Describe a robot that stays in place although an unbalanced force acts on it."""
     size = format_force(abs(situation.resultant))
     push = f"a force of {size} {format_direction(situation.resultant)} acts on it"
     goal = situation.goal

@@ -74,7 +74,7 @@ def _has_same_forces(decision: Decision, recorded: Decision) -> bool:
 
 
 def _complete_recorded_decision(state: PaneState) -> Decision:
-    """Return the decision of a record, with the cells if they are not the usual ones."""
+    """Return the decision of a record; add cells by travel time, which records do not contain."""
     assert state.recorded is not None
     team = state.setup.team
     if state.setup.controller.gains.get("cells") != "time" or not team.has_mixed_speeds:

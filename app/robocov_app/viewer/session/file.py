@@ -45,7 +45,7 @@ class SavedSession:
     document : SessionDocument
         The edits.
     head : Node
-        The node in whose time the present is.
+        The node whose time span contains the present.
     step : int
         The present step.
     view : mapping
@@ -73,7 +73,7 @@ def save_session(
     document : SessionDocument
         The edits.
     head : Node
-        The node in whose time the present is.
+        The node whose time span contains the present.
     step : int
         The present step.
     view : mapping

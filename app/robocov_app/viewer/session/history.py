@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping
 from copy import copy
 from dataclasses import fields, is_dataclass
 from itertools import compress
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
@@ -24,6 +24,8 @@ _OBJECT_OVERHEAD_BYTES = 50
 _MAX_SIZE_DEPTH = 4
 """Nesting up to which objects in the memory of a controller are counted."""
 _STEP_TOLERANCE = 1e-6
+_Selection: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
+"""Whether each state is kept, (k,)."""
 
 
 class RunHistory:
@@ -126,27 +128,34 @@ class RunHistory:
         self.thinned += count - len(self)
         self._bytes = sum(self._sizes)
 
-    def _select_states(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Select the states that are kept when the past is thinned."""
+    def _select_states(self) -> _Selection:
+        """Select the states that are kept when the past is thinned.
+
+        States after an edit are kept, too, unless too many would be left.
+        """
+        is_edited = np.array([True, *map(_has_new_setup, self.states, self.states[1:])])
+        is_kept = self._select_by_age(is_edited)
+        if is_kept.sum() > MAX_KEPT_FRACTION * len(self):
+            is_first = np.arange(len(self)) == 0
+            is_kept = self._select_by_age(is_first)
+        return is_kept
+
+    def _select_by_age(self, is_required: _Selection) -> _Selection:
+        """Select required states, and fewer and fewer of the others until few enough are left.
+
+        The newest states are all kept. Of those that are up to twice as old as the oldest of these, every
+        second step is kept, up to four times as old every fourth, and so on.
+        """
         count = len(self)
         steps = np.array(self.steps)
         ages = steps[-1] - steps
-        is_first = np.arange(count) == 0
-        is_edited = np.array([True, *map(_has_new_setup, self.states, self.states[1:])])
         is_kept = np.ones(count, dtype=bool)
-        # States after an edit are given up only if too many would be left otherwise.
-        for is_required in (is_edited, is_first):
-            is_kept = np.ones(count, dtype=bool)
-            complete_count = count // 2
-            while complete_count > 1 and is_kept.sum() > MAX_KEPT_FRACTION * count:
-                complete_count //= 2
-                # Every step is kept up to the age of the complete states, then every second, fourth, eighth
-                # as the age doubles.
-                relative_ages = np.maximum(ages / ages[-1 - complete_count], 1.0)
-                strides = 2 ** np.ceil(np.log2(relative_ages)).astype(np.intp)
-                is_kept = is_required | (steps % strides == 0)
-            if is_kept.sum() <= MAX_KEPT_FRACTION * count:
-                break
+        complete_count = count // 2
+        while complete_count > 1 and is_kept.sum() > MAX_KEPT_FRACTION * count:
+            complete_count //= 2
+            relative_ages = np.maximum(ages / ages[-1 - complete_count], 1.0)
+            strides = 2 ** np.ceil(np.log2(relative_ages)).astype(np.intp)
+            is_kept = is_required | (steps % strides == 0)
         return is_kept
 
 

@@ -1,6 +1,5 @@
 """Edits of a map: obstacles that are added, moved and removed, and a painted density."""
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -11,7 +10,7 @@ import shapely
 from robocov.arrays import Array
 from robocov.density import Raster, sample_density
 from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
-from robocov.errors import MapError, format_path
+from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
 
 MIN_SHAPE_SIZE_M = 0.02
@@ -31,7 +30,7 @@ _COORDINATE_DECIMALS = 4
 def replace_obstacles(
     environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
 ) -> Environment:
-    """Return a map with some of its obstacles replaced, as a file would contain it.
+    """Return a map with some of its obstacles replaced, as if it were read from a file.
 
     Starts that are covered by an obstacle are removed.
 
@@ -63,18 +62,12 @@ def replace_obstacles(
         try:
             return from_json(to_json(changed), "map")
         except MapError as error:
-            message = str(error).removeprefix("map: ")
-            covered = [name for name in starts if _is_about_start(message, name)]
+            covered = {mistake.path[1] for mistake in error.mistakes if mistake.path[:1] == ("starts",)}
+            covered &= starts.keys()
             if not covered:
-                raise MapError(message) from None
+                raise MapError(str(error).removeprefix("map: ")) from None
             for name in covered:
                 del starts[name]
-
-
-def _is_about_start(message: str, name: str) -> bool:
-    """Return whether the message of a MapError is about a start."""
-    path = re.escape(format_path(("starts", name)))
-    return re.match(rf"{path}[:.\[]", message) is not None
 
 
 def add_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:

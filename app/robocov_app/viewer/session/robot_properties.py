@@ -86,7 +86,7 @@ turning_rate : float
         return cls(**first_values, different=different)
 
     def build_team(self, numbers: Sequence[int]) -> Team:
-        """Build the team of the robots with certain numbers.
+        """Build the team of the robots with these numbers.
 
         Raises
         ------
