@@ -108,8 +108,8 @@ def save_videos(
     quiet : bool
         Whether progress is not shown.
     runs_on_one_map : sequence of Run or None
-        The runs on a map without the robots that failed, if these are part of the maps of `runs`. They are
-        used for distances.
+        The same runs on a map without failed robots, if those are obstacles of the maps of `runs`. Distances
+        are computed on that map.
 
     Raises
     ------

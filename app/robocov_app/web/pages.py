@@ -137,8 +137,8 @@ class Pages:
     def open(self, connection: ServerConnection, *, is_teacher: bool, page_id: str) -> Page:
         """Add the page of a new connection.
 
-        If it had another connection before, which broke without anyone noticing, it keeps its number, name
-        and role.
+        If the page has connected before, and that connection broke unnoticed, it keeps its number, name and
+        role.
 
         Parameters
         ----------

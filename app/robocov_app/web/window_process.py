@@ -97,7 +97,7 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_run_window, args=(command, own_options, sender), daemon=False)
     if os.name == "posix":
-        # When it starts, it unblocks the signals that are blocked below.
+        # Starting this tracker unblocks signals, so it is started before they are blocked.
         resource_tracker.ensure_running()
     block_interrupts()
     process.start()
