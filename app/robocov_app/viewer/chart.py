@@ -165,7 +165,7 @@ class Chart:
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw the chart and the time line onto the window."""
-        if self._is_page_outdated():
+        if self._update_page_key():
             self._draw_page()
         assert self._page is not None
         screen.blit(self._page, self.layout.chart[:2])
@@ -173,8 +173,8 @@ class Chart:
         self._draw_present(screen)
         self._draw_hover(screen)
 
-    def _is_page_outdated(self) -> bool:
-        """Return whether the page has to be drawn again, and remember what it will show."""
+    def _update_page_key(self) -> bool:
+        """Update the key of what the page shows; return whether the page has to be drawn again."""
         timeline = self.viewer.session.timeline
         curves = self._list_curves()
         samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in curves]

@@ -175,7 +175,7 @@ class ViewerWindow(BaseWindow):
         """Keep a draft of unsaved work, and end lesson, video and the computation of costs."""
         files = self.viewer.files
         files.workspace.save_draft(files.view, at_once=True)
-        # The session from before the lesson is kept, not that of the lesson.
+        # This restores the session and the layers from before the lesson, which are the ones to keep.
         self.lesson.end()
         if self.video is not None:
             self.viewer.attempt(self.toggle_recording)
