@@ -9,8 +9,8 @@ import pytest
 
 from robocov.errors import OutputError
 from robocov.files.folder_lock import lock_folder
-from robocov_app.replication.plan import BeyondPlan, Plan
-from robocov_app.replication.runner import RunnerOptions
+from robocov_app.replication.design.plan import BeyondPlan, Plan
+from robocov_app.replication.execution.runner import RunnerOptions
 from robocov_app.terminal.interruption import Interruption
 
 TINY = Plan(

@@ -16,10 +16,10 @@ from robocov_app.terminal.output import BOLD, RIGHT, echo, print_answer, print_t
 
 if TYPE_CHECKING:
     from robocov_app.replication.claims import Claim
-    from robocov_app.replication.forecast import Forecast
-    from robocov_app.replication.plan import Plan
-    from robocov_app.replication.results import BeyondResults, PaperResults
-    from robocov_app.replication.runner import RunnerOptions
+    from robocov_app.replication.design.plan import Plan
+    from robocov_app.replication.execution.forecast import Forecast
+    from robocov_app.replication.execution.runner import RunnerOptions
+    from robocov_app.replication.results.study_results import BeyondResults, PaperResults
 
 FAILED = 1
 """Exit status of a study with failed runs."""
@@ -100,9 +100,9 @@ class _Outcome:
 
 def command(options: Arguments) -> int:
     """Run `robocov paper`, and return its exit status."""
-    from robocov_app.replication.forecast import forecast_study
-    from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.runner import RunnerOptions, StudyInterrupted, open_folder
+    from robocov_app.replication.design.plan import FULL, QUICK
+    from robocov_app.replication.execution.forecast import forecast_study
+    from robocov_app.replication.execution.runner import RunnerOptions, StudyInterrupted, open_folder
     from robocov_app.sweep.local_pool import count_processors
 
     plan = QUICK if options.quick else FULL
@@ -156,11 +156,13 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
 
     Raises
     ------
-    robocov_app.replication.runner.StudyInterrupted
+    robocov_app.replication.execution.runner.StudyInterrupted
         If the user stops the study.
     """
-    from robocov_app.replication import execution, figure_files, pages
     from robocov_app.replication.claims import judge_beyond_claims, judge_paper_claims
+    from robocov_app.replication.execution import parts
+    from robocov_app.replication.figures import figure_files
+    from robocov_app.replication.pages import study_pages
 
     out = options.out
     paper: PaperResults | None = None
@@ -168,25 +170,25 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
     paper_claims: list[Claim] = []
     beyond_claims: list[Claim] = []
     if options.includes_claims:
-        paper = execution.run_paper(out, plan, runner)
+        paper = parts.run_paper(out, plan, runner)
         paper_claims = judge_paper_claims(paper.convex, paper.claims, paper.gains)
-        pages.write_claims(out, paper_claims)
-    figure_runs = execution.run_figures(out, plan, runner) if paper is None else paper.figures
+        study_pages.write_claims(out, paper_claims)
+    figure_runs = parts.run_figures(out, plan, runner) if paper is None else paper.figures
     if options.includes_beyond:
-        beyond = execution.run_beyond(out, plan, runner, paper)
+        beyond = parts.run_beyond(out, plan, runner, paper)
         beyond_claims = list(judge_beyond_claims(beyond))
-        pages.write_claims(out, (*paper_claims, *beyond_claims))
+        study_pages.write_claims(out, (*paper_claims, *beyond_claims))
     figures = figure_files.save_paper_figures(
-        out, figure_runs, execution.record_partition(), paper, quiet=options.json
+        out, figure_runs, parts.record_partition(), paper, quiet=options.json
     )
     if beyond is not None:
         beyond_figures = figure_files.save_beyond_figures(out, beyond, quiet=options.json)
-        beyond_page = pages.build_beyond_page(beyond_figures, beyond)
-        pages.write_text(out / pages.BEYOND_PAGE_FILE, beyond_page)
-    page = pages.build_paper_page(
+        beyond_page = study_pages.build_beyond_page(beyond_figures, beyond)
+        study_pages.write_text(out / study_pages.BEYOND_PAGE_FILE, beyond_page)
+    page = study_pages.build_paper_page(
         plan, figures, figure_runs, results=paper, claims=paper_claims, beyond=beyond_claims
     )
-    pages.write_text(out / pages.PAGE_FILE, page)
+    study_pages.write_text(out / study_pages.PAGE_FILE, page)
     return _Outcome(
         paper=paper,
         beyond=beyond,

@@ -1,4 +1,4 @@
-"""Evidence on every controller: summaries of its outcomes, comparisons, and what is known of it."""
+"""Evidence on every controller: summaries of its outcomes, comparisons, and its profile."""
 
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,12 +11,13 @@ import numpy as np
 from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
 from robocov.controllers.gains import format_value
 from robocov_app.figures.statistics import Interval, bootstrap, group_by, median_time
+from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.claims.explanations import compute_positive_fraction
-from robocov_app.replication.contenders import ASSETS, OWN, Contender
+from robocov_app.replication.design.contenders import OWN, Contender
+from robocov_app.replication.design.studies import AXES, STRONG_INDEX
 from robocov_app.replication.formatting import NO_VALUE, capitalize, format_amount
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
-from robocov_app.replication.results import IDEAL, BeyondResults, Degradation
-from robocov_app.replication.studies import AXES, STRONG_INDEX
+from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, PairedComparison
+from robocov_app.replication.results.study_results import IDEAL, BeyondResults, Degradation
 
 _MAX_WORST_MAPS = 3
 """Number of maps that are named as the worst of a controller."""
@@ -269,7 +270,7 @@ def _list_failures(summary: ContenderSummary) -> str:
 
 
 def describe_tuning(controller: str, outcomes: GainOutcomes) -> str:
-    """Return in a sentence which gains of a controller were the best, and by how much."""
+    """Return in a sentence which gains of a controller were the best, and their advantage over others."""
     grid = outcomes.select_complete()
     if not grid.instances:
         return "Gains: its defaults; in every scenario of the tuning some run failed."

@@ -14,8 +14,12 @@ from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import dump_map, list_bundled_maps, load_map
 from robocov_app.cli import main
 from robocov_app.commands.maps.generate import KindName
-from robocov_app.replication.plan import QUICK
-from robocov_app.replication.study_maps import build_claim_maps, build_convex_maps, build_generated_maps
+from robocov_app.replication.design.plan import QUICK
+from robocov_app.replication.design.study_maps import (
+    build_claim_maps,
+    build_convex_maps,
+    build_generated_maps,
+)
 
 
 def test_every_kind_can_be_asked_for() -> None:

@@ -13,9 +13,9 @@ from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.notebook import record_html, record_png
-from robocov_app.replication.contenders import Contender
-from robocov_app.replication.outcome_tables import read_outcomes
-from robocov_app.replication.studies import Contest
+from robocov_app.replication.design.contenders import Contender
+from robocov_app.replication.design.studies import Contest
+from robocov_app.replication.results.outcome_tables import read_outcomes
 from robocov_app.sweep.study_file import read_study
 from robocov_app.viewer.session.missing_controller import MissingController
 from robocov_app.viewer.session.session import Session

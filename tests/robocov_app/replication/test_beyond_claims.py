@@ -13,7 +13,7 @@ from robocov_app.replication.claims.extensions import (
 )
 from robocov_app.replication.claims.goals import (
     describe_goal,
-    estimate_highest_of_maps,
+    estimate_maximum_over_maps,
     estimate_worst_ratio,
     is_goal_met,
     judge_goals,
@@ -21,11 +21,11 @@ from robocov_app.replication.claims.goals import (
     summarize_goals,
 )
 from robocov_app.replication.claims.rivals import judge_rivals
-from robocov_app.replication.contenders import TARGETS, TEAMS, UNTUNED, build_contender
-from robocov_app.replication.outcomes import Outcomes, PairedComparison, ProblemInstance
-from robocov_app.replication.plan import FULL
-from robocov_app.replication.results import Degradation
-from robocov_app.replication.step_times import StepTimes
+from robocov_app.replication.design.contenders import TARGETS, TEAMS, UNTUNED, build_contender
+from robocov_app.replication.design.plan import FULL
+from robocov_app.replication.results.outcomes import Outcomes, PairedComparison, ProblemInstance
+from robocov_app.replication.results.step_times import StepTimes
+from robocov_app.replication.results.study_results import Degradation
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
@@ -163,7 +163,7 @@ def test_without_a_run_no_goal_is_judged():
 @given(st.lists(st.tuples(st.sampled_from("xyz"), st.floats(0.0, 2.0)), min_size=1, max_size=20))
 def test_the_worst_median_is_that_of_the_worst_map(rows):
     maps, values = [name for name, _ in rows], np.array([value for _, value in rows])
-    found = estimate_highest_of_maps(lambda drawn: np.median(values[drawn], axis=-1), maps)
+    found = estimate_maximum_over_maps(lambda drawn: np.median(values[drawn], axis=-1), maps)
     names = np.array(maps)
     assert found.estimate == pytest.approx(max(np.median(values[names == name]) for name in set(maps)))
     assert min(values) - 1e-12 <= found.low <= found.high <= max(values) + 1e-12

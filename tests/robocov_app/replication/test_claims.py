@@ -25,7 +25,7 @@ from robocov_app.replication.claims.nonconvex_claims import (
 from robocov_app.replication.claims.start_claims import judge_starts_cost, judge_starts_placement
 from robocov_app.replication.claims.thresholds import REGISTERED
 from robocov_app.replication.formatting import format_amount
-from robocov_app.replication.outcomes import (
+from robocov_app.replication.results.outcomes import (
     GainOutcomes,
     Outcomes,
     ProblemInstance,

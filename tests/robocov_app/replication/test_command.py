@@ -5,7 +5,8 @@ from called import complaint
 
 def test_bad_input(tmp_path, capsys):
     (tmp_path / "notes.txt").write_text("mine")
-    assert "is no study of the paper" in complaint(capsys, "paper", "--out", str(tmp_path))
+    message = complaint(capsys, "paper", "--out", str(tmp_path))
+    assert "expected an empty folder or a study of the paper" in message
     assert "--workers: expected a number from 1 to 1024, got 0" in complaint(
         capsys, "paper", "--out", "x", "--workers", "0"
     )

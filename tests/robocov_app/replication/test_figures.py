@@ -12,8 +12,8 @@ from robocov.voronoi import partition
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.page import tone
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.replication.paper_figures import FIGURES, WIDE_PX, draw_figure
-from robocov_app.replication.results import FigureRun
+from robocov_app.replication.figures.paper_figures import FIGURES, WIDE_PX, draw_figure
+from robocov_app.replication.results.study_results import FigureRun
 
 
 def build_figure_run(environment, controller: str, final: float, seed: int = 0) -> FigureRun:

@@ -6,7 +6,7 @@ import pytest
 from robocov.observation.region import Region
 from robocov_app.look.colors import compute_contrast
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.replication.height_plot import PENTAGON, draw_heights, find_sensor_optima
+from robocov_app.replication.figures.height_plot import PENTAGON, draw_heights, find_sensor_optima
 
 HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
 

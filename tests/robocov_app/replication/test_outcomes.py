@@ -14,12 +14,13 @@ from robocov.controllers import get_gain_values, make_controller
 from robocov.mapfile import load_map
 from robocov.metrics import CostHistory
 from robocov_app.evaluation.reference_search import ReferencePlacement
-from robocov_app.replication import degradations, studies, study_maps
-from robocov_app.replication.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, build_paper_contender
-from robocov_app.replication.degradations import read_degradations
+from robocov_app.replication.design import studies, study_maps
+from robocov_app.replication.design.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, build_paper_contender
 from robocov_app.replication.evidence import describe_tuning
-from robocov_app.replication.outcome_tables import read_gain_outcomes, read_outcomes
-from robocov_app.replication.outcomes import (
+from robocov_app.replication.results import degradations
+from robocov_app.replication.results.degradations import read_degradations
+from robocov_app.replication.results.outcome_tables import read_gain_outcomes, read_outcomes
+from robocov_app.replication.results.outcomes import (
     GainOutcomes,
     ProblemInstance,
     compute_mean_until,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.degradation_plot import draw_degradations
-from robocov_app.replication.results import Degradation
+from robocov_app.replication.figures.degradation_plot import draw_degradations
+from robocov_app.replication.results.study_results import Degradation
 
 
 def build_degradations() -> list[Degradation]:

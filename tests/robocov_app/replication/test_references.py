@@ -10,9 +10,9 @@ from robocov.environment import Environment, UniformStart
 from robocov.errors import OutputError
 from robocov.mapfile import to_json
 from robocov_app.evaluation.reference_search import ReferencePlacement, ReferenceQuery
-from robocov_app.replication import references
-from robocov_app.replication.plan import QUICK
-from robocov_app.replication.references import find_references
+from robocov_app.replication.design.plan import QUICK
+from robocov_app.replication.results import references
+from robocov_app.replication.results.references import find_references
 from robocov_app.sweep.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
 

@@ -5,9 +5,9 @@ from itertools import count
 import numpy as np
 import pytest
 
-from robocov_app.replication import step_times as steps
-from robocov_app.replication.plan import QUICK
-from robocov_app.replication.step_times import StepTimes, measure_step_times
+from robocov_app.replication.design.plan import QUICK
+from robocov_app.replication.results import step_times as steps
+from robocov_app.replication.results.step_times import StepTimes, measure_step_times
 
 
 @pytest.fixture(autouse=True)

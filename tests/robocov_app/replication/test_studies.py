@@ -10,9 +10,9 @@ from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonO
 from robocov.errors import StartError
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.figures.statistics import share
-from robocov_app.replication import studies, study_maps
 from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS, NEARLY_ALWAYS, REGISTERED
-from robocov_app.replication.contenders import (
+from robocov_app.replication.design import studies, study_maps
+from robocov_app.replication.design.contenders import (
     GAIN_GRIDS,
     LLOYD,
     OURS,
@@ -24,8 +24,17 @@ from robocov_app.replication.contenders import (
     build_paper_contenders,
     collect_gain_sets,
 )
+from robocov_app.replication.design.plan import (
+    CONVEX,
+    CONVEX_KINDS,
+    FULL,
+    KINDS,
+    NON_CONVEX,
+    QUICK,
+    TEAM,
+    UNSEEN,
+)
 from robocov_app.replication.evidence import load_profile
-from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, FULL, KINDS, NON_CONVEX, QUICK, TEAM, UNSEEN
 from robocov_app.sweep.parameters import TEAM_PARAMETERS as TEAM_PARAMETERS
 from robocov_app.sweep.tasks import generate_tasks
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from robocov_app.figures.statistics import Interval
 from robocov_app.replication.claims import Criterion
 from robocov_app.replication.formatting import format_amount
-from robocov_app.replication.svg_marks import DotStrip, draw_interval_bar, draw_strips
+from robocov_app.replication.pages.svg_marks import DotStrip, draw_interval_bar, draw_strips
 
 gaps = st.dictionaries(
     st.text("abc<&", min_size=1, max_size=4), st.floats(-0.05, 3.0), min_size=1, max_size=9

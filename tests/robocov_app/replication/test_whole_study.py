@@ -23,35 +23,30 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
-from robocov_app.replication import (
-    contenders,
-    execution,
-    figure_files,
-    pages,
-    runner,
-    step_times,
-    studies,
-    study_maps,
-)
-from robocov_app.replication import plan as planned
-from robocov_app.replication.beyond_plots import build_gap_samples, plan_beyond_plots
 from robocov_app.replication.claims import judge_beyond_claims, judge_paper_claims
 from robocov_app.replication.claims.claim import EXTENSIONS, GOALS, RIVALS
 from robocov_app.replication.claims.goals import describe_goal, summarize_goals
 from robocov_app.replication.claims.thresholds import REGISTERED
-from robocov_app.replication.contenders import GAIN_GRIDS, LABELS, TEAMS
+from robocov_app.replication.design import contenders, studies, study_maps
+from robocov_app.replication.design import plan as planned
+from robocov_app.replication.design.contenders import GAIN_GRIDS, LABELS, TEAMS
 from robocov_app.replication.evidence import describe_tuning, rank_contenders, summarize_contenders
-from robocov_app.replication.figure_files import FigureFile
-from robocov_app.replication.forecast import forecast_study
+from robocov_app.replication.execution import parts, runner
+from robocov_app.replication.execution.forecast import forecast_study
+from robocov_app.replication.execution.runner import StudyInterrupted, open_folder
+from robocov_app.replication.figures import figure_files
+from robocov_app.replication.figures.beyond_plots import build_gap_samples, plan_beyond_plots
+from robocov_app.replication.figures.figure_files import FigureFile
+from robocov_app.replication.figures.paper_figures import CAPTIONS, describe_figure, find_arrival_time
 from robocov_app.replication.formatting import format_amount
-from robocov_app.replication.paper_figures import CAPTIONS, describe_figure, find_arrival_time
-from robocov_app.replication.runner import StudyInterrupted, open_folder
+from robocov_app.replication.pages import study_pages
+from robocov_app.replication.results import step_times
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
-FIRST = execution.record_partition()
+FIRST = parts.record_partition()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -71,15 +66,15 @@ def study(tmp_path_factory):
     with shared(tmp_path_factory, "tiny-paper") as root:
         folder, kept = root / "out", root / "images"
         open_folder(folder, TINY)
-        paper = execution.run_paper(folder, TINY, options())
+        paper = parts.run_paper(folder, TINY, options())
         if not kept.exists():
             images = figure_files.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
             found = judge_paper_claims(paper.convex, paper.claims, paper.gains)
-            pages.write_claims(folder, found)
-            page = pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found)
-            pages.write_text(folder / pages.PAGE_FILE, page)
+            study_pages.write_claims(folder, found)
+            page = study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found)
+            study_pages.write_text(folder / study_pages.PAGE_FILE, page)
             kept.write_bytes(pickle.dumps(images))
-        beyond = execution.run_beyond(folder, TINY, options(), paper)
+        beyond = parts.run_beyond(folder, TINY, options(), paper)
     return folder, paper, beyond, pickle.loads(kept.read_bytes())
 
 
@@ -110,7 +105,7 @@ def content(folder):
 
 @pytest.fixture(scope="module")
 def more(beyond):
-    return pages.build_beyond_page(DRAWN, beyond)
+    return study_pages.build_beyond_page(DRAWN, beyond)
 
 
 def text_of(found) -> str:
@@ -142,8 +137,8 @@ class TestRuns:
     def test_the_same_call_does_nothing_again_and_gives_the_same(self, folder, paper, beyond):
         rows = sorted((folder / "studies").glob("*/runs/*/row.json"))
         before = [path.stat().st_mtime_ns for path in rows]
-        again = execution.run_paper(folder, TINY, options())
-        alone = execution.run_beyond(folder, TINY, options(), None)
+        again = parts.run_paper(folder, TINY, options())
+        alone = parts.run_beyond(folder, TINY, options(), None)
         assert [path.stat().st_mtime_ns for path in rows] == before
         assert again.contenders == paper.contenders and again.references == paper.references
         first, second = (judge_paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
@@ -159,7 +154,7 @@ class TestRuns:
         for path in lost:
             shutil.rmtree(path)
         (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as one that was killed leaves it
-        again = execution.run_beyond(out, TINY, options(), paper)
+        again = parts.run_beyond(out, TINY, options(), paper)
         assert text_of(judge_beyond_claims(again)) == text_of(judge_beyond_claims(beyond))
         for name in ("rivals", "conditions-loss"):
             table = f"studies/{name}/results.csv"
@@ -243,7 +238,7 @@ class TestBeyond:
 
     def test_the_papers_runs_count_where_baselines_ran(self, paper):
         fewer = replace(TINY, beyond=replace(TINY.beyond, generated=()))
-        outcomes = execution.select_baseline_outcomes(paper.claims, fewer)
+        outcomes = parts.select_baseline_outcomes(paper.claims, fewer)
         assert set(outcomes.maps) == {"blocks-a"} and set(outcomes.starts) == {"corner"}
 
     def test_both_runs_are_judged_by_the_density(self, folder, beyond):
@@ -289,7 +284,7 @@ class TestBeyond:
 TINY_COMMAND = (
     "import sys; sys.path.insert(0, sys.argv.pop(1))\n"
     "from tiny_paper import TINY\n"
-    "from robocov_app.replication import plan\n"
+    "from robocov_app.replication.design import plan\n"
     "plan.QUICK = TINY\n"
     "from robocov_app.cli import main\n"
     "sys.exit(main(['paper', '--quick', '--without-beyond', *sys.argv[1:]]))\n"
@@ -359,12 +354,12 @@ class TestStopping:
         stopped = options()
         stopped.stop.requested = True
         with pytest.raises(StudyInterrupted):
-            execution.run_paper(tmp_path / "out", TINY, stopped)
+            parts.run_paper(tmp_path / "out", TINY, stopped)
         with pytest.raises(StudyInterrupted):
             runner.run_studies(studies.build_conditions_studies(TINY), tmp_path, stopped, "x")
         assert not list(tmp_path.glob("studies/*/runs/*"))
         with pytest.raises(StudyInterrupted):
-            execution.time_steps(tmp_path, TINY, stopped)
+            parts.time_steps(tmp_path, TINY, stopped)
 
 
 class TestTables:
@@ -530,7 +525,7 @@ class TestPages:
         assert all(describe_tuning(name, grid) in said for name, grid in beyond.gains.items())
         assert "on 1 generated maps (seeds 101)" in said
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
-        said = plain(pages.build_beyond_page({}, quick))
+        said = plain(study_pages.build_beyond_page({}, quick))
         assert "default gains: those that the full study" in said and "120 s on 4 generated maps" in said
 
     def test_energy_has_its_unit(self, more, beyond):
@@ -548,7 +543,7 @@ class TestPages:
             cells = [f"{known[name, *each].ratio.estimate:.2f}" for each in at]
             assert re.findall(r"<td.*?>(.*?)</td>", row) == [*cells, "1"]
         many = replace(TINY.beyond, conditions_maps=tuple("abcdefghijkl"))
-        told = pages.build_beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
+        told = study_pages.build_beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
         assert (
             "<small>"
             in told.partition('class="evidence heat"')[2].partition("<tbody>")[2].partition("</table>")[0]
@@ -565,14 +560,16 @@ class TestPages:
             and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in more
         )
         without = replace(beyond, unseen=None)
-        assert f"<caption>{heading}" not in pages.build_beyond_page({}, without)
+        assert f"<caption>{heading}" not in study_pages.build_beyond_page({}, without)
         assert "goal-unseen" not in text_of(judge_beyond_claims(without))
 
     def test_the_same_runs_give_the_same_pages(self, study, content, more):
         _, paper, beyond, images = study
         found = judge_paper_claims(paper.convex, paper.claims, paper.gains)
-        assert pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found) == content
-        assert pages.build_beyond_page(DRAWN, beyond) == more
+        assert (
+            study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found) == content
+        )
+        assert study_pages.build_beyond_page(DRAWN, beyond) == more
 
     @pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("chromedriver")), reason="no browser")
     @pytest.mark.parametrize("width", [390, 1280])
@@ -657,10 +654,10 @@ class TestCommand:
 
 def test_other_folders_are_left_alone(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match="not empty, and what is in it is no study of the paper"):
+    with pytest.raises(InputError, match="expected an empty folder or a study of the paper"):
         open_folder(tmp_path, TINY)
     (tmp_path / "paper.json").write_text("[]")
-    with pytest.raises(InputError, match="is no study of the paper"):
+    with pytest.raises(InputError, match="expected an empty folder or a study of the paper"):
         open_folder(tmp_path, TINY)
 
 

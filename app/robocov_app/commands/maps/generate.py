@@ -224,8 +224,8 @@ def _list_tasks(options: Arguments) -> list[_MapTask]:
 
 def _list_study_tasks(*, is_quick: bool) -> list[_MapTask]:
     """List the random maps of a study of the paper."""
-    from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.study_maps import (
+    from robocov_app.replication.design.plan import FULL, QUICK
+    from robocov_app.replication.design.study_maps import (
         build_claim_maps,
         build_convex_maps,
         build_generated_maps,

@@ -9,8 +9,8 @@ from robocov_app.replication.claims.extensions import (
 )
 from robocov_app.replication.claims.goals import judge_goals, judge_unseen
 from robocov_app.replication.claims.rivals import judge_rivals
-from robocov_app.replication.contenders import OWN
-from robocov_app.replication.results import BeyondResults
+from robocov_app.replication.design.contenders import OWN
+from robocov_app.replication.results.study_results import BeyondResults
 
 
 def judge_beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:

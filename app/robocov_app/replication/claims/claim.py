@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeAlias
 from robocov_app.figures.statistics import Interval
 from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS
 from robocov_app.replication.formatting import format_amount, format_interval
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
+from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, PairedComparison
 
 Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
 
@@ -35,7 +35,7 @@ class Criterion:
     Parameters
     ----------
     measure : str
-        What is measured, in words.
+        Description of the measured value.
     interval : Interval
         Its estimate and 95 % interval.
     low, high : float

@@ -6,10 +6,10 @@ from robocov_app.figures.statistics import share
 from robocov_app.replication.claims.claim import Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import list_ratios_by_start
 from robocov_app.replication.claims.thresholds import CLUSTERED, NEARLY_ALWAYS, NEARLY_SAME, SAME_COST
-from robocov_app.replication.contenders import LABELS
+from robocov_app.replication.design.contenders import LABELS
 from robocov_app.replication.formatting import format_amount, format_interval
-from robocov_app.replication.outcome_tables import EARLY_S
-from robocov_app.replication.outcomes import Outcomes
+from robocov_app.replication.results.outcome_tables import EARLY_S
+from robocov_app.replication.results.outcomes import Outcomes
 
 
 def judge_convex_final(outcomes: Outcomes) -> Claim:

@@ -4,7 +4,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.replication.formatting import format_amount, format_median
-from robocov_app.replication.outcomes import PairedComparison
+from robocov_app.replication.results.outcomes import PairedComparison
 
 
 def describe_middle_half(gaps: Array) -> str:

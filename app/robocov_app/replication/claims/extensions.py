@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from robocov_app.replication.claims.claim import EXTENSIONS, Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.thresholds import CLEARLY_BELOW, NEARLY_SAME, SAME_COST, TOLERATED
-from robocov_app.replication.contenders import TARGETS, TEAMS
+from robocov_app.replication.design.contenders import TARGETS, TEAMS
 from robocov_app.replication.formatting import capitalize, format_amount, format_median
-from robocov_app.replication.outcomes import Outcomes
-from robocov_app.replication.results import Degradation
+from robocov_app.replication.results.outcomes import Outcomes
+from robocov_app.replication.results.study_results import Degradation
 
 
 def judge_targets(outcomes: Outcomes) -> Claim:

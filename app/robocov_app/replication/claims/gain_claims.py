@@ -6,9 +6,9 @@ from robocov.arrays import Array
 from robocov_app.figures.statistics import bootstrap, spread
 from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.thresholds import BARELY, REGRET
-from robocov_app.replication.contenders import format_potential
+from robocov_app.replication.design.contenders import format_potential
 from robocov_app.replication.formatting import format_amount, format_median
-from robocov_app.replication.outcomes import GainOutcomes
+from robocov_app.replication.results.outcomes import GainOutcomes
 
 _MIN_VARIATION = 1e-12
 """Lower bound of a denominator."""

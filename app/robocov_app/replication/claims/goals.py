@@ -24,11 +24,11 @@ from robocov_app.replication.claims.thresholds import (
     NEVER_WORSE,
     RARELY,
 )
-from robocov_app.replication.contenders import Contender, select_strongest
+from robocov_app.replication.design.contenders import Contender, select_strongest
+from robocov_app.replication.design.plan import Plan
 from robocov_app.replication.formatting import format_amount
-from robocov_app.replication.outcomes import Outcomes, PairedComparison
-from robocov_app.replication.plan import Plan
-from robocov_app.replication.step_times import StepTimes
+from robocov_app.replication.results.outcomes import Outcomes, PairedComparison
+from robocov_app.replication.results.step_times import StepTimes
 
 _RESAMPLES = 2000
 
@@ -97,7 +97,7 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
     label = own.label
     known = outcomes.select_finite("gap", key)
     gaps = known.get_values(key, "gap")
-    highest = estimate_highest_of_maps(lambda rows: np.median(gaps[rows], axis=-1), known.maps)
+    highest = estimate_maximum_over_maps(lambda rows: np.median(gaps[rows], axis=-1), known.maps)
     goals = [
         _build_goal(
             "gap",
@@ -212,8 +212,10 @@ def _judge_step_goals(own: Contender, steps: Mapping[int, StepTimes], plan: Plan
     return [replace(goal, maps=1, min_maps=1) for goal in goals]
 
 
-def estimate_highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Interval:
-    """Estimate the highest value of all maps, with an interval for these maps: runs are drawn within each.
+def estimate_maximum_over_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Interval:
+    """Estimate the maximum over all maps of a statistic of their runs.
+
+    The interval is that of a bootstrap which resamples runs within each map, but not the maps.
 
     Parameters
     ----------
@@ -246,7 +248,7 @@ def estimate_worst_ratio(pairs: PairedComparison) -> Interval:
         first = np.median(pairs.first_values[rows], axis=-1)
         return first / np.median(pairs.second_values[rows], axis=-1)
 
-    return estimate_highest_of_maps(compute_ratio, pairs.outcomes.maps)
+    return estimate_maximum_over_maps(compute_ratio, pairs.outcomes.maps)
 
 
 def _describe_highest(values: Mapping[str, float], bound: float) -> str:
@@ -277,7 +279,7 @@ def describe_goal(goal: Claim) -> str:
 
 
 def summarize_goals(goals: Sequence[Claim]) -> str:
-    """Return in a sentence how many goals are met, and what was missed."""
+    """Return in a sentence how many goals are met, and list the others."""
     if not goals:
         return "Nothing was measured."
     missed = [f"{goal.criteria[0].measure} {_describe_miss(goal)}" for goal in goals if not is_goal_met(goal)]

@@ -20,10 +20,10 @@ from robocov_app.replication.claims.thresholds import (
     NEAR_OPTIMUM,
     NEARLY_ALWAYS,
 )
-from robocov_app.replication.contenders import LABELS
+from robocov_app.replication.design.contenders import LABELS
 from robocov_app.replication.formatting import format_amount, format_median
-from robocov_app.replication.outcome_tables import FIRST_MINUTE_S
-from robocov_app.replication.outcomes import Outcomes
+from robocov_app.replication.results.outcome_tables import FIRST_MINUTE_S
+from robocov_app.replication.results.outcomes import Outcomes
 
 _MIN_STUCK_FRACTION = 0.5
 _GAP_CLAIMS = {

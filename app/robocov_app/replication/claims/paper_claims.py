@@ -19,7 +19,7 @@ from robocov_app.replication.claims.nonconvex_claims import (
 )
 from robocov_app.replication.claims.start_claims import judge_starts_cost, judge_starts_placement
 from robocov_app.replication.claims.thresholds import REGISTERED
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes
+from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes
 
 
 def judge_paper_claims(

@@ -12,9 +12,9 @@ from robocov_app.figures.statistics import bootstrap_by
 from robocov_app.replication.claims.claim import RIVALS, Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import describe_losses
 from robocov_app.replication.claims.thresholds import MIN_CLOSED_FRACTION
-from robocov_app.replication.contenders import OURS, PAPER, Contender, select_strongest
+from robocov_app.replication.design.contenders import OURS, PAPER, Contender, select_strongest
 from robocov_app.replication.formatting import format_median
-from robocov_app.replication.outcomes import Outcomes
+from robocov_app.replication.results.outcomes import Outcomes
 
 
 def judge_rivals(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> list[Claim]:

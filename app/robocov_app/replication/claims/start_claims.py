@@ -8,7 +8,7 @@ from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.gain_claims import build_variation_criteria
 from robocov_app.replication.claims.thresholds import BARELY_BY_START, SAME_PLACEMENT
 from robocov_app.replication.formatting import format_amount, format_median
-from robocov_app.replication.outcomes import Outcomes
+from robocov_app.replication.results.outcomes import Outcomes
 
 _MIN_VARIATION = 1e-12
 """Lower bound of a denominator."""

@@ -4,7 +4,7 @@ They were set before the study was run, those of the goals of our own controller
 are the same for every run.
 """
 
-from robocov_app.replication.plan import CONVEX_KINDS
+from robocov_app.replication.design.plan import CONVEX_KINDS
 
 SAME_COST = 0.02
 """Two costs are the same if the median of their ratio is within 2 % of 1."""

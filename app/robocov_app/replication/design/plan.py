@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from robocov_app.replication.contenders import OURS
+from robocov_app.replication.design.contenders import OURS
 
 ROBOTS = 6
 """Size of the team, as in the paper."""

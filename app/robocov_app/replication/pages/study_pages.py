@@ -15,10 +15,12 @@ from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
 from robocov.record import Record, list_versions
 from robocov.text import escape_controls
 from robocov_app.figures.statistics import RESAMPLES
-from robocov_app.replication import contenders, step_times, studies, study_maps
+from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.claims import goals, judge_beyond_claims, summarize_verdicts, thresholds
 from robocov_app.replication.claims.claim import GOALS, RIVALS, Claim
-from robocov_app.replication.contenders import ASSETS, LABELS, OURS
+from robocov_app.replication.design import contenders, studies, study_maps
+from robocov_app.replication.design.contenders import LABELS, OURS
+from robocov_app.replication.design.plan import FULL, NON_CONVEX, ROBOTS, TEAM, UNSEEN, Plan
 from robocov_app.replication.evidence import (
     ControllerEvidence,
     collect_degradations,
@@ -27,13 +29,13 @@ from robocov_app.replication.evidence import (
     rank_contenders,
     summarize_contenders,
 )
-from robocov_app.replication.figure_files import FigureFile
+from robocov_app.replication.figures.figure_files import FigureFile
+from robocov_app.replication.figures.paper_figures import CAPTIONS, FIGURES
 from robocov_app.replication.formatting import NO_VALUE, format_amount, format_interval
-from robocov_app.replication.outcomes import Outcomes, ProblemInstance
-from robocov_app.replication.paper_figures import CAPTIONS, FIGURES
-from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, UNSEEN, Plan
-from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
-from robocov_app.replication.svg_marks import DotStrip, draw_interval_bar, draw_strips
+from robocov_app.replication.pages.svg_marks import DotStrip, draw_interval_bar, draw_strips
+from robocov_app.replication.results import step_times
+from robocov_app.replication.results.outcomes import Outcomes, ProblemInstance
+from robocov_app.replication.results.study_results import BeyondResults, FigureRun, PaperResults
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import draw_run
 from robocov_app.report.replay import (

@@ -14,9 +14,9 @@ from robocov_app.figures.page import TITLE, Page
 from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_paired
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.look.theme import Theme
-from robocov_app.replication.contenders import OURS
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes, PairedComparison
-from robocov_app.replication.paper_figures import PAGE_SCALE, WIDE_PX
+from robocov_app.replication.design.contenders import OURS
+from robocov_app.replication.figures.paper_figures import PAGE_SCALE, WIDE_PX
+from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, PairedComparison
 
 Draw: TypeAlias = Callable[[], Figure]
 """Draws a figure."""
@@ -122,7 +122,7 @@ def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     values = np.concatenate([sample.values for sample in samples])
     low = min(float(values.min()), 0.0)
     high = float(values.max())
-    functions = (partial(_raise_signed, exponent=0.5), partial(_raise_signed, exponent=2.0))
+    functions = (partial(_compute_signed_power, exponent=0.5), partial(_compute_signed_power, exponent=2.0))
     axes.set_xscale("function", functions=functions)
     # Leave some space to the left of values below the reference.
     axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
@@ -132,7 +132,8 @@ def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     return figure
 
 
-def _raise_signed(values: Array, exponent: float) -> Array:
+def _compute_signed_power(values: Array, exponent: float) -> Array:
+    """Raise the absolute values to a power, and keep the signs."""
     return np.asarray(np.sign(values) * np.abs(values) ** exponent)
 
 

@@ -120,7 +120,7 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     """
     cell = _build_cell()
     path = find_sensor_optima(np.geomspace(_MIN_HEIGHT_M, _MAX_HEIGHT_M, _PATH_POINTS).tolist())
-    labeled = _select_labeled(path_heights=[n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)])
+    labeled = _select_labeled_optima(path_heights=[n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)])
     median = find_best_points(cell, Distance())[0]
     page = Page(size, theme, scale)
     top = 44 * scale
@@ -152,7 +152,7 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     return page.figure
 
 
-def _select_labeled(path_heights: Sequence[float]) -> list[SensorOptimum]:
+def _select_labeled_optima(path_heights: Sequence[float]) -> list[SensorOptimum]:
     """Return the limits, and the optima that are far enough from them and from each other for a label."""
     first, *inner, last = find_sensor_optima(path_heights)
     min_distance = _MIN_LABEL_DISTANCE * first.distance

@@ -7,11 +7,11 @@ from typing import TypeAlias
 from robocov.controllers import load_controller_class
 from robocov.metrics.results import read_results
 from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS, bootstrap
-from robocov_app.replication import studies
-from robocov_app.replication.contenders import RAPF_SHARED
-from robocov_app.replication.plan import Plan
-from robocov_app.replication.results import IDEAL, Degradation
-from robocov_app.replication.step_times import UNKNOWN
+from robocov_app.replication.design import studies
+from robocov_app.replication.design.contenders import RAPF_SHARED
+from robocov_app.replication.design.plan import Plan
+from robocov_app.replication.results.step_times import UNKNOWN
+from robocov_app.replication.results.study_results import IDEAL, Degradation
 from robocov_app.sweep.parameters import name_parameter_column
 
 Costs: TypeAlias = dict[tuple[str, int], float]

@@ -7,7 +7,10 @@ import numpy as np
 
 from robocov_app.figures.results import Sample
 from robocov_app.look.theme import Theme, get_theme
-from robocov_app.replication.comparison_plots import (
+from robocov_app.replication.design.contenders import OWN, TARGETS, TEAMS
+from robocov_app.replication.design.studies import DISTURBED
+from robocov_app.replication.evidence import rank_contenders
+from robocov_app.replication.figures.comparison_plots import (
     Draw,
     PairsRow,
     Plots,
@@ -16,13 +19,10 @@ from robocov_app.replication.comparison_plots import (
     plan_pairs_plot,
     select_plots,
 )
-from robocov_app.replication.contenders import OWN, TARGETS, TEAMS
-from robocov_app.replication.degradation_plot import draw_degradations
-from robocov_app.replication.evidence import rank_contenders
-from robocov_app.replication.height_plot import draw_heights
-from robocov_app.replication.paper_figures import PAGE_SCALE, WIDE_PX, draw_side_by_side
-from robocov_app.replication.results import IDEAL, BeyondResults
-from robocov_app.replication.studies import DISTURBED
+from robocov_app.replication.figures.degradation_plot import draw_degradations
+from robocov_app.replication.figures.height_plot import draw_heights
+from robocov_app.replication.figures.paper_figures import PAGE_SCALE, WIDE_PX, draw_side_by_side
+from robocov_app.replication.results.study_results import IDEAL, BeyondResults
 
 _HEIGHTS_ASPECT = 0.41
 _HEIGHTS_SCALE = 0.68 * PAGE_SCALE

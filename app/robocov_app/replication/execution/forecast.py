@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from robocov_app.replication import contenders, studies
-from robocov_app.replication.contenders import UNTUNED, Contender, build_paper_contenders
-from robocov_app.replication.plan import Plan
-from robocov_app.replication.runner import get_study_folder
+from robocov_app.replication.design import contenders, studies
+from robocov_app.replication.design.contenders import UNTUNED, Contender, build_paper_contenders
+from robocov_app.replication.design.plan import Plan
+from robocov_app.replication.execution.runner import get_study_folder
 from robocov_app.sweep import worker
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.tasks import generate_tasks

@@ -8,10 +8,15 @@ import numpy as np
 
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.metrics.results import read_results
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes, ProblemInstance, compute_mean_until
-from robocov_app.replication.plan import ROBOTS
-from robocov_app.replication.references import References
-from robocov_app.replication.studies import Contest
+from robocov_app.replication.design.plan import ROBOTS
+from robocov_app.replication.design.studies import Contest
+from robocov_app.replication.results.outcomes import (
+    GainOutcomes,
+    Outcomes,
+    ProblemInstance,
+    compute_mean_until,
+)
+from robocov_app.replication.results.references import References
 from robocov_app.sweep.study import Study
 
 EARLY_S = 20.0

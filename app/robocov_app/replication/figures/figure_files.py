@@ -8,17 +8,17 @@ from typing import NamedTuple
 from robocov.files.result_folder import report_folder_errors
 from robocov.record import Record
 from robocov_app.figures.files import save_figure
-from robocov_app.replication.beyond_plots import plan_beyond_plots
-from robocov_app.replication.comparison_plots import Draw, Plots
-from robocov_app.replication.paper_figures import (
+from robocov_app.replication.figures.beyond_plots import plan_beyond_plots
+from robocov_app.replication.figures.claim_plots import plan_paper_plots
+from robocov_app.replication.figures.comparison_plots import Draw, Plots
+from robocov_app.replication.figures.paper_figures import (
     BEST_FIGURES,
     CAPTIONS,
     FIGURES,
     describe_figure,
     draw_figure,
 )
-from robocov_app.replication.paper_plots import plan_paper_plots
-from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
+from robocov_app.replication.results.study_results import BeyondResults, FigureRun, PaperResults
 from robocov_app.terminal.progress import show_progress
 
 FIGURES_FOLDER = "figures"

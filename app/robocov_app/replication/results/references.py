@@ -15,7 +15,7 @@ from robocov_app.evaluation.reference_search import (
     ReferenceQuery,
     answer_queries,
 )
-from robocov_app.replication.plan import ROBOTS, TEAM, Plan
+from robocov_app.replication.design.plan import ROBOTS, TEAM, Plan
 from robocov_app.sweep.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress

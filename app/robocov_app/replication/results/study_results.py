@@ -7,11 +7,11 @@ from typing import TypeAlias
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.contenders import Contender
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes, ProblemInstance
-from robocov_app.replication.plan import Plan
-from robocov_app.replication.references import References
-from robocov_app.replication.step_times import StepTimes
+from robocov_app.replication.design.contenders import Contender
+from robocov_app.replication.design.plan import Plan
+from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, ProblemInstance
+from robocov_app.replication.results.references import References
+from robocov_app.replication.results.step_times import StepTimes
 
 ShownRuns: TypeAlias = list[tuple[ProblemInstance, Record]]
 """Runs that were repeated to be shown."""

@@ -16,7 +16,7 @@ from robocov.files.writing import replace_file
 from robocov.record import list_versions
 from robocov.scenario import Scenario
 from robocov_app.figures.statistics import Interval, bootstrap
-from robocov_app.replication.plan import TEAM, Plan
+from robocov_app.replication.design.plan import TEAM, Plan
 from robocov_app.sweep.parameters import build_swept_team
 
 BASELINE = "rapf"

@@ -25,11 +25,11 @@ from robocov_app.figures.page import SMALL, TITLE, Page, tone
 from robocov_app.look.colors import mix
 from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
-from robocov_app.replication.contenders import ASSETS
+from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.formatting import format_amount
-from robocov_app.replication.outcome_tables import FIRST_MINUTE_S
-from robocov_app.replication.outcomes import compute_matched_distance, compute_mean_until
-from robocov_app.replication.results import FigureRun
+from robocov_app.replication.results.outcome_tables import FIRST_MINUTE_S
+from robocov_app.replication.results.outcomes import compute_matched_distance, compute_mean_until
+from robocov_app.replication.results.study_results import FigureRun
 
 PAGE_SCALE = 3.0
 """Scale of the pages: 300 dots per inch."""

@@ -4,14 +4,11 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import TypeAlias
 
 from robocov.controllers import CONTROLLERS, get_gain_values, make_controller
 from robocov.controllers.gains import Value, format_value
-
-ASSETS = Path(__file__).parent / "assets"
-"""Folder of templates, captions and gain grids."""
+from robocov_app.replication.assets import ASSETS
 
 PAPER = ("rapf", "rpf", "lloyd")
 """Controllers of the paper's claims."""

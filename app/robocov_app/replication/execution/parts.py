@@ -1,4 +1,7 @@
-"""Executing the study: all runs, in an order in which each has the results that it depends on."""
+"""The parts of the study: figures, the paper's claims, and the results beyond the paper.
+
+The runs are executed in an order in which each has the results that it depends on.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -13,34 +16,46 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov.record import Record
-from robocov_app.replication import studies
-from robocov_app.replication.contenders import OURS, OWN, RAPF_SHARED, Contender, build_paper_contenders
-from robocov_app.replication.degradations import read_degradations
-from robocov_app.replication.forecast import is_gain_grid_finished
-from robocov_app.replication.outcome_tables import read_gain_outcomes, read_outcomes
-from robocov_app.replication.outcomes import (
-    GainOutcomes,
-    Outcomes,
-    ProblemInstance,
-    find_best_gains,
-    merge_outcomes,
+from robocov_app.replication.design import studies
+from robocov_app.replication.design.contenders import (
+    OURS,
+    OWN,
+    RAPF_SHARED,
+    Contender,
+    build_paper_contenders,
 )
-from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
-from robocov_app.replication.references import References
-from robocov_app.replication.results import BeyondResults, DensityResults, FigureRun, PaperResults, ShownRuns
-from robocov_app.replication.runner import (
+from robocov_app.replication.design.plan import PARTITION_SEED, ROBOTS, Plan
+from robocov_app.replication.design.study_maps import (
+    build_baseline_maps,
+    build_density_maps,
+    build_generated_maps,
+    build_unseen_maps,
+)
+from robocov_app.replication.execution.forecast import is_gain_grid_finished
+from robocov_app.replication.execution.runner import (
     RunnerOptions,
     find_map_references,
     get_study_folder,
     run_studies,
     run_study,
 )
-from robocov_app.replication.step_times import StepTimes, measure_step_times
-from robocov_app.replication.study_maps import (
-    build_baseline_maps,
-    build_density_maps,
-    build_generated_maps,
-    build_unseen_maps,
+from robocov_app.replication.results.degradations import read_degradations
+from robocov_app.replication.results.outcome_tables import read_gain_outcomes, read_outcomes
+from robocov_app.replication.results.outcomes import (
+    GainOutcomes,
+    Outcomes,
+    ProblemInstance,
+    find_best_gains,
+    merge_outcomes,
+)
+from robocov_app.replication.results.references import References
+from robocov_app.replication.results.step_times import StepTimes, measure_step_times
+from robocov_app.replication.results.study_results import (
+    BeyondResults,
+    DensityResults,
+    FigureRun,
+    PaperResults,
+    ShownRuns,
 )
 from robocov_app.sweep import worker
 from robocov_app.sweep.study import Study
@@ -156,10 +171,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
         claims = paper.claims
     else:
         papers, claims, references = _run_claims_only(folder, plan, options)
-    gains: dict[str, GainOutcomes] = {}
-    tuning = studies.build_baseline_gains_study(plan)
-    if tuning is not None:
-        gains, _ = _run_gain_grid(tuning, studies.BASELINE_GAINS, folder, plan, options)
+    gains = _run_baseline_gain_grids(folder, plan, options)
     contests = studies.build_beyond_contests(plan, find_best_gains(gains), papers)
     maps = (*build_generated_maps(plan.beyond.maps), *build_unseen_maps(plan))
     references |= find_map_references(maps, folder, plan, options)
@@ -170,12 +182,11 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
         name: read_outcomes(get_study_folder(folder, name), contest, references)
         for name, contest in contests.items()
     }
-    sides = [name for name in contests if name == "rivals" or name.startswith("ours-")]
-    all_outcomes = merge_outcomes(
-        [select_baseline_outcomes(claims, plan), *(outcomes[name] for name in sides)]
-    )
+    ranked_names = [name for name in contests if name == "rivals" or name.startswith("ours-")]
+    ranked_outcomes = [outcomes[name] for name in ranked_names]
+    all_outcomes = merge_outcomes([select_baseline_outcomes(claims, plan), *ranked_outcomes])
     all_contenders = list(papers)
-    for name in sides:
+    for name in ranked_names:
         all_contenders += contests[name].contenders
     own_study = contests[f"ours-{OURS[0]}"].study
     names = [*sweeps, studies.BASELINE_GAINS] if gains else list(sweeps)
@@ -211,6 +222,15 @@ def _run_claims_only(
     references |= find_map_references(contest.study.maps, folder, plan, options)
     target = run_study(contest.study, folder, "claims", options)
     return papers, read_outcomes(target, contest, references), references
+
+
+def _run_baseline_gain_grids(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, GainOutcomes]:
+    """Run the gain grids of the baselines, if the plan tunes them; return their outcomes by controller."""
+    tuning = studies.build_baseline_gains_study(plan)
+    if tuning is None:
+        return {}
+    outcomes, _ = _run_gain_grid(tuning, studies.BASELINE_GAINS, folder, plan, options)
+    return outcomes
 
 
 def _run_gain_grid(

@@ -12,8 +12,8 @@ from robocov_app.figures.page import SMALL, TEXT, Page, quiet_axes, tone
 from robocov_app.look.colors import mix
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.look.theme import LIGHT, Theme, get_theme
-from robocov_app.replication.paper_figures import CAPTIONS
-from robocov_app.replication.results import Degradation
+from robocov_app.replication.figures.paper_figures import CAPTIONS
+from robocov_app.replication.results.study_results import Degradation
 from robocov_app.sweep.parameters import UNITS
 
 _SIZE_PX = (1180, 720)
@@ -55,7 +55,9 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
         y = 100 + row * panel_height
         axes = page.axes((x, y, panel_width - 60, panel_height - 84))
         axes.set_ylim(bottom, top)
-        _draw_panel(axes, name, [each for each in degradations if each.axis == name], theme)
+        _draw_panel(
+            axes, name, [degradation for degradation in degradations if degradation.axis == name], theme
+        )
     handles, labels = page.figure.axes[0].get_legend_handles_labels()
     page.figure.legend(
         handles,

@@ -4,7 +4,8 @@ from functools import partial
 
 from robocov_app.look.theme import Theme, get_theme
 from robocov_app.replication.claims.thresholds import CLUSTERED
-from robocov_app.replication.comparison_plots import (
+from robocov_app.replication.design.contenders import LABELS
+from robocov_app.replication.figures.comparison_plots import (
     CostRow,
     PairsRow,
     Plots,
@@ -14,9 +15,8 @@ from robocov_app.replication.comparison_plots import (
     plan_pairs_plot,
     select_plots,
 )
-from robocov_app.replication.contenders import LABELS
-from robocov_app.replication.outcomes import Outcomes
-from robocov_app.replication.results import PaperResults
+from robocov_app.replication.results.outcomes import Outcomes
+from robocov_app.replication.results.study_results import PaperResults
 
 
 def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:

@@ -10,8 +10,8 @@ from pathlib import Path
 from robocov.errors import InputError
 from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import replace_file
-from robocov_app.replication.plan import Plan
-from robocov_app.replication.references import References, find_references
+from robocov_app.replication.design.plan import Plan
+from robocov_app.replication.results.references import References, find_references
 from robocov_app.sweep import worker
 from robocov_app.sweep.ledger import Ledger, open_ledger
 from robocov_app.sweep.local_pool import LocalPool
@@ -75,7 +75,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
         with replace_file(path) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
-    problem = "the folder is not empty, and what is in it is no study of the paper"
+    problem = "expected an empty folder or a study of the paper"
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["format"] == _HEAD["format"]:

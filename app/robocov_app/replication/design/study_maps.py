@@ -13,7 +13,7 @@ from robocov.errors import StartError
 from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov_app.evaluation.hot_spots import add_hot_spots
-from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, UNSEEN, Plan
+from robocov_app.replication.design.plan import CONVEX, CONVEX_KINDS, KINDS, UNSEEN, Plan
 from robocov_app.sweep.study import StudyMap
 
 START_RADII_M = (0.8, 0.6, 0.45)

@@ -263,7 +263,7 @@ def compute_mean_until(history: CostHistory, until: float) -> float:
 
 
 def compute_matched_distance(first: Array, second: Array) -> float:
-    """Compute the distance between two placements, whatever the order of their robots.
+    """Compute the distance between two placements of robots that are interchangeable.
 
     Parameters
     ----------

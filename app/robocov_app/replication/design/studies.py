@@ -12,10 +12,17 @@ from typing import Any, NamedTuple, TypeAlias
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import Value
 from robocov.mapfile import load_map
-from robocov_app.replication import contenders
-from robocov_app.replication.contenders import LLOYD, OWN, RAPF_DEFAULT, RAPF_SHARED, RPF_SHARED, Contender
-from robocov_app.replication.plan import CONVEX_KINDS, KINDS, ROBOTS, TEAM, Plan
-from robocov_app.replication.study_maps import (
+from robocov_app.replication.design import contenders
+from robocov_app.replication.design.contenders import (
+    LLOYD,
+    OWN,
+    RAPF_DEFAULT,
+    RAPF_SHARED,
+    RPF_SHARED,
+    Contender,
+)
+from robocov_app.replication.design.plan import CONVEX_KINDS, KINDS, ROBOTS, TEAM, Plan
+from robocov_app.replication.design.study_maps import (
     build_baseline_maps,
     build_claim_maps,
     build_convex_maps,

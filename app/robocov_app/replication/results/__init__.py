@@ -1,0 +1,8 @@
+"""Results of the study.
+
+- `outcomes`, `outcome_tables`: outcomes of contenders on the same problem instances, and how they are read
+- `degradations`: final costs with disturbances, relative to those under ideal conditions
+- `references`: the reference placement of every map
+- `step_times`: computing times of a step of every controller
+- `study_results`: all results together
+"""
