@@ -83,9 +83,9 @@ def _run_protected(name: str, rest: list[str], *, may_supervise: bool) -> int:
     """Run a subcommand so that a user's controller cannot hide its failure, and return its exit status."""
     from robocov_app.terminal.standard_streams import StandardStreams
     from robocov_app.terminal.supervision import (
-        begin_supervised,
         can_supervise,
         find_own_controllers,
+        prepare_supervision,
         report_status,
         supervise,
     )
@@ -94,7 +94,7 @@ def _run_protected(name: str, rest: list[str], *, may_supervise: bool) -> int:
     if may_supervise and controllers and can_supervise():
         status, complaint = supervise(controllers)
         return _print_error(complaint, FAILED) if complaint else status
-    descriptor = begin_supervised() if may_supervise else None
+    descriptor = prepare_supervision() if may_supervise else None
     streams = StandardStreams()
     try:
         status = _run_command(name, rest)

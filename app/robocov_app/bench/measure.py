@@ -23,9 +23,9 @@ class Row:
     part : str
         Part of the benchmark, as in `robocov bench PART`.
     name : str
-        What is measured.
+        Name of the measured work.
     parameters : Mapping
-        What is varied, for example ``{"robots": 50}``.
+        Varied parameters, for example ``{"robots": 50}``.
     seconds : float
         Median time, s.
     yardstick : str, optional
@@ -37,7 +37,7 @@ class Row:
     goal_seconds : float, optional
         Maximum time, s.
     note : str
-        The time in other words, for example "95 x real time".
+        The time in another unit, for example "95 x real time".
     before : float, optional
         Approximate ratio when nothing was compiled (commit 8838167).
     """

@@ -12,7 +12,7 @@ from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
 from robocov_app.look.theme import LIGHT, Theme
 
-NOTE = "medians of calls in turn on one thread; below 1 robocov is quicker; a bar marks what is wanted"
+NOTE = "medians of calls in turn on one thread; below 1 robocov is faster; a bar marks the goal"
 HEADINGS = {
     "step": "Simulated step",
     "maps": "Exact coverage cost on maps",

@@ -50,8 +50,8 @@ def refine_cost_for_figures(
     ----------
     environment : Environment
     cost : CoverageCost
-        Cost of this map. It is returned if it is fine enough, or the map has so many vertices that a finer
-        one would take too long.
+        Cost of this map. It is returned if it is fine enough, or if a finer one would take too long because
+        the map has too many vertices.
     lattice : int or None
         Coarsest lattice; `MIN_FIGURE_LATTICE` by default.
 

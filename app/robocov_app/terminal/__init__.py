@@ -1,8 +1,8 @@
 """Terminal services of the commands.
 
-- `arguments`: the words of a command line, parsed
+- `arguments`: parses command lines
 - `output`, `progress`: answers, tables, small files and progress
-- `interruption`: Ctrl-C that keeps what has been computed
+- `interruption`: Ctrl-C that keeps the results so far
 - `standard_streams`, `supervision`: protection against controllers that close streams or end Python
 - `file_watching`: files that are checked again when they change
 """

@@ -121,7 +121,7 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
 
 
 def _add_suggestion(problem: str, kind: Any, command: str) -> str:
-    """Return a problem with what the user may have meant."""
+    """Return a problem with a suggestion, if the user may have meant another option."""
     names = _list_option_names(kind)
     options = [f"--{name}" for name in names]
     match = re.match(r"unexpected argument (\S+)", problem)

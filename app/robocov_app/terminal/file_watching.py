@@ -1,4 +1,4 @@
-"""Files that are watched for changes, in whatever way editors write them."""
+"""Watching files for changes, which editors write in different ways."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -37,7 +37,7 @@ def watch_files(
         first = [_get_state(path) for path in paths]
         if first == known:
             continue
-        settled = _wait_until_settled(paths, first, sleep)
+        settled = _wait_for_end_of_changes(paths, first, sleep)
         changed = []
         for path, old, new, newest in zip(paths, known, first, settled, strict=True):
             if not old == new == newest:
@@ -47,7 +47,7 @@ def watch_files(
         yield tuple(changed)
 
 
-def _wait_until_settled(
+def _wait_for_end_of_changes(
     paths: Sequence[Path], states: list[_State], sleep: Callable[[float], None]
 ) -> list[_State]:
     """Wait until the states of files stay the same, and return them."""

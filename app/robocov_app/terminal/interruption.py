@@ -1,4 +1,4 @@
-"""Ctrl-C that keeps what has been computed."""
+"""Ctrl-C that keeps the results so far."""
 
 import os
 import signal

@@ -221,7 +221,10 @@ def create_console() -> Console:
     from rich.console import Console
 
     class SafeConsole(Console):
+        """A console that prints no control characters."""
+
         def print(self, *objects: Any, **options: Any) -> None:
+            """Print objects; control characters in texts are escaped."""
             safe = [escape_controls(item) if isinstance(item, str) else item for item in objects]
             super().print(*safe, **options)
 

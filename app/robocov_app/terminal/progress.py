@@ -37,13 +37,14 @@ def show_progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Ca
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-        columns = (
+        progress_bar = Progress(
             TextColumn(f"{label:<12}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TimeRemainingColumn(elapsed_when_finished=True),
+            console=Console(stderr=True),
         )
-        with Progress(*columns, console=Console(stderr=True)) as bar:
+        with progress_bar as bar:
             task = bar.add_task(label, total=total)
             yield lambda finished: bar.update(task, completed=finished)
     else:

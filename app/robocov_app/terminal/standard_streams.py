@@ -28,7 +28,7 @@ class StandardStreams:
             os.close(descriptor)
         self._duplicates.clear()
 
-    def find_closed(self) -> list[str]:
+    def list_closed_streams(self) -> list[str]:
         """Return the labels of the closed streams, as "standard output"."""
         return [_LABELS[name] for name in self._streams if self._is_closed(name)]
 
@@ -38,9 +38,9 @@ class StandardStreams:
         Returns
         -------
         list of str
-            Labels of the streams that were closed, see `find_closed`.
+            Labels of the streams that were closed, see `list_closed_streams`.
         """
-        closed_labels = self.find_closed()
+        closed_labels = self.list_closed_streams()
         for name in _DESCRIPTORS:
             if self._is_closed(name) and name in self._duplicates:
                 os.dup2(self._duplicates[name], _DESCRIPTORS[name])

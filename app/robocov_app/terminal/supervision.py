@@ -124,7 +124,7 @@ def _read_message(descriptor: int) -> bytes:
         return pipe.read() or b""
 
 
-def begin_supervised() -> int | None:
+def prepare_supervision() -> int | None:
     """Prepare this process to be supervised, if it is; it then ends with its parent.
 
     Returns
@@ -154,7 +154,7 @@ def report_status(descriptor: int, status: int) -> None:
     Parameters
     ----------
     descriptor : int
-        Descriptor that `begin_supervised` returned.
+        Descriptor that `prepare_supervision` returned.
     status : int
         Exit status of the command.
     """

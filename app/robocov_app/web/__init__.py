@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def prepare(options: Any, folder: Path) -> None:
-    """Check what a served window needs before anything is opened for it.
+    """Check the requirements of a served window before anything is opened for it.
 
     Parameters
     ----------

@@ -79,12 +79,16 @@ class Listener:
         listener = self
 
         class Connection(ServerConnection):
+            """A connection that reports its beginning and its end to the listener."""
+
             def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                """Limit the time until a request arrives."""
                 super().connection_made(transport)
-                listener._on_connected(self)
+                listener._add_connection(self)
 
             def connection_lost(self, error: Exception | None) -> None:
-                listener._on_lost(self)
+                """Forget the connection."""
+                listener._remove_connection(self)
                 super().connection_lost(error)
 
         _raise_file_limit()
@@ -104,14 +108,14 @@ class Listener:
                 max_size=MAX_MESSAGE_BYTES,
                 max_queue=MAX_QUEUED_MESSAGES,
                 write_limit=WRITE_LIMIT_BYTES,
-                open_timeout=None,  # see `_on_connected`: the answer may be a large file
+                open_timeout=None,  # see `_add_connection`: the answer may be a large file
                 close_timeout=CLOSE_TIMEOUT_S,
                 logger=logger,
             )
         except OSError as error:
             raise build_listen_error(host, port, error) from None
-        found: int = self._server.sockets[0].getsockname()[1]
-        return found
+        actual_port: int = self._server.sockets[0].getsockname()[1]
+        return actual_port
 
     async def close(self) -> None:
         """Close the sockets of all pages, and end all connections."""
@@ -127,7 +131,7 @@ class Listener:
             connection.transport.abort()
         await closed
 
-    def _on_connected(self, connection: ServerConnection) -> None:
+    def _add_connection(self, connection: ServerConnection) -> None:
         self._connections.add(connection)
         timer = asyncio.get_running_loop().call_later(REQUEST_TIMEOUT_S, self._abort_silent, connection)
         self._unanswered[connection] = timer
@@ -138,12 +142,12 @@ class Listener:
         if connection.request is None:
             connection.transport.abort()
 
-    def _on_lost(self, connection: ServerConnection) -> None:
+    def _remove_connection(self, connection: ServerConnection) -> None:
         self._connections.discard(connection)
         self._files.pop(connection, None)
-        self._on_answered(connection)
+        self._stop_request_timer(connection)
 
-    def _on_answered(self, connection: ServerConnection) -> None:
+    def _stop_request_timer(self, connection: ServerConnection) -> None:
         timer = self._unanswered.pop(connection, None)
         if timer is not None:
             timer.cancel()
@@ -171,13 +175,13 @@ class Listener:
 
     def _extend_timeout(self, connection: ServerConnection, n_bytes: int) -> None:
         """Give a browser with a slow connection enough time to download a file."""
-        self._on_answered(connection)
+        self._stop_request_timer(connection)
         self._files[connection] = n_bytes
         connection.close_timeout = RESPONSE_TIMEOUT_S
         asyncio.get_running_loop().call_later(RESPONSE_TIMEOUT_S, connection.transport.abort)
 
     async def _handle_socket(self, connection: ServerConnection) -> None:
-        self._on_answered(connection)
+        self._stop_request_timer(connection)
         try:
             await self._talk(connection)
         except Exception:

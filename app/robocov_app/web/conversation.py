@@ -65,15 +65,18 @@ class _EventBudget:
 
     @property
     def is_exceeded(self) -> bool:
+        """Whether the page has sent more events than it may."""
         return self._remaining < 0.0
 
     def refill(self) -> None:
+        """Add the events of the time since the last call."""
         now = monotonic()
         gained = (now - self._refilled_at) * MAX_EVENTS_PER_S
         self._remaining = min(self._remaining + gained, MAX_EVENTS_PER_S)
         self._refilled_at = now
 
     def spend(self, event_count: float) -> None:
+        """Subtract events that the page has sent."""
         self._remaining -= event_count
 
 
@@ -228,7 +231,7 @@ class Conversation:
                     await self._send(frame)
 
     async def _send_state(self) -> None:
-        """Send the state of the window and the people, if it differs from what was sent last."""
+        """Send the state of the window and the people, if it differs from the last one that was sent."""
         page = self._page
         state = {
             **self._shared.state,

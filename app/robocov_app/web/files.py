@@ -68,6 +68,7 @@ class Upload:
 
     @property
     def is_complete(self) -> bool:
+        """Whether all of the file has arrived."""
         return self._remaining == 0
 
     def add(self, piece: bytes) -> None:

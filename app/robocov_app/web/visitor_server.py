@@ -237,7 +237,7 @@ class VisitorServer:
         visitor = read_id(self._read_token(request))
         window = await self._find_or_open(visitor)
         if window is None:
-            await connection.close(TRY_AGAIN_LATER, self._describe_lack_of_windows())
+            await connection.close(TRY_AGAIN_LATER, self._explain_waiting())
             return
         window.page_count += 1
         try:
@@ -252,7 +252,7 @@ class VisitorServer:
             window.page_count -= 1
             window.idle_since = monotonic()
 
-    def _describe_lack_of_windows(self) -> str:
+    def _explain_waiting(self) -> str:
         if self._max_windows == 1:
             return "The only window is in use. Trying again …"
         return f"All {self._max_windows} windows are in use. Trying again …"

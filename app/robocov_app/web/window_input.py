@@ -44,7 +44,7 @@ class WindowInput:
 
     @property
     def is_full(self) -> bool:
-        """Whether so many messages wait that no more should be read."""
+        """Whether too many messages wait to read more of them."""
         return len(self._messages) > MAX_WAITING_MESSAGES
 
     def put(self, message: InputMessage | Uploaded) -> None:

@@ -227,6 +227,7 @@ class Panel(SidePanel):
             self.ui.needs_redraw = True
 
     def show_content(self, ui: Ui) -> None:
+        """Show the title of the map, its files, the tools and the open tab."""
         ui.inset(12, 8, 12)
         document = self.editor.document
         suffix = ", not saved" if document.history.has_unsaved_changes else ""
