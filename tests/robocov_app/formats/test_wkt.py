@@ -13,7 +13,7 @@ from vector_files import read
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
 from robocov_app.formats.geometry.shapes import Shapes
-from robocov_app.formats.wkt import WktText
+from robocov_app.formats.wkt.parser import WktParser
 
 HALL = "POLYGON ((0 0, 10 0, 10 5, 0 5, 0 0), (1 1, 2 1, 2 2, 1 2, 1 1))"
 
@@ -240,6 +240,6 @@ _GEOMETRY = st.recursive(
 def test_coordinates_are_those_that_shapely_reads(geometry: Any, flat: bool) -> None:
     text = shapely.to_wkt(geometry, rounding_precision=-1)
     shapes = Shapes("plan", ReadOptions())
-    figures = WktText(text, "plan", shapes).parse()
+    figures = WktParser(text, "plan", shapes).parse()
     found = [tuple(point) for figure in figures for ring in figure.rings for point in ring.tolist()]
     assert found == [tuple(point) for point in shapely.get_coordinates(shapely.from_wkt(text)).tolist()]

@@ -1,0 +1,74 @@
+"""A text that is read from its start to its end, and the position of errors in it."""
+
+from __future__ import annotations
+
+import re
+from typing import NoReturn
+
+from robocov.errors import MapError, quote
+from robocov.files.json_positions import find_line_and_column
+
+_SPACE = re.compile(r"\s*")
+_MAX_QUOTED_CHARACTERS = 24
+
+
+class Scanner:
+    """A text and the position up to which it was read.
+
+    Parameters
+    ----------
+    text : str
+    where : str
+        The file, for messages.
+
+    Attributes
+    ----------
+    text : str
+    position : int
+        Index of the next character.
+    """
+
+    def __init__(self, text: str, where: str) -> None:
+        self.text = text
+        self.position = 0
+        self._where = where
+
+    def skip_space(self) -> None:
+        """Move past white space."""
+        match = _SPACE.match(self.text, self.position)
+        assert match is not None  # The pattern matches an empty text, too.
+        self.position = match.end()
+
+    def is_at_end(self) -> bool:
+        """Move past white space, and return whether nothing follows."""
+        self.skip_space()
+        return self.position == len(self.text)
+
+    def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        """Return the match of a pattern at the position, without moving past it."""
+        return pattern.match(self.text, self.position)
+
+    def accept(self, characters: str) -> bool:
+        """Move past white space and one of some characters, if it follows; return whether it did."""
+        self.skip_space()
+        character = self.text[self.position : self.position + 1]
+        if not character or character not in characters:
+            return False
+        self.position += 1
+        return True
+
+    def expect(self, character: str) -> None:
+        """Move past white space and a character. Raises MapError if another one follows."""
+        if not self.accept(character):
+            self.refuse(f"expected {character}, got {self.quote_next()}")
+
+    def quote_next(self) -> str:
+        """Move past white space, and return the beginning of the following line for a message."""
+        self.skip_space()
+        lines = self.text[self.position : self.position + _MAX_QUOTED_CHARACTERS].splitlines()
+        return quote(lines[0]) if lines else "the end"
+
+    def refuse(self, problem: str, position: int | None = None) -> NoReturn:
+        """Raise a MapError about a position, by default the next character."""
+        line, column = find_line_and_column(self.text, self.position if position is None else position)
+        raise MapError(f"{self._where}:{line}:{column}: {problem}")
