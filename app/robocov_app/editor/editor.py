@@ -15,30 +15,13 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem, translate_message
 from robocov_app.editor.settings import LAYERS, EditorSettings
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.density import DensityTool
-from robocov_app.editor.tools.door import DoorTool
-from robocov_app.editor.tools.draw import (
-    BoundaryTool,
-    CircleTool,
-    DiscTool,
-    MeasureTool,
-    PlacesTool,
-    PolygonTool,
-    RectangleTool,
-    WallTool,
-)
-from robocov_app.editor.tools.motion_path import MotionPathTool
-from robocov_app.editor.tools.reference_image import ReferenceImageTool
-from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.snapping import SNAPS, count_vertices
 from robocov_app.editor.tools.tool import EditorTool
+from robocov_app.editor.tools.toolbox import EditorToolbox
 from robocov_app.jobs.workers import Worker
 from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
-from robocov_app.toolkit.faults import describe_os_error
 
-MESSAGE_S = 5.0  # time for which a message is shown
-ERROR_MESSAGE_S = 8.0
 MAX_LIVE_VERTICES = 1500  # larger maps are not measured while something is dragged
 GRIDS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 MAX_ROBOTS = 1000
@@ -61,12 +44,8 @@ class Editor(EditorContext):
 
     Attributes
     ----------
-    selector : SelectTool
-        The selection tool.
-    tools : dict of str to EditorTool
-        All tools by their names, in the order in which they are shown.
-    tool : EditorTool
-        The tool in use.
+    toolbox : EditorToolbox
+        The tools, and the one in use.
     theme : str
         Colors: "light" or "dark".
     panel : bool
@@ -99,6 +78,8 @@ class Editor(EditorContext):
         Time since which moving obstacles are shown moving, s; None while they stand.
     """
 
+    error_message_s = 8.0
+
     def __init__(
         self,
         document: Document,
@@ -109,11 +90,7 @@ class Editor(EditorContext):
         super().__init__(document)
         self.measurement_worker = measurement_worker
         self.folder = folder
-        self.selector = SelectTool()
-        self.tape = MeasureTool()
-        self.density_tool = DensityTool()
-        self.tools: dict[str, EditorTool] = {tool.name: tool for tool in self._list_tools()}
-        self.tool: EditorTool = self.selector
+        self.toolbox = EditorToolbox()
         self.theme: str = settings.theme
         self.panel = True
         self.shown = set(settings.shown) & set(LAYERS)
@@ -135,28 +112,15 @@ class Editor(EditorContext):
         self.moves_since: float | None = None
         self._measured: tuple[Sketch, float] | None = None  # sketch and radius last sent to the worker
 
-    def _list_tools(self) -> list[EditorTool]:
-        return [
-            self.selector,
-            PanTool(),
-            PolygonTool(),
-            RectangleTool(),
-            CircleTool(),
-            WallTool(),
-            DoorTool(),
-            BoundaryTool(),
-            self.tape,
-            DiscTool(),
-            PlacesTool(),
-            self.density_tool,
-            MotionPathTool(),
-            ReferenceImageTool(),
-        ]
+    @property
+    def tool(self) -> EditorTool:
+        """The tool in use."""
+        return self.toolbox.current
 
     @property
     def displayed(self) -> tuple[Sketch, Selection]:
         """Map and selection as shown: during a drag, as a release would make them."""
-        drag = self.selector.drag
+        drag = self.toolbox.selector.drag
         if drag is None or drag.change is None:
             return self.sketch, self.selection
         return drag.change.sketch, drag.change.selection
@@ -204,7 +168,7 @@ class Editor(EditorContext):
         if steps == 1:
             self.show_message(f"undone: {change.description}" if change else "nothing to undo")
         elif steps == -1:
-            self.show_message(f"done again: {change.description}" if change else "nothing to do again")
+            self.show_message(f"redone: {change.description}" if change else "nothing to redo")
         self._handle_change()
 
     def open_document(self, document: Document) -> None:
@@ -212,27 +176,18 @@ class Editor(EditorContext):
         self.document = document
         self.measurement = None
         self._measured = None
-        self.selector.cancel(self)
+        self.toolbox.selector.cancel(self)
         self.choose_tool("select", shows_hint=False)
         self._handle_change()
 
     def choose_tool(self, name: str, *, shows_hint: bool = True) -> None:
         """Choose a tool by its name."""
         self.tool.cancel(self)
-        self.tool = self.tools[name]
+        self.toolbox.current = self.toolbox.by_name[name]
         self.typed = ""
         self.revision += 1
         if shows_hint:
             self.show_message(self.tool.hint)
-
-    def attempt(self, action: Callable[[], object]) -> None:
-        """Carry an action out, and show its message or its error."""
-        try:
-            self.carry_out(action)
-        except RobocovError as error:
-            self.show_message(str(error), is_error=True)
-        except OSError as error:
-            self.show_message(describe_os_error(error), is_error=True)
 
     def carry_out(self, action: Callable[[], object]) -> None:
         """Carry an action out, and show the message that it returns.
@@ -242,13 +197,10 @@ class Editor(EditorContext):
         MapError
             If the action fails. Objects are named as in the window, not by their place in the file.
         """
-        self.revision += 1
         try:
-            message = action()
+            super().carry_out(action)
         except RobocovError as error:
             raise MapError(translate_message(str(error), self.sketch)) from None
-        if isinstance(message, str):
-            self.show_message(message)
 
     def ask_question(self, title: str, text: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
         """Ask a question.
@@ -263,12 +215,9 @@ class Editor(EditorContext):
         buttons = [Answer(label, partial(self.attempt, action), key) for label, key, action in answers]
         self.dialogs.ask(Question(title, text, buttons, on_cancel=buttons[-1].call))
 
-    def advance(self, seconds: float) -> None:
+    def pass_time(self, seconds: float) -> None:
         """Advance the clock: old messages go, and measurements arrive."""
-        self.now += seconds
-        duration = ERROR_MESSAGE_S if self.has_error_message else MESSAGE_S
-        if self.message and self.now - self.message_time > duration:
-            self.message = ""
+        super().pass_time(seconds)
         measurement = self.measurement_worker.poll()
         if measurement is not None:
             self.measurement = measurement

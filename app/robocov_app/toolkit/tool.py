@@ -1,8 +1,9 @@
 """Tools: base class of the mouse actions in a map, the events that they get, and what they show."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import dist
-from typing import Generic, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 Point: TypeAlias = tuple[float, float]
 CursorShape: TypeAlias = Literal["arrow", "cross", "hand", "move", "sideways", "updown", "rising", "falling"]
@@ -119,3 +120,27 @@ class Tool(Generic[ContextT, EventT]):
     def choose_cursor(self, context: ContextT) -> CursorShape:
         """Return the shape of the cursor over the map."""
         return "cross"
+
+
+ToolT = TypeVar("ToolT", bound=Tool[Any, Any])
+
+
+class Toolbox(Generic[ToolT]):
+    """The tools of a window, and the one in use.
+
+    Parameters
+    ----------
+    tools : iterable of Tool
+        The tools, in the order of the panel. The first is in use until another one is chosen.
+
+    Attributes
+    ----------
+    by_name : dict of str to Tool
+        The tools by their names.
+    current : Tool
+        The tool in use.
+    """
+
+    def __init__(self, tools: Iterable[ToolT]) -> None:
+        self.by_name = {tool.name: tool for tool in tools}
+        self.current: ToolT = next(iter(self.by_name.values()))

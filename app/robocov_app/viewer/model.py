@@ -5,20 +5,18 @@ from collections.abc import Callable, Iterable
 from robocov.controllers import CONTROLLERS
 from robocov.environment import Environment
 from robocov.errors import RobocovError
-from robocov_app.toolkit.faults import describe_os_error
+from robocov_app.toolkit.window_model import WindowModel
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.tool import ViewerTool
-from robocov_app.viewer.tools.toolbox import Toolbox
+from robocov_app.viewer.tools.toolbox import ViewerToolbox
 from robocov_app.viewer.view import ViewState
 
-MESSAGE_S = 5.0  # a status message disappears after this time
 
-
-class ViewerModel:
+class ViewerModel(WindowModel):
     """State of the viewer; knows no pygame.
 
     Parameters
@@ -38,18 +36,10 @@ class ViewerModel:
         Visible layers and other options of the window.
     inspection : Inspection
         Selected robot, active pane and cursor.
-    toolbox : Toolbox
+    toolbox : ViewerToolbox
         The tools, and the one in use.
     controllers : list of str
         Names of the controllers that are offered.
-    revision : int
-        Grows whenever panel and canvas have to be drawn again.
-    message : str
-        Status message; empty after a few seconds.
-    has_error_message : bool
-        Whether the message reports an error.
-    now : float
-        Time since the window was opened, s.
     settled_change : Node or None
         Change after which the team has settled, even if it moves a little again.
     """
@@ -57,18 +47,14 @@ class ViewerModel:
     def __init__(
         self, session: Session, costs: Costs, layers: set[str], controllers: Iterable[str] = ()
     ) -> None:
+        super().__init__()
         self.session = session
         self.costs = costs
         self.view = ViewState(layers)
         self.inspection = Inspection()
-        self.toolbox = Toolbox(self.inspection)
+        self.toolbox = ViewerToolbox(self.inspection)
         self.controllers = list(dict.fromkeys([*CONTROLLERS, *controllers]))
-        self.revision = 0
-        self.message = ""
-        self.has_error_message = False
-        self.now = 0.0
         self.settled_change: Node | None = None
-        self._message_time = 0.0
         self._cost_map: Environment | None = None
         self.update_cost_map()
 
@@ -98,36 +84,14 @@ class ViewerModel:
         selected = self.inspection.selected
         return selected if selected in self.robot_numbers else None
 
-    def show_message(self, text: str, *, is_error: bool = False) -> None:
-        """Show a status message; an empty one leaves the present message."""
-        if text:
-            self.message = text
-            self.has_error_message = is_error
-            self._message_time = self.now
-
-    def clear_message(self) -> None:
-        """Remove the status message."""
-        self.message = ""
-
-    def pass_time(self, seconds: float) -> None:
-        """Remove the status message once it has been shown long enough."""
-        self.now += seconds
-        if self.message and self.now - self._message_time > MESSAGE_S:
-            self.clear_message()
-
     def attempt(self, action: Callable[[], object]) -> None:
-        """Run an action; show the message that it returns, or its error."""
-        try:
-            message = action()
-        except RobocovError as error:
-            self.show_message(simplify_message(str(error)), is_error=True)
-        except OSError as error:
-            self.show_message(describe_os_error(error), is_error=True)
-        else:
-            if isinstance(message, str):
-                self.show_message(message)
-        self.revision += 1
+        """Carry an action out; show the message that it returns, or its error."""
+        super().attempt(action)
         self.update_cost_map()
+
+    def describe_error(self, error: RobocovError) -> str:
+        """Return the message of an error without the names of places in files."""
+        return simplify_message(str(error))
 
     def update_cost_map(self) -> None:
         """Prepare the cost for the map if it has changed."""

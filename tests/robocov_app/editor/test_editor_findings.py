@@ -88,7 +88,7 @@ def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -
 def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
     with opened_editor(tmp_path, Sketch()) as hands:
         assert "no boundary" in hands.editor.problems[0].message or hands.editor.problems[0].is_error
-        for tool in hands.editor.tools:
+        for tool in hands.editor.toolbox.by_name:
             hands.window.do(f"tool:{tool}")
             hands.click_all((2, 2), (4, 2), (4, 4))
             hands.key("escape", times=3)

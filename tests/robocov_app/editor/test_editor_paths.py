@@ -179,7 +179,9 @@ def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
         assert not hands.editor.selection and hands.editor.tool.name == "path"
         hands.click_all((6.0, 7.3))
         hands.key("escape")
-        assert hands.editor.tool is hands.editor.selector and hands.editor.selection == Selection.of(1)
+        assert hands.editor.tool is hands.editor.toolbox.selector and hands.editor.selection == Selection.of(
+            1
+        )
         hands.key("alt+o")
         assert paths.list_moving_obstacles(hands.sketch) == (0,)
 

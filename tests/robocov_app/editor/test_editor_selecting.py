@@ -232,7 +232,7 @@ def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path
         hands.press(*hands.pixel((3, 3)))
         hands.go((3.5, 3.2), (4, 3.5), held=1)
         assert hands.editor.displayed[0] is hands.sketch
-        assert hands.editor.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
+        assert hands.editor.toolbox.selector.drag.carried.offset == pytest.approx((1.0, 0.5))
         hands.release()
         assert hands.shapes == [item.shape for item in wanted.obstacles]
 
@@ -249,7 +249,7 @@ def test_grips_know_whose_vertices_are_shown(hands: Hands) -> None:
 
 
 def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
-    selector = hands.editor.selector
+    selector = hands.editor.toolbox.selector
     hands.go((9, 5))
     assert selector.choose_cursor(hands.editor) == "arrow"
     hands.go((3, 3))

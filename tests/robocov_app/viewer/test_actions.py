@@ -21,7 +21,7 @@ from robocov_app.viewer import panel
 from robocov_app.viewer.commands import GROUPS, list_viewer_commands
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.lesson_guide import COMMANDS_WITHIN_LESSON
-from robocov_app.viewer.tools.toolbox import Toolbox
+from robocov_app.viewer.tools.toolbox import ViewerToolbox
 
 TITLES = {layer.name: layer.title for layer in standard_layers()}
 TEXTS = [path.read_text() for path in Path(package.__path__[0]).glob("*.py")]
@@ -56,7 +56,7 @@ def test_everything_has_a_key_or_is_typed_and_is_in_a_group_of_the_help(actions:
 def test_all_layers_and_all_tools_are_there(shared: Driver) -> None:
     named = [each.name for each in list_viewer_commands(shared.viewer, TITLES)]
     assert [name for name in named if name.startswith("tool:")] == [
-        f"tool:{name}" for name in Toolbox(Inspection()).by_name
+        f"tool:{name}" for name in ViewerToolbox(Inspection()).by_name
     ]
     assert {name for name in named if name.startswith("layer:")} == {f"layer:{name}" for name in TITLES}
 

@@ -24,12 +24,12 @@ from robocov_app.viewer.tools.hand import HandTool
 from robocov_app.viewer.tools.outlines import DEFAULT_WALL_WIDTH_M, AddPolygonTool, AddWallTool
 from robocov_app.viewer.tools.segments import AddCircleTool, RulerTool
 from robocov_app.viewer.tools.tool import ViewerDrawState, ViewerTool
-from robocov_app.viewer.tools.toolbox import Toolbox
+from robocov_app.viewer.tools.toolbox import ViewerToolbox
 
 
 def build_tools() -> dict[str, ViewerTool]:
     """Return the tools by their names."""
-    return Toolbox(Inspection()).by_name
+    return ViewerToolbox(Inspection()).by_name
 
 
 def clicked(tool, session, *points, number=None) -> str | None:

@@ -9,11 +9,12 @@ from robocov_app.editor.model.sketch import Owner, Sketch
 from robocov_app.editor.tools.handles import Handle, list_handles, list_vertex_owners
 from robocov_app.editor.tools.snapping import SNAPS, Dragged, Snap, Snapper, SnapSettings, snap_point
 from robocov_app.render.surface_cache import LatestValue
+from robocov_app.toolkit.window_model import WindowModel
 
 SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a line that is far off must not win over the grid
 
 
-class EditorContext:
+class EditorContext(WindowModel):
     """The open map, its selection and the snap settings: the part of the editor that tools know.
 
     Parameters
@@ -23,8 +24,6 @@ class EditorContext:
 
     Attributes
     ----------
-    revision : int
-        Grows whenever panel and sheet have to be drawn again.
     snaps : set of str
         Names of the snap modes that are on; see `SNAPS`.
     grid : float
@@ -35,29 +34,17 @@ class EditorContext:
         Width of new walls, m.
     pixel : float
         Side of a pixel at scale 1, m.
-    message : str
-        Latest status message; empty after a few seconds.
-    has_error_message : bool
-        Whether the message reports an error.
-    now : float
-        Clock of the window, s.
-    message_time : float
-        Time at which the message appeared, s.
     """
 
     def __init__(self, document: Document) -> None:
+        super().__init__()
         self.document = document
-        self.revision = 0
         self.snaps = set(SNAPS)
         self.grid = 0.1
         self.snap_angle = 15.0
         self.wall_width = 0.1
         self.pixel = 0.01
         self.snapper = Snapper()
-        self.message = ""
-        self.has_error_message = False
-        self.now = 0.0
-        self.message_time = 0.0
         self._handles: LatestValue[tuple[Handle, ...]] = LatestValue()
 
     @property
@@ -130,10 +117,3 @@ class EditorContext:
         if selection != self.selection:
             self.document.history.selection = selection
             self.revision += 1
-
-    def show_message(self, text: str, *, is_error: bool = False) -> None:
-        """Show a status message; an empty one leaves the present message."""
-        if text:
-            self.message = text
-            self.has_error_message = is_error
-            self.message_time = self.now

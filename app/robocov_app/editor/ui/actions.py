@@ -96,11 +96,11 @@ def duplicate(editor: Editor) -> None:
 
 def level(editor: Editor) -> None:
     """Turn the map so that the measured line is level or upright."""
-    measured = editor.tape.measured
+    measured = editor.toolbox.tape.measured
     require(len(measured) == 2, "measure along a wall first: the tool Measure, two clicks")
     start, end = measured
     editor.apply(transform.level_map(editor.sketch, start, end))
-    editor.tape.cancel(editor)
+    editor.toolbox.tape.cancel(editor)
 
 
 def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
@@ -125,7 +125,7 @@ def cancel(editor: Editor) -> None:
         editor.typed = ""
         return
     had_something = editor.tool.cancel(editor)
-    if not had_something and editor.tool is not editor.selector:
+    if not had_something and editor.tool is not editor.toolbox.selector:
         editor.choose_tool("select", shows_hint=False)
 
 
@@ -217,7 +217,7 @@ def make_default_start(editor: Editor) -> None:
 
 def convert_to_areas(editor: Editor) -> None:
     """Turn the selected polygons into areas of the density."""
-    weight = editor.density_tool.weight
+    weight = editor.toolbox.density.weight
     editor.apply(density.convert_polygons(editor.sketch, require_selection(editor), weight))
 
 

@@ -334,7 +334,7 @@ def _list_help_commands(editor: Editor, window: WindowActions) -> EditorCommandG
 
 def _list_tool_commands(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("Tools", editor)
-    for tool in editor.tools.values():
+    for tool in editor.toolbox.by_name.values():
         choose = partial(editor.choose_tool, tool.name)
         group.add(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", choose, tool.key)
     return group

@@ -104,7 +104,7 @@ def list_status(editor: Editor, frame_rate: float, team: Team | None) -> list[st
     texts: list[str] = []
     if editor.cursor is not None:
         texts.append(format_point(editor.cursor))
-    is_selecting = editor.tool is editor.selector
+    is_selecting = editor.tool is editor.toolbox.selector
     item = _find_hovered_item(editor) if is_selecting else None
     if not is_selecting:
         texts.append(f"{editor.tool.title}: {editor.tool.hint}")
@@ -124,7 +124,7 @@ def list_status(editor: Editor, frame_rate: float, team: Team | None) -> list[st
 
 
 def _find_hovered_item(editor: Editor) -> Item | None:
-    owner = editor.selector.hovered
+    owner = editor.toolbox.selector.hovered
     if isinstance(owner, int) and owner in editor.sketch.index_by_key:
         return editor.sketch.get_item(owner)
     return None

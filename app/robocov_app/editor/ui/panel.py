@@ -236,7 +236,7 @@ class Panel(SidePanel):
             self._draw_buttons(ui, row)
         ui.header("TOOLS")
         ui.row(0, 0, 0, 0, below=4)
-        for tool in self.editor.tools.values():
+        for tool in self.editor.toolbox.by_name.values():
             is_chosen = tool is self.editor.tool
             self._draw_button(ui, Button(tool.title, f"tool:{tool.name}"), is_chosen=is_chosen)
         self._draw_tabs(ui)

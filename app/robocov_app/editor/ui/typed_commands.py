@@ -181,7 +181,7 @@ def _set_floor(editor: Editor, text: str) -> None:
 
 
 def _set_weight(editor: Editor, text: str) -> None:
-    editor.density_tool.enter_text(editor, text)
+    editor.toolbox.density.enter_text(editor, text)
 
 
 def _remove_density(editor: Editor, text: str) -> None:

@@ -123,7 +123,7 @@ class EditorWindow(BaseWindow):
                 editor.tool.cancel(editor)
             except Exception:
                 # Choosing the tool again makes it forget what it was doing.
-                editor.tool = editor.selector
+                editor.toolbox.current = editor.toolbox.selector
                 raise
             finally:
                 editor.revision += 1
@@ -202,7 +202,7 @@ class EditorWindow(BaseWindow):
             self.closed = True
             return
         editor = self.editor
-        editor.advance(seconds)
+        editor.pass_time(seconds)
         if not self.pointer.is_busy:
             self.documents.poll()
             self._update_team()
@@ -313,9 +313,9 @@ class EditorWindow(BaseWindow):
 
     def try_it(self) -> None:
         """Open the viewer on the map in this window."""
-        if self.editor.selector.is_busy:
+        if self.editor.toolbox.selector.is_busy:
             # A drag ends, but what is half drawn stays.
-            self.editor.selector.cancel(self.editor)
+            self.editor.toolbox.selector.cancel(self.editor)
         trial = start_trial(self.editor, self.screen, self.scale, patient=self._patient)
         trial.windowed_size = self.windowed_size
         trial.cursor = self.cursor

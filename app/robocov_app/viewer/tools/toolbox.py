@@ -1,5 +1,6 @@
 """All tools of the viewer."""
 
+from robocov_app.toolkit.tool import Toolbox
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.tools.brush import BrushTool
 from robocov_app.viewer.tools.clicks import AddRobotTool, EraserTool, FailureTool
@@ -9,7 +10,7 @@ from robocov_app.viewer.tools.segments import AddCircleTool, RulerTool
 from robocov_app.viewer.tools.tool import ViewerTool
 
 
-class Toolbox:
+class ViewerToolbox(Toolbox[ViewerTool]):
     """The tools, and the one in use.
 
     Parameters
@@ -19,20 +20,17 @@ class Toolbox:
 
     Attributes
     ----------
-    by_name : dict of str to ViewerTool
-        The tools, in the order of the panel.
+    by_name, current
+        See `Toolbox`.
     hand : HandTool
         The tool to which Escape returns.
     wall : AddWallTool
         The tool whose width can be changed at any time.
-    current : ViewerTool
-        The tool in use.
     """
 
     def __init__(self, inspection: Inspection) -> None:
         self.hand = HandTool(inspection)
         self.wall = AddWallTool()
-        self.current: ViewerTool = self.hand
         tools: list[ViewerTool] = [
             self.hand,
             AddPolygonTool(),
@@ -44,7 +42,7 @@ class Toolbox:
             FailureTool(),
             RulerTool(),
         ]
-        self.by_name = {tool.name: tool for tool in tools}
+        super().__init__(tools)
 
     @property
     def resizable(self) -> ViewerTool:

@@ -1,0 +1,57 @@
+"""All tools of the editor."""
+
+from robocov_app.editor.tools.density import DensityTool
+from robocov_app.editor.tools.door import DoorTool
+from robocov_app.editor.tools.draw import (
+    BoundaryTool,
+    CircleTool,
+    DiscTool,
+    MeasureTool,
+    PlacesTool,
+    PolygonTool,
+    RectangleTool,
+    WallTool,
+)
+from robocov_app.editor.tools.motion_path import MotionPathTool
+from robocov_app.editor.tools.reference_image import ReferenceImageTool
+from robocov_app.editor.tools.select import PanTool, SelectTool
+from robocov_app.editor.tools.tool import EditorTool
+from robocov_app.toolkit.tool import Toolbox
+
+
+class EditorToolbox(Toolbox[EditorTool]):
+    """The tools of the editor, and the one in use.
+
+    Attributes
+    ----------
+    by_name, current
+        See `Toolbox`.
+    selector : SelectTool
+        The tool to which Escape returns.
+    tape : MeasureTool
+        The tool whose line levels the map.
+    density : DensityTool
+        The tool with the weight of new areas.
+    """
+
+    def __init__(self) -> None:
+        self.selector = SelectTool()
+        self.tape = MeasureTool()
+        self.density = DensityTool()
+        tools: list[EditorTool] = [
+            self.selector,
+            PanTool(),
+            PolygonTool(),
+            RectangleTool(),
+            CircleTool(),
+            WallTool(),
+            DoorTool(),
+            BoundaryTool(),
+            self.tape,
+            DiscTool(),
+            PlacesTool(),
+            self.density,
+            MotionPathTool(),
+            ReferenceImageTool(),
+        ]
+        super().__init__(tools)
