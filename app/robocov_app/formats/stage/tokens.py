@@ -1,0 +1,111 @@
+"""Words, numbers, texts and brackets of world files, with those of the files that they include."""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+from robocov.errors import MapError, quote, to_one_line
+from robocov_app.formats import files
+
+MAX_BYTES = 5_000_000
+"""Largest file of a world, and largest size of all included files together."""
+MAX_TOKENS = 200_000
+"""Largest number of tokens."""
+BRACKETS = ("(", ")", "[", "]")
+_TOKEN = re.compile(
+    r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
+    r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])|(?P<strange>[\s\S])'
+)
+_MAX_QUOTED_CHARACTERS = 20
+
+
+class Token(NamedTuple):
+    """A word, number, text or bracket.
+
+    Attributes
+    ----------
+    kind : str
+        "word", "number", "string", or the bracket itself.
+    text : str
+        Without quotation marks.
+    at : str
+        File and line.
+    """
+
+    kind: str
+    text: str
+    at: str
+
+    def refuse(self, expected: str) -> NoReturn:
+        """Raise the MapError of this token."""
+        raise MapError(f"{self.at}: expected {expected}, got {quote(self.text)}")
+
+
+def read_tokens(path: Path, find_file: Callable[..., Path]) -> deque[Token]:
+    """Return the tokens of a world file, each include replaced by the tokens of its file.
+
+    Parameters
+    ----------
+    path : Path
+    find_file : callable
+        ``find_file(name, description, at=position)`` returns the path of a file that another one names.
+
+    Raises
+    ------
+    MapError
+        If a file cannot be read, is too large, or includes itself.
+    """
+    reader = _TokenReader(find_file)
+    reader.read(path, (path,))
+    return reader.tokens
+
+
+class _TokenReader:
+    """Collects the tokens of files."""
+
+    def __init__(self, find_file: Callable[..., Path]) -> None:
+        self.tokens: deque[Token] = deque()
+        self._find_file = find_file
+        self._budget = files.IncludeBudget(max_bytes=MAX_BYTES)
+
+    def read(self, path: Path, open_files: tuple[Path, ...]) -> None:
+        """Append the tokens of a file; `open_files` are this one and those that include it."""
+        content = files.read_content(path, MAX_BYTES).decode("utf-8", "replace")
+        name = to_one_line(path)
+        line = 1
+        is_after_include = False
+        for match in _TOKEN.finditer(content):
+            kind = str(match.lastgroup)
+            text = match[kind]
+            token = Token(text if kind == "mark" else kind, text, f"{name}:{line}")
+            line += match[0].count("\n")
+            if kind == "blank":
+                continue
+            if kind == "strange":
+                strange = content[match.start() : match.start() + _MAX_QUOTED_CHARACTERS]
+                token._replace(text=strange).refuse("a word, a number or a bracket")
+            is_include = kind == "word" and text == "include"
+            if is_after_include:
+                self._include(token, open_files)
+            elif not is_include:
+                self._append(token)
+            is_after_include = is_include and not is_after_include
+
+    def _append(self, token: Token) -> None:
+        if len(self.tokens) >= MAX_TOKENS:
+            raise MapError(f"{token.at}: expected fewer, got more than {MAX_TOKENS} words and numbers")
+        self.tokens.append(token)
+
+    def _include(self, token: Token, open_files: tuple[Path, ...]) -> None:
+        if token.kind != "string":
+            token.refuse("a file to include")
+        path = self._find_file(token.text, "file", at=token.at)
+        includes_itself = any(path.resolve() == file.resolve() for file in open_files)
+        if includes_itself or len(open_files) > files.MAX_DEPTH:
+            token.refuse("a file to include, which does not include itself,")
+        self._budget.take(path, token.at)
+        self.read(path, (*open_files, path))
