@@ -34,7 +34,7 @@ class Arguments(FigureOptions):
     """Path of a map file, or the name of a bundled map."""
     positions: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """JSON file with a list of [x, y] in meters, one for each robot."""
-    speeds: tuple[float, ...] = ()
+    speeds: Annotated[tuple[float, ...], tyro.conf.arg(metavar="SPEED ...")] = ()
     """Speed of each robot, or one for all, m/s; sites then belong to the first robot to arrive."""
     lattice: int = 128
     """Compute the coverage cost on a lattice of N x N sites over the map."""

@@ -25,7 +25,7 @@ class Arguments(JsonOption):
     """
 
     action: tyro.conf.Positional[Literal["check"]]
-    """Action."""
+    """Validate the lesson, and print how each chapter ends."""
     file: tyro.conf.Positional[Path]
     """Lesson file."""
 

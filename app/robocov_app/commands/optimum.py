@@ -37,9 +37,9 @@ _AREA_TOLERANCE_M2 = 1e-6
 class Arguments(FigureOptions):
     """Search for the best positions on a known map, as a reference for the coverage cost (22).
 
-    The answer is the best of many restarts, each improved on a table of geodesic distances, then by descent
-    of the exact cost. The more restarts agree with it, the more it can be trusted; --bound proves how much
-    better any placement can be. --plot draws a map of the distances.
+    The result is the best of many restarts. Each is improved on a table of geodesic distances, and then by
+    descent of the exact cost. The more restarts agree, the more you can trust the result; --bound proves how
+    much better any placement can be. --plot draws a map of the distances.
 
     Example: robocov optimum rooms --robots 6 --positions best.json --plot best.png
     """
@@ -49,7 +49,7 @@ class Arguments(FigureOptions):
     robots: int | None = None
     """Number of robots (default: 6, or that of the run)."""
     restarts: int = 24
-    """Number of restarts, each from its own seed; the best counts."""
+    """Number of restarts, each from its own seed; the best one is used."""
     lattice: int = 128
     """Compute the coverage cost on a lattice of N x N sites over the map."""
     seed: int = 0
@@ -63,7 +63,7 @@ class Arguments(FigureOptions):
     overwrite: bool = False
     """Replace an earlier file of positions."""
     bound: bool = False
-    """Prove a lower bound of the cost of all placements, by the dual; takes about a minute."""
+    """Also compute a certified lower bound on the cost of all placements; takes about a minute."""
     precision: float = 0.001
     """Relative tolerance of --bound; smaller is slower."""
 

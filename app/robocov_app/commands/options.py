@@ -53,7 +53,7 @@ class FigureOptions(JsonOption):
     """A figure of the answer."""
 
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draw it to a PNG, SVG or PDF."""
+    """File for a figure (.png, .svg or .pdf)."""
     theme: Literal["light", "dark"] = "light"
     """Colors of the figure."""
 
@@ -68,9 +68,9 @@ class FigureOptions(JsonOption):
 class LayerOptions:
     """Layers of frames and windows."""
 
-    show: tuple[str, ...] = ()
+    show: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LAYER ...")] = ()
     """Layers to show in addition to the standard ones: distances, geodesic-cells, ..."""
-    hide: tuple[str, ...] = ()
+    hide: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LAYER ...")] = ()
     """Layers to hide, as in --hide cells centroids."""
 
     def read_layers(self) -> tuple[frozenset[str], frozenset[str]]:
@@ -116,11 +116,11 @@ class WindowOptions(WebOptions):
     """The look of a window."""
 
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
-    """Colors; by default those of the last time."""
+    """Colors (default: those of the last window)."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size of the window in pixels; by default that of the last time."""
+    """Size of the window in pixels (default: that of the last window)."""
     scale: float | None = None
-    """Scale of text and lines, as 2 on a screen of twice the density; by default what suits the screen."""
+    """Scale of text and lines, such as 2 for a high-density screen (default: fitted to the screen)."""
     folder: Path = Path()
     """Default folder of screenshots, videos, runs and maps."""
 
@@ -212,11 +212,11 @@ class VideoOptions(LayerOptions):
     film_speed: float = 4.0
     """Simulated seconds per second of video."""
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
-    """Colors; by default light, in a window as the last time."""
+    """Colors (default: light; in a window the last ones)."""
     colors: Literal["paper", "robots"] = "paper"
-    """Draw trajectories in the paper's red, or in a color for each robot; in videos, too."""
+    """Colors of trajectories, also in videos: the paper's red, or one color per robot."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size in pixels; by default 1280x720 for the video of a run, otherwise what suits the map."""
+    """Size in pixels (default: 1280x720 for the video of a run, otherwise fitted to the map)."""
 
     def __post_init__(self) -> None:
         require_number("--fps", self.fps, 1, 240)
@@ -285,7 +285,7 @@ class ScenarioOptions:
     radius: float = DEFAULT_RADIUS_M
     """Radius of a robot, m."""
     team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
-    """TOML or JSON file of a mixed team: [[group]] with count, max_speed, ...; options give the rest."""
+    """TOML or JSON file of a mixed team; options apply where a group sets no value."""
     lattice: int = DEFAULT_LATTICE
     """Compute the coverage cost on a lattice of N x N sites over the map."""
     conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
@@ -300,21 +300,21 @@ class RunOptions(ScenarioOptions, JsonOption):
     duration: float = DEFAULT_DURATION_S
     """Simulated time, s."""
     record_hz: float | None = None
-    """Approximate number of recorded moments per second; by default all, up to 320 MB for large teams."""
+    """Approximate number of recorded samples per second (default: every step, up to 320 MB)."""
     max_speed: float = DEFAULT_MAX_SPEED_M_S
     """Maximum speed, m/s."""
     max_acceleration: float = DEFAULT_MAX_ACCELERATION_M_S2
     """Maximum acceleration, m/s²."""
     viscosity: float = DEFAULT_VISCOSITY_N_S_M
-    """Viscosity nu of (28), N s/m; a robot has 1 kg."""
+    """Viscosity nu of (28), N s/m, for robots of 1 kg."""
     sensing_range: float = DEFAULT_SENSING_RANGE_M
     """Sensing range from the robot's center, m."""
     communication_range: float | None = None
     """Communication range, m; unlimited by default."""
     kinematics: Literal["point", "unicycle"] = "point"
-    """Motion: points move in any direction, unicycles have two driven wheels and have to turn."""
+    """Points move in any direction; unicycles have two driven wheels and must turn."""
     track_width: float = DEFAULT_TRACK_WIDTH_M
-    """Distance between a unicycle's wheels, m; 0 stands for 1.6 radii."""
+    """Distance between the wheels of a unicycle, m; 0 for 1.6 radii."""
     turning_rate: float = DEFAULT_TURNING_RATE_RAD_S
     """Maximum turning rate of a unicycle, rad/s."""
     out: Path | None = None
@@ -322,8 +322,8 @@ class RunOptions(ScenarioOptions, JsonOption):
     overwrite: bool = False
     """Replace an earlier result in that folder."""
     no_pictures: bool = False
-    """Save only the numbers, without figures of trajectories and cost."""
-    film: tyro.conf.OmitArgPrefixes[VideoOptions] = field(default_factory=VideoOptions)
+    """Write no figures, only data."""
+    video: tyro.conf.OmitArgPrefixes[VideoOptions] = field(default_factory=VideoOptions)
 
     def __post_init__(self) -> None:
         if self.team is not None:
@@ -446,7 +446,7 @@ class RunOptions(ScenarioOptions, JsonOption):
             overwrite=self.overwrite,
             figures=not self.no_pictures,
             quiet=self.json,
-            video=self.film.build_settings(),
+            video=self.video.build_settings(),
         )
 
 

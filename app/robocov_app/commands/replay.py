@@ -40,7 +40,7 @@ class Arguments(JsonOption, WebOptions):
     """Folder for frames and video."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
-    film: tyro.conf.OmitArgPrefixes[VideoOptions] = field(default_factory=VideoOptions)
+    video: tyro.conf.OmitArgPrefixes[VideoOptions] = field(default_factory=VideoOptions)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -52,7 +52,7 @@ class Arguments(JsonOption, WebOptions):
             for name in ("out", "json"):
                 if getattr(self, name):
                     raise ParameterError(f"--{name}: requires --frames or --video")
-            parse_window_size(self.film.size)
+            parse_window_size(self.video.size)
 
     def _check_headless_options(self) -> None:
         if self.serve:
@@ -65,7 +65,7 @@ class Arguments(JsonOption, WebOptions):
     @property
     def is_headless(self) -> bool:
         """Whether the run is rendered without a window."""
-        return self.film.frames or self.film.video
+        return self.video.frames or self.video.video
 
 
 def command(options: Arguments) -> int:
@@ -80,7 +80,7 @@ def command(options: Arguments) -> int:
 
 
 def _replay(options: Arguments) -> int:
-    options.film.read_layers()
+    options.video.read_layers()
     path = options.run
     if (path / "story.json").is_file():
         path = path / "session.robocov"
@@ -135,13 +135,13 @@ def _open_window(options: Arguments, session: Session, file: Path | None = None)
     from robocov_app.web import prepare, show
 
     prepare(options, Path())
-    shown_layers, hidden_layers = options.film.read_layers()
+    shown_layers, hidden_layers = options.video.read_layers()
     launcher = Launcher(
         session,
         _find_map_name(session),
         Path(),
-        theme=options.film.theme,
-        size=parse_window_size(options.film.size),
+        theme=options.video.theme,
+        size=parse_window_size(options.video.size),
         controllers=options.controller,
         shown_layers=shown_layers,
         hidden_layers=hidden_layers,
@@ -194,7 +194,7 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
             runs,
             None,
             result.staging,
-            options.film.build_settings(),
+            options.video.build_settings(),
             interruption,
             quiet=options.json,
             runs_on_one_map=runs_on_one_map if len(runs) > 1 else None,

@@ -80,57 +80,55 @@ class ReadOptions(Options):
     """Options for reading a map that its file does not contain; the format chooses what is not given."""
 
     cell: float | None = None
-    """Side of a cell or pixel, or width of a tile, in meters. By default MovingAI's and Tiled's have 1."""
+    """Side of a cell, pixel or tile, m (default: 1 for MovingAI and Tiled)."""
     unknown: Literal["obstacle", "free", "cut"] | None = None
     """Treatment of unknown or transparent cells; with cut the map ends at the known cells."""
     threshold: float | None = None
-    """From 0 to 1. Darker pixels of a picture are obstacles; so are cells that are occupied with this
-    probability in a ROS map of mode scale or raw. 0.5 by default."""
+    """Brightness below which pixels, or occupancy from which ROS cells, are obstacles (default: 0.5)."""
     invert: bool = False
-    """Light pixels of a picture are obstacles, not dark ones."""
+    """Light pixels of an image are obstacles, not dark ones."""
     trees: Literal["obstacle", "free"] | None = None
     """Whether trees (T) in a MovingAI grid are obstacles (the default)."""
     water: Literal["obstacle", "free"] | None = None
     """Whether water (W) in a MovingAI grid, or of OpenStreetMap, is an obstacle (the default)."""
     anywhere: bool = False
-    """Pictures and includes that a file names may be outside of its folder."""
+    """Allow images and included files outside the folder of the file."""
     scale: float | None = None
-    """Size in meters of a unit of a drawing, or of a pixel of a TMX."""
+    """Size of a unit of a drawing, or of a pixel of a TMX, m."""
     units: Literal["meters", "degrees"] | None = None
-    """Unit of the coordinates of GeoJSON, which overrides the file."""
+    """Unit of the coordinates of GeoJSON; overrides the file."""
     thickness: float | None = None
-    """Width in meters of walls that are drawn as lines."""
+    """Width of walls that are drawn as lines, m."""
     pillar: float | None = None
-    """Radius in meters of a pillar for each point; without it points are left out."""
+    """Radius of the pillar at each point, m; by default points are left out."""
     outlines: Literal["free", "solid", "nested"] | None = None
-    """Meaning of closed outlines of a drawing, except for the boundary. Nested outlines are free and solid
-    by turns, from the outside in, so that the larger area is free."""
+    """Meaning of closed outlines except the boundary; nested: alternately free and solid, from outside in."""
     boundary: str | None = None
-    """Name, id, class or layer of the shape that is the outer boundary."""
+    """Name, id, class or layer of the outer boundary."""
     around: float | None = None
-    """Margin in meters around the shapes if none of them is the boundary."""
+    """Margin around the shapes if none of them is the boundary, m."""
     snap: float | None = None
-    """Gaps between outlines of free space that are narrower than this, in meters, are closed where they cut
-    it apart; 0 keeps all. By default 0.01, or a thousandth of the drawing if that is less."""
-    only: tuple[str, ...] | None = None
-    """Names, ids, classes or layers that are read; all others are left out."""
-    skip: tuple[str, ...] | None = field(default=None, metadata={"aliases": ["--ignore-layer"]})
-    """Names, ids, classes or layers that are left out."""
+    """Maximum width of gaps between outlines to close, m (default: 0.01, or less in small drawings)."""
+    only: tuple[str, ...] | None = field(default=None, metadata={"metavar": "NAME ..."})
+    """Names, ids, classes or layers to read; all others are left out."""
+    skip: tuple[str, ...] | None = field(
+        default=None, metadata={"aliases": ["--ignore-layer"], "metavar": "NAME ..."}
+    )
+    """Names, ids, classes or layers to leave out."""
     level: str | None = None
-    """Floor of a building that is read, by its number or name. By default the ground floor, 0."""
-    free_color: tuple[str, ...] | None = None
-    """Colors that are free space, by name or as #rrggbb."""
-    solid_color: tuple[str, ...] | None = None
-    """Colors that are obstacles."""
-    ignore_color: tuple[str, ...] | None = None
-    """Colors that are left out: the color around or below them counts."""
+    """Number or name of the floor of a building to read (default: 0, the ground floor)."""
+    free_color: tuple[str, ...] | None = field(default=None, metadata={"metavar": "COLOR ..."})
+    """Colors of free space, as names or #rrggbb."""
+    solid_color: tuple[str, ...] | None = field(default=None, metadata={"metavar": "COLOR ..."})
+    """Colors of obstacles."""
+    ignore_color: tuple[str, ...] | None = field(default=None, metadata={"metavar": "COLOR ..."})
+    """Colors to ignore; they are replaced by the color around or below them."""
     color_tolerance: float | None = None
-    """Largest difference of a color in each of red, green and blue, of 255. By default 24 in a picture,
-    and 0 in a drawing."""
+    """Maximum difference in red, green and blue, of 255 (default: 24 in images, 0 in drawings)."""
     min_stroke: str | None = None
-    """Thinner strokes (door arcs, furniture, text) are dropped: a width in meters, or in pixels as in 3px."""
+    """Minimum width of strokes to read, in meters or pixels, as in 3px; drops door arcs, furniture, text."""
     hatches: bool = False
-    """Hatches are areas, as outlines are."""
+    """Treat hatches as areas, like outlines."""
 
     def __post_init__(self) -> None:
         self.require_ranges(
@@ -195,17 +193,17 @@ class WriteOptions(Options):
     """Options for writing a map; the format chooses what is not given."""
 
     cell: float | None = None
-    """Side of a cell, or of a pixel, in meters; 0.05 by default. Walls that are thinner stay whole."""
+    """Side of a cell or pixel, m (default: 0.05); thinner walls stay connected."""
     mode: Literal["trinary", "scale", "raw"] | None = None
-    """Encoding of occupancy in a ROS map; trinary by default."""
+    """Encoding of occupancy in a ROS map (default: trinary)."""
     image: Literal["pgm", "png"] | None = None
-    """Format of the picture of a ROS map; pgm by default."""
+    """Image format of a ROS map (default: pgm)."""
     scale: float | None = None
-    """Size in meters of a millimeter of an SVG; 0.001, true scale, by default."""
+    """Size of a millimeter of an SVG, m (default: 0.001, true to scale)."""
     digits: int | None = None
-    """Decimals of coordinates; by default a micrometer."""
-    origin: tuple[float, float] | None = None
-    """Longitude and latitude of [0, 0] m, for GeoJSON in degrees. Needs pyproj: robocov[geo]."""
+    """Number of decimals of coordinates (default: those of a micrometer)."""
+    origin: tuple[float, float] | None = field(default=None, metadata={"metavar": "LON LAT"})
+    """Longitude and latitude of [0, 0] m, for GeoJSON in degrees; needs robocov[geo]."""
 
     def __post_init__(self) -> None:
         self.require_ranges(cell=_LENGTH_RANGE, scale=_LENGTH_RANGE, digits=(0, 12, ""))

@@ -247,11 +247,9 @@ def _arrange_help(kind: type[T]) -> type[T]:
 
 
 def _make_help_settings(option: Any) -> Any:
-    """Return tyro's settings of an option, with its aliases."""
-    aliases = None if option is None else option.metadata.get("aliases")
-    if aliases:
-        return tyro.conf.arg(help_behavior_hint=_format_default, aliases=aliases)
-    return tyro.conf.arg(help_behavior_hint=_format_default)
+    """Return tyro's settings of an option, with the aliases and the metavar in the metadata of its field."""
+    settings = {} if option is None else dict(option.metadata)
+    return tyro.conf.arg(help_behavior_hint=_format_default, **settings)
 
 
 def _format_default(label: str) -> str:

@@ -25,25 +25,21 @@ class Shaping(Options):
     """Parameters of the conversion of a foreign map to an environment."""
 
     simplify: float | None = None
-    """Walls may move by so many meters where that saves vertices; 0 keeps all. By default one cell of a
-    grid, 0.02 of the rest."""
+    """Maximum distance by which walls may move to save vertices, m (default: 0.02, or one cell of a grid)."""
     specks: float | None = None
-    """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
-    none."""
+    """Minimum area of obstacles, m² (default: 0, but single cells of ROS maps and JPEGs are dropped)."""
     keep: Literal["largest", "all"] = "largest"
-    """Which connected parts of the free space stay; where the file places robots, the one with most of them
-    counts as the largest."""
-    inside: tuple[float, float] | None = None
-    """The part of the free space that holds this place, x and y in the map's meters, stays instead of the
-    largest."""
+    """Components of the free space to keep; with robots, the largest is the one with the most robots."""
+    inside: tuple[float, float] | None = field(default=None, metadata={"metavar": "X Y"})
+    """Keep the component that contains this point, m, instead of the largest."""
     hull: bool = False
-    """The boundary is the convex hull of the free space, not its outline."""
+    """Use the convex hull of the free space as boundary instead of its outline."""
     margin: float = 0.0
-    """So many meters around the free space are solid."""
+    """Thickness of the solid margin around the free space, m."""
     radius: float = DEFAULT_RADIUS_M
-    """Radius of a robot in meters: where it passes in the file, it passes in the map."""
+    """Radius of a robot, m; passages in which it fits stay open."""
     default_start: Literal["room", "uniform"] = "room"
-    """The map's default start: a disc at the roomiest place, or anywhere."""
+    """Default start of the map: a disc where there is most room, or anywhere."""
 
     def __post_init__(self) -> None:
         self.require_ranges(
