@@ -1,4 +1,4 @@
-"""A window without a display, and hands for it: what a test presses, drags and types."""
+"""A viewer window without a display, and a driver that presses, drags and types in it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.display import open_display
+from robocov_app.toolkit.input import split_key_name
 from robocov_app.toolkit.page import Widget
 from robocov_app.viewer.commands import list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.costs import Costs
@@ -29,7 +30,7 @@ SIZE = (900, 600)
 FRAME = 1 / 50
 
 MIDDLE = (0.6, 3.6)
-"""A place in the hall where nothing is."""
+"""A free position in the hall, m."""
 
 KEYS = {
     **{
@@ -46,9 +47,9 @@ MODIFIERS = {"ctrl": pygame.KMOD_LCTRL, "shift": pygame.KMOD_LSHIFT, "alt": pyga
 
 
 @contextmanager
-def opened(
+def open_viewer(
     folder: Path,
-    *laws: ControllerChoice,
+    *controllers: ControllerChoice,
     environment: Environment = HALL,
     map_name: str = "hall",
     robots: int = 3,
@@ -58,48 +59,47 @@ def opened(
     lattice: int = 16,
     **changes: Any,
 ) -> Iterator[Driver]:
-    """Open a window without a display, paused at its beginning."""
+    """Open a window without a display, paused at time 0."""
     with open_display(headless=True):
-        session = start_session(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
-        usual = {layer.name for layer in standard_layers() if layer.default}
-        viewer = Presenter(
-            session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name
-        )
+        session = start_session(*(controllers or (RAPF,)), robots=robots, environment=environment, **changes)
+        if shown is None:
+            shown = {layer.name for layer in standard_layers() if layer.default}
+        viewer = Presenter(session, Costs(lattice, direct=True), shown, folder, map_name)
         driver = Driver(ViewerWindow(viewer, size, scale, is_unattended=True))
         driver.settle()
-        driver.settle()  # now it knows how high the legend is
+        # The height of the legend is known only after the first frame.
+        driver.settle()
         yield driver
         driver.window.close()
         driver.window.run_saver.finish()
 
 
-def key_event(name: str) -> dict[str, Any]:
-    """Return what an event tells of a key, by its name in the list of commands."""
-    plus = name == "+" or name.endswith("++")
-    *held, last = [*name[:-1].split("+"), "+"] if plus else name.split("+")
+def build_key_event(name: str) -> dict[str, Any]:
+    """Return the attributes of the event of a key, by its name in the list of commands."""
+    *held, last = split_key_name(name)
     text = last if len(last) == 1 and "ctrl" not in held else ""
-    mod = sum(MODIFIERS[each] for each in held if each)
-    return {"key": KEYS.get(last) or pygame.key.key_code(last), "mod": mod, "unicode": text, "scancode": 0}
+    modifiers = sum(MODIFIERS[modifier] for modifier in held)
+    code = KEYS.get(last) or pygame.key.key_code(last)
+    return {"key": code, "mod": modifiers, "unicode": text, "scancode": 0}
 
 
-def listed(viewer: Presenter) -> CommandTable:
-    """Return the commands without a window."""
+def build_command_table(viewer: Presenter) -> CommandTable:
+    """Build the table of the commands that need no window."""
     titles = {layer.name: layer.title for layer in standard_layers()}
-    return CommandTable(
-        list_viewer_commands(viewer, titles), viewer.attempt, lambda: list_parameter_commands(viewer)
-    )
+    commands = list_viewer_commands(viewer, titles)
+    return CommandTable(commands, viewer.attempt, lambda: list_parameter_commands(viewer))
 
 
-def do(viewer: Presenter, name: str) -> None:
-    listed(viewer).run(name)
+def run_command(viewer: Presenter, name: str) -> None:
+    build_command_table(viewer).run(name)
 
 
-def typed(viewer: Presenter, text: str) -> None:
-    listed(viewer).run_text(text)
+def run_text(viewer: Presenter, text: str) -> None:
+    build_command_table(viewer).run_text(text)
 
 
 class Driver:
-    """Does to a window what people do; each deed takes a frame or some."""
+    """Uses a window as people do; each action takes one or more frames."""
 
     def __init__(self, window: ViewerWindow) -> None:
         self.window = window
@@ -116,7 +116,7 @@ class Driver:
             self.window.run_frame(seconds)
 
     def settle(self) -> None:
-        """Let what was posted arrive, and what that posted."""
+        """Handle the posted events, and those that they post."""
         for _ in range(3):
             self.window.advance(0.0)
         self.window.run_frame(0.0)
@@ -131,7 +131,7 @@ class Driver:
         rel = at[0] - self.at[0], at[1] - self.at[1]
         buttons = tuple(int(held == k) for k in (1, 2, 3))
         pygame.mouse.set_pos(at)
-        pygame.event.clear(pygame.MOUSEMOTION)  # what moving the cursor itself has posted
+        pygame.event.clear(pygame.MOUSEMOTION)  # posted by the line above
         self.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=buttons)
         self.at = at
         if settled:
@@ -151,7 +151,7 @@ class Driver:
         self.release(button)
 
     def drag(self, *path: tuple[float, float], button: int = 1) -> None:
-        """Press at the first of some pixels, and let go at the last."""
+        """Press the button at the first pixel, and release it at the last."""
         self.press(*path[0], button)
         for x, y in path[1:]:
             self.move(x, y, held=button)
@@ -162,15 +162,14 @@ class Driver:
         self.post(pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False)
         self.settle()
 
-    # places in the arena
+    # positions in the arena
 
     def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
         return self.window.canvas.to_pixel(point, pane)
 
     def robot(self, number: int, pane: int = 0) -> tuple[float, float]:
-        """Return the pixel where a robot is."""
-        its = self.session.timeline.panes[pane]
-        x, y = self.session.displayed.get_positions(its)[its.numbers.index(number)].tolist()
+        """Return the pixel at which a robot is drawn."""
+        x, y = get_position(self, number, pane).tolist()
         return self.pixel((x, y), pane)
 
     def click_at(self, point: tuple[float, float], pane: int = 0, button: int = 1) -> None:
@@ -182,13 +181,13 @@ class Driver:
     # keys
 
     def key(self, name: str, times: int = 1) -> None:
-        """Press a key as the list of actions calls it: ``ctrl+shift+z``."""
-        what = key_event(name)
+        """Press a key by its name in the list of commands, as in ``ctrl+shift+z``."""
+        attributes = build_key_event(name)
         for _ in range(times):
-            self.post(pygame.KEYDOWN, **what)
-            if what["unicode"]:
-                self.post(pygame.TEXTINPUT, text=what["unicode"])
-            self.post(pygame.KEYUP, **what)
+            self.post(pygame.KEYDOWN, **attributes)
+            if attributes["unicode"]:
+                self.post(pygame.TEXTINPUT, text=attributes["unicode"])
+            self.post(pygame.KEYUP, **attributes)
             self.settle()
 
     def type(self, text: str) -> None:
@@ -222,10 +221,11 @@ class Driver:
         self.click(*self.widget("check", name).rect.center)
 
     def choose(self, menu: str, option: str) -> None:
-        """Open a menu of the panel and choose from it, scrolling as far as is needed."""
+        """Open a menu of the panel, scroll to an option, and choose it."""
         self.click(*self.widget("menu", menu).rect.center)
         found = self.window.panel.ui.open_list
-        assert found is not None and option in found.options, f"no {option} in {menu}"
+        assert found is not None
+        assert option in found.options, f"no {option} in {menu}"
         item = found.get_item_rect(found.options.index(option))
         for _ in range(100):
             if found.rect.contains(item):
@@ -240,20 +240,19 @@ class Driver:
         self.type(text)
 
     def slide(self, name: str, part: float) -> None:
-        """Drag a slider's knob to a part of its width."""
+        """Drag a slider's knob to a fraction of its way."""
         knob, free = self.knob(name)
         x = self.widget("slider", name).rect.left + knob.width / 2 + part * free
         self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))
 
     def knob(self, name: str) -> tuple[pygame.Rect, float]:
-        """Return where a slider's knob is, and how far it can move."""
+        """Return the rectangle of a slider's knob, and the length by which it can move, px."""
         slider = self.widget("slider", name)
-        low, high = (0.0, 1.0) if name != "speed" else (0.0, len(SPEEDS) - 1.0)
-        knob = pygame.Rect(slider.rect.left, slider.rect.top, round(12 * self.window.layout.scale), 0)
-        free = slider.rect.width - knob.width
-        knob.x += round(free * (slider.value - low) / (high - low))
-        knob.height = slider.rect.height
-        return knob, free
+        high = len(SPEEDS) - 1.0 if name == "speed" else 1.0
+        width = round(12 * self.window.layout.scale)
+        free_width = slider.rect.width - width
+        left = slider.rect.left + round(free_width * slider.value / high)
+        return pygame.Rect(left, slider.rect.top, width, slider.rect.height), free_width
 
     def picture(self) -> Any:
         """Return the pixels of the window."""
@@ -263,14 +262,15 @@ class Driver:
         return bool(np.array_equal(self.picture(), other))
 
 
-def place(driver: Driver, number: int, pane: int = 0) -> np.ndarray:
-    """Return where a robot is, (2,) m."""
-    its = driver.session.timeline.panes[pane]
-    return driver.session.displayed.get_positions(its)[its.numbers.index(number)]
+def get_position(driver: Driver, number: int, pane: int = 0) -> np.ndarray:
+    """Return the displayed position of a robot, (2,) m."""
+    shown_pane = driver.session.timeline.panes[pane]
+    row = shown_pane.numbers.index(number)
+    return driver.session.displayed.get_positions(shown_pane)[row]
 
 
-def resized(driver: Driver, size: tuple[int, int]) -> None:
-    """Give the window another size."""
+def resize_window(driver: Driver, size: tuple[int, int]) -> None:
+    """Change the size of the window."""
     pygame.display.set_mode(size, pygame.RESIZABLE)
     driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
     driver.settle()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pygame
-from driven_window import MODIFIERS, key_event
+from driven_window import MODIFIERS, build_key_event
 
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.toolkit.clipboard import Clipboard
@@ -198,7 +198,7 @@ class RandomEvents:
         pygame.event.post(pygame.event.Event(kind, **content))
 
     def post_key(self, name: str) -> None:
-        content = key_event(name)
+        content = build_key_event(name)
         self.post(pygame.KEYDOWN, **content)
         if content["unicode"]:
             self.post(pygame.TEXTINPUT, text=content["unicode"])
@@ -214,7 +214,7 @@ class RandomEvents:
             self.post_key(key)
 
     def storm_keys(self) -> None:
-        content = key_event(self.random.choice(STORM_KEYS))
+        content = build_key_event(self.random.choice(STORM_KEYS))
         for _ in range(self.random.randint(2, 25)):
             self.post(pygame.KEYDOWN, **content)
             if content["unicode"]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 from reported_results import entry, result_of
 from swept import ROOM, InProcess, small_study
 
@@ -179,7 +179,7 @@ def test_laws_of_the_window_say_words() -> None:
 
 
 def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
-    with opened(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
+    with open_viewer(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
         target = lambda: driver.session.timeline.panes[0].controller.get_value("target")  # noqa: E731
         chosen = lambda word: driver.widget("button", f"target:{word}").value  # noqa: E731
         assert target() == "centroid" and chosen("centroid")
@@ -205,7 +205,7 @@ def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:
         "    def force(self, own):\n"
         "        return own.centroid - own.position\n"
     )
-    with opened(tmp_path, ControllerChoice(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
+    with open_viewer(tmp_path, ControllerChoice(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
         for word in ("anticlockwise", "whichever is near", "clockwise"):
             driver.choose("way", word)
             assert driver.session.timeline.panes[0].controller.get_value("way") == word

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from driven_editor import Hands, opened_editor, sheet
-from driven_window import opened as opened_viewer
+from driven_window import open_viewer
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits import create
@@ -43,7 +43,7 @@ def test_no_key_does_two_things_and_every_command_has_a_group(hands: Hands) -> N
 
 
 def test_the_same_things_have_the_same_keys_as_in_the_viewer(tmp_path: Path) -> None:
-    with opened_viewer(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         theirs = {command.name: command.keys for command in driver.window.commands.commands}
     with opened_editor(tmp_path) as hands:
         ours = {command.name: command.keys for command in hands.window.commands.commands}

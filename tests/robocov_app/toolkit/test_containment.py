@@ -1,4 +1,4 @@
-"""One message, one event or one fault does not end a window, and text comes in without control characters."""
+"""Faults do not end a window, and control characters are removed from input."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pygame
 import pytest
 from driven_editor import opened_editor
-from driven_window import opened
+from driven_window import open_viewer
 from sample_sessions import start_session
 
 from robocov.environment import CircleObstacle
@@ -28,7 +28,7 @@ CONTROLS = "".join(map(chr, [*range(32), *range(127, 160)])) + "\u202e\u2066\udc
 
 
 class Fragile(BaseWindow):
-    """Raises where it is told to."""
+    """A window whose parts raise the exceptions in `raises`."""
 
     def __init__(self) -> None:
         super().__init__((900, 600))
@@ -80,16 +80,19 @@ def post_key() -> None:
     pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a, mod=0, unicode="a", scancode=0))
 
 
-def test_an_event_that_raises_is_logged_reported_and_taken_back(window: Fragile, tmp_path: Path) -> None:
+def test_an_event_that_raises_is_logged_reported_and_reverted(window: Fragile, tmp_path: Path) -> None:
     window.raises["take"] = ValueError("embedded\nnull byte")
     post_key()
     window.run_frame(0.02)
-    assert window.value == 0 and not window.closed
+    assert window.value == 0
+    assert not window.closed
     (report,) = window.reports
     assert report.startswith("Internal error while handling KeyDown (ValueError: embedded null byte).")
-    assert str(tmp_path / LOG_FILE) in report and "\n" not in report
+    assert str(tmp_path / LOG_FILE) in report
+    assert "\n" not in report
     log = (tmp_path / LOG_FILE).read_text()
-    assert "Traceback" in log and "ValueError: embedded" in log
+    assert "Traceback" in log
+    assert "ValueError: embedded" in log
     window.raises.clear()
     post_key()
     window.run_frame(0.02)
@@ -97,13 +100,13 @@ def test_an_event_that_raises_is_logged_reported_and_taken_back(window: Fragile,
 
 
 @pytest.mark.parametrize("part", ["update", "draw", "look"])
-def test_a_part_that_always_fails_floods_nothing_and_recovers(
+def test_a_part_that_always_fails_is_retried_rarely_and_recovers(
     window: Fragile, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.raises[part] = RuntimeError("always")
     for _ in range(500):
         window.run_frame(0.02)
-    assert window.calls.count(part) < 20, "it is tried now and then"
+    assert window.calls.count(part) < 20, "it is retried rarely"
     assert (tmp_path / LOG_FILE).read_text().count("Traceback") == 1
     window.raises.clear()
     window._retry_at_s.clear()
@@ -120,7 +123,7 @@ def test_a_window_whose_closing_fails_closes(window: Fragile) -> None:
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, MemoryError])
-def test_what_is_meant_to_end_a_program_ends_it(window: Fragile, error: type[Exception]) -> None:
+def test_exceptions_that_end_a_program_are_passed_on(window: Fragile, error: type[Exception]) -> None:
     window.raises["take"] = error()
     post_key()
     with pytest.raises(error):
@@ -141,18 +144,19 @@ def test_a_log_file_stays_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         error = type(f"Error{k}", (Exception,), {})("x" * 500)
         log.record(error, "testing")
     files = list(tmp_path.iterdir())
-    assert len(files) == 2 and sum(file.stat().st_size for file in files) < 12_000
+    assert len(files) == 2
+    assert sum(file.stat().st_size for file in files) < 12_000
     assert log.count == 300
 
 
-def test_where_no_log_file_can_be_written_it_is_standard_error(tmp_path: Path, capsys) -> None:
+def test_standard_error_replaces_an_unwritable_log_file(tmp_path: Path, capsys) -> None:
     (tmp_path / "file").write_text("")
     sentence = FaultLog(tmp_path / "file").record(ValueError("boom\x1b[31m"), "testing")
     assert sentence == "Internal error while testing (ValueError: boom[31m). Details: the terminal."
     assert "ValueError: boom" in capsys.readouterr().err
 
 
-def test_no_control_character_comes_in(tmp_path: Path) -> None:
+def test_control_characters_are_removed_from_input(tmp_path: Path) -> None:
     clipboard = Clipboard()
     with open_display(headless=True):
         for text in ("a\x00b", f"a{CONTROLS}b"):
@@ -160,10 +164,12 @@ def test_no_control_character_comes_in(tmp_path: Path) -> None:
             assert clipboard.get().replace("\n", "").replace("\t", "") == "ab"
             for kind in (pygame.TEXTINPUT, pygame.TEXTEDITING):
                 event = clean_event(pygame.event.Event(kind, text=text, start=0, length=0))
-                assert event is not None and event.text == "ab"
+                assert event is not None
+                assert event.text == "ab"
         assert clean_event(pygame.event.Event(pygame.TEXTINPUT, text="\x00")) is None
         dropped = clean_event(pygame.event.Event(pygame.DROPFILE, file="a\x00 b\n.json"))
-        assert dropped is not None and dropped.file == "a b\n.json"
+        assert dropped is not None
+        assert dropped.file == "a b\n.json"
         pygame.display.set_mode((100, 100))
         set_title(f"a{CONTROLS}b")
         assert pygame.display.get_caption()[0] == "ab"
@@ -172,20 +178,21 @@ def test_no_control_character_comes_in(tmp_path: Path) -> None:
         assert clipboard.get() == "ab"
 
 
-def test_a_field_takes_text_of_a_largest_length() -> None:
+def test_a_field_limits_the_length_of_its_text() -> None:
     edit = TextEdit.select_all("ab")
     edit.place(1)
     edit.type("x\x00y\tz" * MAX_CHARS)
-    assert len(edit.text) == MAX_CHARS and edit.text.startswith("axyzxyz") and edit.text.endswith("b")
+    assert len(edit.text) == MAX_CHARS
+    assert edit.text.startswith("axyzxyz")
+    assert edit.text.endswith("b")
     edit.type("more")
     assert len(edit.text) == MAX_CHARS
 
 
-def test_an_edit_of_the_map_that_raises_is_taken_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
-        window, editor = hands.window, hands.editor
+        window = hands.window
+        editor = hands.editor
         window.contains_faults = True
         editor.apply(add_circle(editor.sketch, (2.0, 2.0), 0.5))
         before = editor.sketch
@@ -197,7 +204,9 @@ def test_an_edit_of_the_map_that_raises_is_taken_back(
         monkeypatch.setattr(window, "try_it", half_way)
         monkeypatch.setattr(window, "do", lambda name: half_way())
         hands.key("f5")
-        assert editor.sketch == before and "Internal error" in editor.message and editor.has_error_message
+        assert editor.sketch == before
+        assert "Internal error" in editor.message
+        assert editor.has_error_message
         monkeypatch.undo()
         hands.key("ctrl+z")
         assert editor.sketch.obstacles == ()
@@ -205,7 +214,7 @@ def test_an_edit_of_the_map_that_raises_is_taken_back(
         assert editor.sketch == before
 
 
-def test_a_dialog_that_cannot_be_drawn_is_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dialog_that_cannot_be_drawn_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with opened_editor(tmp_path) as hands:
         hands.window.contains_faults = True
         hands.key("ctrl+k")
@@ -218,22 +227,22 @@ def test_a_dialog_that_cannot_be_drawn_is_dropped(tmp_path: Path, monkeypatch: p
         monkeypatch.setattr(asked, "show_content", fail)
         hands.window.run_frame(0.1)
         hands.window.run_frame(0.1)
-        assert hands.editor.dialogs.current is None and "IndexError" in hands.editor.message
+        assert hands.editor.dialogs.current is None
+        assert "IndexError" in hands.editor.message
 
 
-def test_an_edit_of_a_session_that_raises_is_taken_back(
+def test_an_edit_of_a_session_that_raises_is_reverted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with opened(tmp_path) as driver:
-        window, session = driver.window, driver.session
+    with open_viewer(tmp_path) as driver:
+        window = driver.window
+        session = driver.session
         window.contains_faults = True
         for _ in range(20):
             session.playback.step()
         session.fail_robot(2)
-        nodes, positions = (
-            len(session.timeline.document.nodes),
-            session.timeline.panes[0].simulation.positions.copy(),
-        )
+        nodes = len(session.timeline.document.nodes)
+        positions = session.timeline.panes[0].simulation.positions.copy()
         amend = session.timeline.history.amend
 
         def fail(moment: object) -> None:
@@ -244,9 +253,10 @@ def test_an_edit_of_a_session_that_raises_is_taken_back(
         driver.key("delete")
         assert "ZeroDivisionError" in driver.viewer.message
         monkeypatch.setattr(session.timeline.history, "amend", amend)
-        assert session.displayed.numbers == (1, 3) and len(session.timeline.document.nodes) == nodes
+        assert session.displayed.numbers == (1, 3)
+        assert len(session.timeline.document.nodes) == nodes
         assert (session.timeline.panes[0].simulation.positions == positions).all()
-        again = _same_without_a_fault()
+        again = build_session_without_fault()
         for _ in range(30):
             session.playback.step()
             again.playback.step()
@@ -254,7 +264,7 @@ def test_an_edit_of_a_session_that_raises_is_taken_back(
         assert (session.timeline.panes[0].simulation.positions == expected).all()
 
 
-def _same_without_a_fault() -> Session:
+def build_session_without_fault() -> Session:
     session = start_session()
     for _ in range(20):
         session.playback.step()
@@ -262,11 +272,12 @@ def _same_without_a_fault() -> Session:
     return session
 
 
-def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
+def test_a_step_that_raises_is_reverted_and_pauses_the_session(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with opened(tmp_path) as driver:
-        window, session = driver.window, driver.session
+    with open_viewer(tmp_path) as driver:
+        window = driver.window
+        session = driver.session
         window.contains_faults = True
         for _ in range(20):
             session.playback.step()
@@ -281,7 +292,8 @@ def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
         monkeypatch.setattr(pane, "step", fail)
         session.playback.is_playing = True
         driver.frames(3, 0.1)
-        assert not session.playback.is_playing and "ZeroDivisionError" in driver.viewer.message
+        assert not session.playback.is_playing
+        assert "ZeroDivisionError" in driver.viewer.message
         assert session.timeline.panes[0].time == pytest.approx(session.timeline.end_time)
         assert (session.timeline.panes[0].simulation.positions == positions).all()
         session.playback.is_playing = True
@@ -289,7 +301,7 @@ def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
         assert session.timeline.end_time > 20 * session.timeline.scenario.dt
 
 
-def test_a_map_with_controls_in_its_texts_is_drawn(tmp_path: Path) -> None:
+def test_a_message_with_control_characters_is_drawn(tmp_path: Path) -> None:
     with opened_editor(tmp_path) as hands:
         hands.editor.apply(add_circle(hands.sketch, (5.0, 5.0), 1.0))
         (item,) = hands.sketch.obstacles

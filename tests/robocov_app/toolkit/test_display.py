@@ -1,4 +1,4 @@
-"""The display: visible or not, and the environment as before afterwards."""
+"""The display: visible or not, and the environment variables afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Odd sizes, files, numbers and texts, each of which once raised something in a window or held it up."""
+"""Odd sizes, files, numbers and texts that once raised an error in a window or blocked it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pygame
 import pytest
 from driven_editor import opened_editor, sheet
-from driven_window import Driver, opened
+from driven_window import open_viewer, resize_window
 
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
@@ -25,45 +25,40 @@ posix_only = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links
 
 
 @pytest.mark.parametrize("precise", [math.nan, math.inf, -math.inf])
-def test_a_wheel_turned_by_no_number_counts_whole_notches(precise: float) -> None:
+def test_whole_notches_replace_a_wheel_value_that_is_not_finite(precise: float) -> None:
     event = pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=2, precise_x=0.0, precise_y=precise)
     assert get_wheel_notches(event) == 2.0
 
 
-def resize(driver: Driver, size: tuple[int, int]) -> None:
-    pygame.display.set_mode(size, pygame.RESIZABLE)
-    driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
-    driver.settle()
-
-
 @pytest.mark.parametrize("size", [(1, 1), (3, 700), (1300, 30)])
-def test_a_tiny_window_shows_a_part_of_a_larger_one(size: tuple[int, int], tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
-        resize(driver, size)
+def test_a_tiny_window_shows_a_part_of_a_larger_surface(size: tuple[int, int], tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        resize_window(driver, size)
         assert pygame.display.get_surface().get_size() == size
         driver.key("ctrl+k")
         driver.key("escape")
         driver.key("f1")
-        resize(driver, (900, 600))
+        resize_window(driver, (900, 600))
         assert driver.window.screen is pygame.display.get_surface()
     with opened_editor(tmp_path) as hands:
-        resize(hands, size)
+        resize_window(hands, size)
         hands.key("ctrl+k")
         hands.key("escape")
         hands.key("f5")
         hands.key("f5")
-        resize(hands, (900, 600))
+        resize_window(hands, (900, 600))
         assert hands.window.screen is pygame.display.get_surface()
 
 
 @posix_only
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("suffix", [".json", ".png", ".robocov"])
-def test_a_dropped_pipe_or_circle_of_links_is_refused(suffix: str, tmp_path: Path) -> None:
-    pipe, link = tmp_path / f"pipe{suffix}", tmp_path / f"loop{suffix}"
+def test_a_dropped_pipe_or_loop_of_links_is_refused(suffix: str, tmp_path: Path) -> None:
+    pipe = tmp_path / f"pipe{suffix}"
+    link = tmp_path / f"loop{suffix}"
     os.mkfifo(pipe)
     link.symlink_to(link)
-    with opened(tmp_path / "viewer") as driver:
+    with open_viewer(tmp_path / "viewer") as driver:
         for path, expected in ((pipe, "got a pipe or a device"), (link, "got a link to nothing")):
             driver.post(pygame.DROPFILE, file=str(path))
             driver.settle()
@@ -77,7 +72,7 @@ def test_a_dropped_pipe_or_circle_of_links_is_refused(suffix: str, tmp_path: Pat
 
 @posix_only
 @pytest.mark.timeout(60)
-def test_a_picture_that_is_a_pipe_does_not_hold_the_window_up(tmp_path: Path) -> None:
+def test_a_background_that_is_a_pipe_does_not_block_the_window(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "plan.png")
     sketch = sheet(background=Background("plan.png", (10, 10)))
     with opened_editor(tmp_path, sketch) as hands:
@@ -86,7 +81,7 @@ def test_a_picture_that_is_a_pipe_does_not_hold_the_window_up(tmp_path: Path) ->
         assert "got a pipe or a device" in hands.said
 
 
-def test_a_draft_with_an_endless_circle_is_drawn(tmp_path: Path) -> None:
+def test_a_draft_with_a_huge_circle_is_drawn(tmp_path: Path) -> None:
     sketch = sheet(CircleObstacle((5.0, 5.0), 1e308), CircleObstacle((1e308, -1e308), 0.5))
     with opened_editor(tmp_path, sketch) as hands:
         hands.select(*(item.key for item in sketch.obstacles))
@@ -94,8 +89,8 @@ def test_a_draft_with_an_endless_circle_is_drawn(tmp_path: Path) -> None:
         hands.window.run_frame(0.1)
 
 
-def test_an_open_list_whose_names_have_changed_chooses_nothing(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+def test_an_open_list_with_outdated_names_chooses_nothing(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
         driver.click(*driver.widget("menu", "map").rect.center)
         assert driver.window.panel.ui.open_list is not None
         driver.viewer.files.open_map("square")
@@ -104,7 +99,7 @@ def test_an_open_list_whose_names_have_changed_chooses_nothing(tmp_path: Path) -
 
 
 @posix_only
-def test_a_map_whose_file_name_is_no_text_has_drafts(tmp_path: Path) -> None:
+def test_a_map_whose_file_name_is_not_text_has_drafts(tmp_path: Path) -> None:
     path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.json"))
     document = Document.new(tmp_path / "drafts", path)
     with opened_editor(tmp_path, document=document) as hands:
@@ -112,19 +107,21 @@ def test_a_map_whose_file_name_is_no_text_has_drafts(tmp_path: Path) -> None:
         hands.window.run_frame(0.1)
         assert document.flush()
     (draft,) = find_recoverable(tmp_path / "drafts")
-    assert draft.path == path and len(draft.read_sketch().obstacles) == 1
+    assert draft.path == path
+    assert len(draft.read_sketch().obstacles) == 1
 
 
-def test_a_question_that_cannot_be_sent_is_not_waited_for(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_question_that_cannot_be_sent_is_reported(capfd: pytest.CaptureFixture[str]) -> None:
     worker = LatestWorker[object]("slow_service:Slow", "works")
     try:
-        worker.put(lambda: None)  # functions without a name cannot be sent
+        worker.put(lambda: None)  # a lambda cannot be pickled
         for _ in range(2000):
             worker.poll()
             if not worker.busy:
                 break
             pygame.time.wait(10)
-        assert not worker.busy and "has ended" in worker.trouble
+        assert not worker.busy
+        assert "has ended" in worker.trouble
     finally:
         worker.close()
 
@@ -136,5 +133,6 @@ def test_a_process_that_cannot_be_started_is_reported(monkeypatch: pytest.Monkey
     monkeypatch.setattr("robocov_app.jobs.workers.start_process", refuse)
     worker = LatestWorker[object]("slow_service:Slow", "works")
     worker.put(1)
-    assert not worker.busy and worker.poll() is None
+    assert not worker.busy
+    assert worker.poll() is None
     assert worker.trouble == "the process that works cannot be started: Resource temporarily unavailable"

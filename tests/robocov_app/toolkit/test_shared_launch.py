@@ -1,4 +1,4 @@
-"""What both windows share when they are opened: sizes, and the question about unsaved work."""
+"""Opening of both windows: sizes, scales, and the question about unsaved work."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from robocov_app.toolkit.window_settings import WindowSettings, limit_window_siz
     ("size", "limited"),
     [((1280, 720), (1280, 720)), ((1, 1), (900, 600)), ((100_000, 100_000), (7680, 4320))],
 )
-def test_every_size_of_a_window_can_be_saved(size: tuple[int, int], limited: tuple[int, int]) -> None:
+def test_window_sizes_are_limited_for_settings(size: tuple[int, int], limited: tuple[int, int]) -> None:
     width, height = limit_window_size(size)
     assert (width, height) == limited
     assert WindowSettings(width=width, height=height).width == width
 
 
-def test_a_requested_scale_goes_before_that_of_the_display() -> None:
+def test_a_requested_scale_has_priority_over_the_display() -> None:
     assert choose_scale(1.5, has_display=True) == 1.5
     assert choose_scale(None, has_display=False) == 1.0
 

@@ -1,4 +1,4 @@
-"""SIGTERM and SIGHUP end a window in time, whatever it is doing, and its draft is there."""
+"""SIGTERM and SIGHUP end a process in time, after its drafts are written."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from robocov_app.storage.autosave import Autosaver
 from robocov_app.toolkit.termination import ending_on_signals, is_ending
 
 def be_busy():
-    # as a compiler that never looks whether it is to end
+    # Like a compiler, this never checks whether it has to end.
     while True:
         time.sleep(0.01)
 
@@ -48,15 +48,16 @@ with ending_on_signals():
 
 
 @contextmanager
-def program(folder: Path, main: str, *, prefix: tuple[str, ...] = ()) -> Iterator[subprocess.Popen[str]]:
-    """Run the program up to a change that is not written yet."""
+def run_program(folder: Path, main: str, *, prefix: tuple[str, ...] = ()) -> Iterator[subprocess.Popen[str]]:
+    """Run the program until it has a change that is not saved."""
     script = PROGRAM.replace("{main}", main)
     pipe = subprocess.PIPE
     process = subprocess.Popen(
         [*prefix, sys.executable, "-c", script, str(folder)], stdin=pipe, stdout=pipe, stderr=pipe, text=True
     )
     try:
-        assert process.stdout is not None and process.stdin is not None
+        assert process.stdout is not None
+        assert process.stdin is not None
         assert process.stdout.readline() == "ready\n"
         process.stdin.write("\n")
         process.stdin.flush()
@@ -68,29 +69,31 @@ def program(folder: Path, main: str, *, prefix: tuple[str, ...] = ()) -> Iterato
         process.communicate()
 
 
-def works_in(folder: Path) -> list[object]:
+def list_works(folder: Path) -> list[object]:
     return [record.content["work"] for record in find_drafts(folder, KIND, lambda record: record)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_busy_window_ends_with_its_draft_written(number: int, tmp_path: Path) -> None:
-    with program(tmp_path, "be_busy") as process:
+def test_a_busy_process_ends_after_writing_its_draft(number: int, tmp_path: Path) -> None:
+    with run_program(tmp_path, "be_busy") as process:
         process.send_signal(number)
         assert process.wait(HANG_LIMIT_S) == 128 + number
-        assert process.stderr is not None and process.stderr.read() == ""
-    assert works_in(tmp_path) == [1]
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert list_works(tmp_path) == [1]
 
 
-def test_a_window_whose_loop_runs_closes_in_order(tmp_path: Path) -> None:
-    with program(tmp_path, "run_loop") as process:
+def test_a_running_loop_closes_in_order(tmp_path: Path) -> None:
+    with run_program(tmp_path, "run_loop") as process:
         process.send_signal(signal.SIGTERM)
         assert process.wait(HANG_LIMIT_S) == 0
-        assert process.stdout is not None and process.stdout.read() == "closed\n"
-    assert works_in(tmp_path) == [1]
+        assert process.stdout is not None
+        assert process.stdout.read() == "closed\n"
+    assert list_works(tmp_path) == [1]
 
 
-def test_signals_that_are_ignored_stay_ignored(tmp_path: Path) -> None:
-    with program(tmp_path, "run_loop", prefix=("nohup",)) as process:
+def test_ignored_signals_stay_ignored(tmp_path: Path) -> None:
+    with run_program(tmp_path, "run_loop", prefix=("nohup",)) as process:
         process.send_signal(signal.SIGHUP)
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(1.5)
@@ -98,7 +101,7 @@ def test_signals_that_are_ignored_stay_ignored(tmp_path: Path) -> None:
         process.wait(HANG_LIMIT_S)
 
 
-def test_handlers_are_as_before_afterwards() -> None:
+def test_previous_handlers_are_restored() -> None:
     before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)
     with ending_on_signals(), ending_on_signals():
         assert not is_ending()
@@ -107,7 +110,7 @@ def test_handlers_are_as_before_afterwards() -> None:
     assert signal.set_wakeup_fd(-1) == -1
 
 
-def test_an_error_within_is_passed_on() -> None:
+def test_errors_are_passed_on() -> None:
     with pytest.raises(ZeroDivisionError), ending_on_signals():
         _ = 1 / 0
     assert not is_ending()

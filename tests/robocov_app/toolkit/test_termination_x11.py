@@ -1,4 +1,4 @@
-"""Signals end real windows in whatever state, with their drafts written, and without questions."""
+"""Signals end real windows in any state without a question, after their drafts are written."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def display() -> Iterator[str]:
         yield number
 
 
-def environment_in(folder: Path, *, is_cold: bool) -> dict[str, str]:
+def build_environment(folder: Path, *, is_cold: bool) -> dict[str, str]:
     """Return environment variables; with empty caches everything has to be compiled first."""
     (folder / "settings").mkdir()
     (folder / "settings/window.json").write_text("{}")  # not the first start, at which a lesson is offered
@@ -38,29 +38,29 @@ def environment_in(folder: Path, *, is_cold: bool) -> dict[str, str]:
     return found
 
 
-def end(process: subprocess.Popen[str], number: int) -> None:
+def end_process(process: subprocess.Popen[str], number: int) -> None:
     began = time.monotonic()
     process.send_signal(number)
     process.wait(HANG_LIMIT_S)
     assert time.monotonic() - began < HANG_LIMIT_S
 
 
-def drafts_in(folder: Path) -> list[dict]:
+def read_drafts(folder: Path) -> list[dict]:
     return [json.loads(path.read_text()) for path in folder.rglob("draft.json")]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_window_that_compiles_ends(display: str, tmp_path: Path, number: int) -> None:
+def test_a_compiling_window_ends(display: str, tmp_path: Path, number: int) -> None:
     command = [*COMMAND, "demo", "square", "--robots", "3", "--folder", str(tmp_path)]
-    with run_window(display, tmp_path, command, **environment_in(tmp_path, is_cold=True)) as hands:
-        end(hands.process, number)
+    with run_window(display, tmp_path, command, **build_environment(tmp_path, is_cold=True)) as hands:
+        end_process(hands.process, number)
 
 
-def test_a_served_window_that_compiles_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in environment_in(tmp_path, is_cold=True).items():
+def test_a_compiling_served_window_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in build_environment(tmp_path, is_cold=True).items():
         monkeypatch.setenv(name, value)
     with served("demo", "square", "--robots", "3", "--folder", str(tmp_path)) as link:
-        end(link.process, signal.SIGTERM)
+        end_process(link.process, signal.SIGTERM)
 
 
 def draw_circle(hands: Hands) -> None:
@@ -74,7 +74,7 @@ def ask_to_save(hands: Hands) -> None:
     hands.key("ctrl+q")
 
 
-def choose_a_file(hands: Hands) -> None:
+def choose_file(hands: Hands) -> None:
     hands.key("ctrl+o")
 
 
@@ -82,22 +82,22 @@ def show_palette(hands: Hands) -> None:
     hands.key("ctrl+k")
 
 
-def drag_something(hands: Hands) -> None:
+def start_drag(hands: Hands) -> None:
     hands.move(400, 400)
     hands.tool("mousedown", 1)
     hands.move(430, 430)
 
 
-@pytest.mark.parametrize("act", [ask_to_save, choose_a_file, show_palette, drag_something])
+@pytest.mark.parametrize("act", [ask_to_save, choose_file, show_palette, start_drag])
 def test_an_editor_with_a_dialog_ends_and_keeps_its_draft(
     display: str, tmp_path: Path, act: Callable[[Hands], None]
 ) -> None:
     command = [*COMMAND, "edit", str(tmp_path / "m.json"), "--folder", str(tmp_path), "--size", "1000x640"]
-    with run_window(display, tmp_path, command, **environment_in(tmp_path, is_cold=False)) as hands:
+    with run_window(display, tmp_path, command, **build_environment(tmp_path, is_cold=False)) as hands:
         draw_circle(hands)
         act(hands)
         time.sleep(0.3)
         assert hands.process.poll() is None
-        end(hands.process, signal.SIGTERM)
-    (draft,) = drafts_in(tmp_path / "drafts")
+        end_process(hands.process, signal.SIGTERM)
+    (draft,) = read_drafts(tmp_path / "drafts")
     assert len(draft["sketch"]["obstacles"]) == 1

@@ -1,4 +1,4 @@
-"""Boxes of a window, and words for keys and for what is typed."""
+"""Layout of a window, names of keys, and typed commands."""
 
 import pytest
 
@@ -7,21 +7,22 @@ from robocov_app.toolkit.input import format_key
 from robocov_app.toolkit.layout import build_layout, find_max_scale, is_inside
 
 
-def test_the_panel_stands_at_the_right_of_the_arena() -> None:
+def test_the_panel_is_to_the_right_of_the_arena() -> None:
     layout = build_layout((1280, 720), 1.0, 1, 4 / 3)
     assert (layout.arena, layout.panel) == ((0, 0, 960, 518), (960, 0, 320, 720))
-    assert is_inside((10, 10, 5, 5), (14, 10)) and not is_inside((10, 10, 5, 5), (15, 10))
+    assert is_inside((10, 10, 5, 5), (14, 10))
+    assert not is_inside((10, 10, 5, 5), (15, 10))
 
 
 @pytest.mark.parametrize(
     ("size", "scale"),
     [((900, 600), 1.0), ((1280, 720), 1.125), ((3840, 2160), 3.5), ((640, 480), 0.625), ((1170, 2532), 2.5)],
 )
-def test_text_is_as_large_as_there_is_room_for(size: tuple[int, int], scale: float) -> None:
+def test_the_scale_is_limited_by_the_window_size(size: tuple[int, int], scale: float) -> None:
     assert find_max_scale(size) == scale
 
 
-def test_keys_and_what_is_typed() -> None:
+def test_keys_are_formatted_and_commands_split() -> None:
     keys = ("ctrl+shift+z", "page down", "f1", "space", "`", "left")
     assert [format_key(key) for key in keys] == ["Ctrl Shift Z", "Page down", "F1", "Space", "`", "←"]
     assert split_command("k_rep = 0.5") == ("k_rep", "0.5")

@@ -1,4 +1,4 @@
-"""Widgets: what a page shows, and what hands do to it."""
+"""Widgets, dialogs, menus and the palette, used by events without a window."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import pygame
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 
 from robocov.errors import InputError
 from robocov_app.look.theme import DARK, LIGHT
@@ -23,13 +23,13 @@ KEYS |= {"up": pygame.K_UP, "down": pygame.K_DOWN, "backspace": pygame.K_BACKSPA
 MODIFIERS = {"ctrl": pygame.KMOD_LCTRL, "shift": pygame.KMOD_LSHIFT}
 
 
-def key(name: str) -> pygame.event.Event:
+def build_key_event(name: str) -> pygame.event.Event:
     *held, last = name.split("+")
     mod = sum(MODIFIERS[each] for each in held)
     return pygame.event.Event(pygame.KEYDOWN, key=KEYS.get(last) or ord(last), mod=mod, unicode="")
 
 
-def letters(text: str) -> pygame.event.Event:
+def build_text_event(text: str) -> pygame.event.Event:
     return pygame.event.Event(pygame.TEXTINPUT, text=text)
 
 
@@ -42,12 +42,16 @@ def screen(monkeypatch: pytest.MonkeyPatch) -> Iterator[pygame.Surface]:
     pygame.display.quit()
 
 
-class Page:
-    """One of each widget, and what they edit."""
+class EditedPage:
+    """A page with one widget of each kind, and the values that they edit."""
 
     def __init__(self, screen: pygame.Surface) -> None:
         self.screen = screen
-        self.value, self.on, self.name, self.word, self.tab = 0.5, False, "8", "b", "one"
+        self.value = 0.5
+        self.on = False
+        self.name = "8"
+        self.word = "b"
+        self.tab = "one"
         self.pressed = 0
         self.ui = Ui(self.page, LIGHT)
         self.ui.box = screen.get_rect()
@@ -57,8 +61,9 @@ class Page:
         self.pressed += ui.button("Go", tip="goes")
         self.pressed += ui.button("Stop", disabled_reason="nothing goes")
         self.value = ui.slider("value", self.value, 0.0, 1.0) or self.value
-        if (on := ui.check_box("On", value=self.on)) is not None:
-            self.on = on
+        is_on = ui.check_box("On", value=self.on)
+        if is_on is not None:
+            self.on = is_on
         self.name = ui.text_field("name", self.name) or self.name
         self.word = ui.dropdown("word", "abcdefghijklmnopqrstuvwxyz", self.word) or self.word
         self.tab = ui.tabs("tab", ["one", "two"], self.tab) or self.tab
@@ -84,7 +89,7 @@ class Page:
 
     def keys(self, *names: str) -> None:
         for name in names:
-            self.ui.handle_event(key(name))
+            self.ui.handle_event(build_key_event(name))
 
     def text(self) -> str:
         found = self.ui.find("entry", "name")
@@ -93,96 +98,108 @@ class Page:
 
 
 @pytest.fixture
-def page(screen: pygame.Surface) -> Page:
-    return Page(screen)
+def page(screen: pygame.Surface) -> EditedPage:
+    return EditedPage(screen)
 
 
-def test_widgets_edit_what_they_show(page: Page) -> None:
+def test_widgets_edit_their_values(page: EditedPage) -> None:
     page.press("button", "Go")
-    page.press("button", "Stop")  # disabled, with its reason as tip
-    assert page.pressed == 1 and page.ui.widgets["button:Stop"].tip == "nothing goes"
+    page.press("button", "Stop")  # disabled, with the reason as tip
+    assert page.pressed == 1
+    assert page.ui.widgets["button:Stop"].tip == "nothing goes"
     page.press("slider", "value", 0.9)
     assert 0.85 < page.value < 0.95
     page.press("check", "On")
     page.press("button", "tab:two")
-    assert page.on and page.tab == "two"
+    assert page.on
+    assert page.tab == "two"
 
 
-def test_a_field_replaces_undoes_and_gives_its_text_with_enter(page: Page) -> None:
+def test_a_text_field_edits_undoes_and_accepts_text(page: EditedPage) -> None:
     page.press("entry", "name")
-    page.ui.handle_event(letters("1"))
-    page.ui.handle_event(letters("2"))
-    assert page.ui.edit and page.name == "8"
+    page.ui.handle_event(build_text_event("1"))
+    page.ui.handle_event(build_text_event("2"))
+    assert page.ui.edit
+    assert page.name == "8"
     page.keys("ctrl+z")
     page.draw()
     assert page.text() == "8"  # letters that follow each other are undone together
     page.keys("ctrl+y", "ctrl+a", "ctrl+c", "return")
-    assert page.name == "12" and not page.ui.edit and page.ui.clipboard.get() == "12"
+    assert page.name == "12"
+    assert not page.ui.edit
+    assert page.ui.clipboard.get() == "12"
     page.press("entry", "name")
     page.keys("backspace", "escape")
     page.draw()
-    assert page.name == "12" and page.text() == "12"
+    assert page.name == "12"
+    assert page.text() == "12"
 
 
-def test_an_input_method_composes_before_it_types(page: Page) -> None:
+def test_an_input_method_composes_text(page: EditedPage) -> None:
     page.press("entry", "name")
     page.ui.handle_event(pygame.event.Event(pygame.TEXTEDITING, text="にほ", start=0, length=2))
     page.draw()
     page.keys("return")
-    assert page.ui.edit and page.text() == "8"
-    page.ui.handle_event(letters("日本"))
+    assert page.ui.edit
+    assert page.text() == "8"
+    page.ui.handle_event(build_text_event("日本"))
     page.keys("return")
     assert page.name == "日本"
 
 
-def test_lists_drop_down_over_what_is_below(page: Page) -> None:
+def test_an_open_list_covers_the_widgets_below(page: EditedPage) -> None:
     page.press("menu", "word")
     found = page.ui.open_list
     assert found is not None
     item = found.get_item_rect(found.chosen + 1)
     page.at(*item.center)
-    assert page.word == "c" and page.ui.open_list is None and page.tab == "one"
+    assert page.word == "c"
+    assert page.ui.open_list is None
+    assert page.tab == "one"
     page.press("menu", "word")
     page.keys("up", "return")
     assert page.word == "b"
     page.press("menu", "word")
-    page.press("button", "Go")  # closes the list, and no more
-    assert page.pressed == 0 and page.ui.open_list is None
+    page.press("button", "Go")  # only closes the list
+    assert page.pressed == 0
+    assert page.ui.open_list is None
 
 
-def test_tab_walks_and_keys_press(page: Page) -> None:
-    assert not page.ui.handle_event(key("tab"))  # while nothing has the focus it means something else
+def test_tab_moves_the_focus_and_keys_press_widgets(page: EditedPage) -> None:
+    assert not page.ui.handle_event(build_key_event("tab")), "no widget has the focus"
     page.press("entry", "name")
     page.keys("shift+tab", "space")
-    assert page.on and not page.ui.edit
+    assert page.on
+    assert not page.ui.edit
     page.keys("shift+tab", "left")
     assert page.value < 0.5
     page.keys("shift+tab", "return")
     assert page.pressed == 1
-    assert (
-        not page.ui.handle_event(key("x"))
-        and page.ui.handle_event(key("escape"))
-        and not page.ui.handle_event(key("space"))
-    )
+    assert not page.ui.handle_event(build_key_event("x"))
+    assert page.ui.handle_event(build_key_event("escape"))
+    assert not page.ui.handle_event(build_key_event("space"))
 
 
-def test_more_than_there_is_room_for_scrolls_and_folds(page: Page) -> None:
+def test_long_content_scrolls_and_folds(page: EditedPage) -> None:
     bar = page.ui.find("bar", "more")
-    assert bar is not None and bar.value == 0.0
+    assert bar is not None
+    assert bar.value == 0.0
     page.ui.pointer = (50, 280)
     page.ui.handle_event(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=-1, precise_y=-1.0))
     page.draw()
     bar = page.ui.find("bar", "more")
-    assert bar is not None and bar.value == 40.0
+    assert bar is not None
+    assert bar.value == 40.0
     page.ui.handle_event(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=1, precise_y=1.0))
     page.draw()
     page.press("section", "section:MORE")
-    assert page.ui.find("label", "line 0") is None and page.ui.find("bar", "more") is None
+    assert page.ui.find("label", "line 0") is None
+    assert page.ui.find("bar", "more") is None
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.25])
-def test_what_is_drawn_once_is_copied(scale: float, screen: pygame.Surface) -> None:
-    page = Page(screen)
+def test_an_unchanged_page_is_copied(scale: float, screen: pygame.Surface) -> None:
+    page = EditedPage(screen)
     page.ui = Ui(page.page, DARK, scale)
     page.ui.box = screen.get_rect()
     page.draw()
@@ -195,12 +212,12 @@ def test_what_is_drawn_once_is_copied(scale: float, screen: pygame.Surface) -> N
 # commands
 
 
-class Done:
-    """Commands, and what they did."""
+class RecordedCommands:
+    """Commands that record their effects and errors."""
 
     def __init__(self) -> None:
         self.done: list[object] = []
-        self.said: list[str] = []
+        self.errors: list[str] = []
         self.commands = CommandTable(
             [
                 Command("pause", "Play or pause", "Run", lambda: self.done.append("pause"), ("space",)),
@@ -232,43 +249,67 @@ class Done:
         try:
             call()
         except InputError as error:
-            self.said.append(str(error))
+            self.errors.append(str(error))
 
 
-def test_keys_do_commands_once_and_tell_why_they_cannot_be_done() -> None:
-    its = Done()
-    command = its.commands.press_key(key("space"))
-    assert command is not None and command.name == "pause"
-    assert its.commands.press_key(key("space")) is None, "it is held down"
-    its.commands.release_key(key("space"))
-    its.commands.run("pause")
-    its.commands.run("undo")
-    assert its.done == ["pause"] and its.said == ["nothing to undo"]
-    assert its.commands["undo"].tip == "Undo (Ctrl Z)"
+def test_keys_run_commands_once_and_disabled_commands_report_why() -> None:
+    recorded = RecordedCommands()
+    command = recorded.commands.press_key(build_key_event("space"))
+    assert command is not None
+    assert command.name == "pause"
+    assert recorded.commands.press_key(build_key_event("space")) is None, "it is held down"
+    recorded.commands.release_key(build_key_event("space"))
+    recorded.commands.run("pause")
+    recorded.commands.run("undo")
+    assert recorded.done == ["pause"]
+    assert recorded.errors == ["nothing to undo"]
+    assert recorded.commands["undo"].tip == "Undo (Ctrl Z)"
 
 
-def test_the_palette_completes_and_keeps_what_was_wrong(screen: pygame.Surface) -> None:
-    its, dialogs, told = Done(), Dialogs(), []
-    dialogs.ask(create_palette(its.commands, "", told.append))
+def test_the_palette_completes_names_and_keeps_invalid_text(screen: pygame.Surface) -> None:
+    recorded = RecordedCommands()
+    dialogs = Dialogs()
+    messages = []
+    dialogs.ask(create_palette(recorded.commands, "", messages.append))
     dialogs.ignore_letter("/")
 
-    def does(*events: pygame.event.Event) -> None:
+    def send(*events: pygame.event.Event) -> None:
         for event in events:
             dialogs.draw(screen, LIGHT, 1.0)
             dialogs.handle_event(event)
 
-    does(letters("/"), letters("open"), key("return"), letters("attic"), key("return"))
-    assert dialogs.is_open and its.done == []
-    assert dialogs.current.text == "map attic" and dialogs.current.error == "there is no map attic"
-    does(key("ctrl+backspace"), letters("of"), key("tab"), key("return"))
-    assert not dialogs.is_open and its.done == ["office"] and told == ["office is open"]
+    send(
+        build_text_event("/"),
+        build_text_event("open"),
+        build_key_event("return"),
+        build_text_event("attic"),
+        build_key_event("return"),
+    )
+    assert dialogs.is_open
+    assert recorded.done == []
+    assert dialogs.current.text == "map attic"
+    assert dialogs.current.error == "there is no map attic"
+    send(
+        build_key_event("ctrl+backspace"),
+        build_text_event("of"),
+        build_key_event("tab"),
+        build_key_event("return"),
+    )
+    assert not dialogs.is_open
+    assert recorded.done == ["office"]
+    assert messages == ["office is open"]
     with pytest.raises(InputError, match="mao"):
-        its.commands.run_text("mao office")
+        recorded.commands.run_text("mao office")
 
 
 def test_questions_are_answered_by_keys_and_clicks(screen: pygame.Surface) -> None:
     given: list[str] = []
-    for events in ([key("return")], [key("tab"), key("return")], [key("d")], [key("escape")]):
+    for events in (
+        [build_key_event("return")],
+        [build_key_event("tab"), build_key_event("return")],
+        [build_key_event("d")],
+        [build_key_event("escape")],
+    ):
         dialogs = Dialogs()
         answers = [
             Answer("Save", lambda: given.append("s")),
@@ -282,39 +323,47 @@ def test_questions_are_answered_by_keys_and_clicks(screen: pygame.Surface) -> No
     assert given == ["s", "d", "d", "c"]
 
 
-def test_files_are_found_in_folders(screen: pygame.Surface, tmp_path: Any) -> None:
+def test_files_are_chosen_in_folders(screen: pygame.Surface, tmp_path: Any) -> None:
     (tmp_path / "maps").mkdir()
     (tmp_path / "maps" / "a.json").touch()
     (tmp_path / "maps" / "b.txt").touch()
     chosen: list[object] = []
     dialogs = Dialogs()
     dialogs.ask(create_file_choice("Open", tmp_path, chosen.append, suffixes=(".json",)))
-    for event in (key("return"), key("return")):
+    for event in (build_key_event("return"), build_key_event("return")):
         dialogs.draw(screen, LIGHT, 1.0)
         dialogs.handle_event(event)
-    assert chosen == [tmp_path / "maps" / "a.json"] and not dialogs.is_open
+    assert chosen == [tmp_path / "maps" / "a.json"]
+    assert not dialogs.is_open
 
 
-def test_a_menu_at_the_cursor_stays_in_the_window_and_passes_over_what_cannot_be_done(
+def test_a_menu_stays_in_the_window_and_skips_disabled_commands(
     screen: pygame.Surface,
 ) -> None:
-    its, dialogs = Done(), Dialogs()
-    dialogs.ask(Menu([its.commands["undo"], None, its.commands["pause"]], (310, 290), its.commands.run))
+    recorded = RecordedCommands()
+    dialogs = Dialogs()
+    dialogs.ask(
+        Menu([recorded.commands["undo"], None, recorded.commands["pause"]], (310, 290), recorded.commands.run)
+    )
     dialogs.draw(screen, LIGHT, 1.0)
-    assert dialogs.ui is not None and screen.get_rect().contains(dialogs.ui.box)
-    dialogs.handle_event(key("down"))
-    dialogs.handle_event(key("return"))
-    assert its.done == ["pause"] and not dialogs.is_open
+    assert dialogs.ui is not None
+    assert screen.get_rect().contains(dialogs.ui.box)
+    dialogs.handle_event(build_key_event("down"))
+    dialogs.handle_event(build_key_event("return"))
+    assert recorded.done == ["pause"]
+    assert not dialogs.is_open
 
 
-def test_a_command_that_is_typed_within_one_frame_is_done(tmp_path: Path) -> None:
-    """As on a slow machine: the key that asks, letters and Enter come before anything is drawn."""
-    with opened(tmp_path) as driver:
+def test_a_command_typed_within_one_frame_runs(tmp_path: Path) -> None:
+    """On a slow machine, all keys may come before the palette is drawn."""
+    with open_viewer(tmp_path) as driver:
         for letter in ("/", *"robots 1", "\r"):
             key = pygame.key.key_code("return") if letter == "\r" else ord(letter)
-            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode=letter, scancode=0))
+            attributes = {"key": key, "mod": 0, "unicode": letter, "scancode": 0}
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, attributes))
             if letter.isprintable():
                 pygame.event.post(pygame.event.Event(pygame.TEXTINPUT, text=letter))
-            pygame.event.post(pygame.event.Event(pygame.KEYUP, key=key, mod=0, unicode=letter, scancode=0))
+            pygame.event.post(pygame.event.Event(pygame.KEYUP, attributes))
         driver.frames(2)
-        assert not driver.window.dialogs.is_open and driver.viewer.session.displayed.numbers == (1,)
+        assert not driver.window.dialogs.is_open
+        assert driver.viewer.session.displayed.numbers == (1,)

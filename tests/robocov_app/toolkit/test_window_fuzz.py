@@ -1,4 +1,4 @@
-"""Thousands of random events for each of the two windows: nothing is raised, and the windows can be used."""
+"""Thousands of random events for both windows: nothing is raised, and the windows stay usable."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 import pytest
 from driven_editor import Hands, opened_editor
-from driven_window import Driver, opened
+from driven_window import Driver, open_viewer
 from random_events import RandomEvents
 
 from robocov.environment import Environment
@@ -26,11 +26,12 @@ SEED = 1
 
 @pytest.fixture(autouse=True)
 def _work_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)  # names without a folder are typed and dropped, too, and maps saved there
+    # Random events also type relative paths, and save maps there.
+    monkeypatch.chdir(tmp_path)
 
 
 def contain_faults(window: BaseWindow, folder: Path) -> FaultLog:
-    """Let a window go on after a fault, so that one run finds all of them."""
+    """Let a window continue after a fault, so that one run finds all faults."""
     window.contains_faults = True
     window.faults = FaultLog(folder / "faults")
     return window.faults
@@ -60,25 +61,26 @@ def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
 
 
 class CostsOfSmallMaps(Costs):
-    """Costs of maps with few obstacles: those of others take long, and have tests of their own."""
+    """Costs of maps with few obstacles. Larger maps would take long, and are tested elsewhere."""
 
-    def environment(self, environment: Environment) -> None:
+    def set_environment(self, environment: Environment) -> None:
         if len(environment.obstacles) < 10:
-            super().environment(environment)
+            super().set_environment(environment)
         else:
             self.forget()
-            self._map = None
+            self._map_question = None
 
 
 def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
         patch.setattr("driven_window.Costs", CostsOfSmallMaps)
-        driver = stack.enter_context(opened(folder, lattice=4, robots=2))
+        driver = stack.enter_context(open_viewer(folder, lattice=4, robots=2))
         log = contain_faults(driver.window, folder)
         fuzz = RandomEvents(driver.window, folder / "odd", seed)
 
         def keep_small() -> None:
-            session, viewer = driver.session, driver.viewer
+            session = driver.session
+            viewer = driver.viewer
             is_large = len(session.displayed.numbers) > 6 or len(session.displayed.environment.obstacles) > 20
             if is_large or session.timeline.scenario.robots > 6:
                 viewer.attempt(lambda: viewer.files.open_map("square"))
@@ -94,7 +96,7 @@ def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
 
 
 def leave_everything(driver: Driver | Hands) -> None:
-    """Release what is held, end what is going on, and give the window its usual size."""
+    """Release all buttons, cancel all actions, and restore the usual size of the window."""
     pygame.event.clear()
     pygame.key.set_mods(0)
     for button in (1, 2, 3):
@@ -108,21 +110,21 @@ def leave_everything(driver: Driver | Hands) -> None:
         driver.window.closed = False
 
 
-def test_the_editor_bears_some_random_events(tmp_path: Path) -> None:
+def test_the_editor_handles_a_few_random_events(tmp_path: Path) -> None:
     assert_no_fault(play_editor(tmp_path, SEED + 1, FEW_EVENTS))
 
 
-def test_the_viewer_bears_some_random_events(tmp_path: Path) -> None:
+def test_the_viewer_handles_a_few_random_events(tmp_path: Path) -> None:
     assert_no_fault(play_viewer(tmp_path, SEED + 1, FEW_EVENTS))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(580)
-def test_the_editor_survives_thousands_of_random_events(tmp_path: Path) -> None:
+def test_the_editor_handles_thousands_of_random_events(tmp_path: Path) -> None:
     assert_no_fault(play_editor(tmp_path, SEED, EVENTS))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(580)
-def test_the_viewer_survives_thousands_of_random_events(tmp_path: Path) -> None:
+def test_the_viewer_handles_thousands_of_random_events(tmp_path: Path) -> None:
     assert_no_fault(play_viewer(tmp_path, SEED, EVENTS))

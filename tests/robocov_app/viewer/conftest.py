@@ -1,4 +1,4 @@
-"""What several tests of the window share."""
+"""Fixtures of the viewer's tests."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from driven_window import Driver, opened
+from driven_window import Driver, open_viewer
 
 from robocov_app.viewer.session import history, present
 
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[Driver]:
-    """A window with a session, as a user has it in front of them."""
-    with opened(tmp_path) as driver:
+    """Yield the driver of a window with three robots in the hall."""
+    with open_viewer(tmp_path) as driver:
         yield driver
 
 
 @pytest.fixture
 def short_history(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the past be thinned soon."""
+    """Reduce the memory of the past, so that it is thinned soon."""
     monkeypatch.setattr(history, "MIN_STATES", 20)
     monkeypatch.setattr(present, "RunHistory", lambda dt: history.RunHistory(dt, 60_000))

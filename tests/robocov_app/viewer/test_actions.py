@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driven_window import KEYS, Driver, do, key_event, opened
+from driven_window import KEYS, Driver, build_key_event, open_viewer, run_command
 from hypothesis import given
 from hypothesis import strategies as st
 from pointer_events import build_event
@@ -185,15 +185,15 @@ def test_every_key_does_its_action(shared: Driver, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(shared.window, "do", done.append)
     for action in shared.window.commands.commands:
         for key in action.keys:
-            shared.post(pygame.KEYDOWN, **key_event(key))
-            shared.post(pygame.KEYUP, **key_event(key))
+            shared.post(pygame.KEYDOWN, **build_key_event(key))
+            shared.post(pygame.KEYUP, **build_key_event(key))
     shared.window.advance(0.0)
     assert done == [action.name for action in shared.window.commands.commands for _ in action.keys]
 
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory):
-    with opened(tmp_path_factory.mktemp("window")) as driver:
+    with open_viewer(tmp_path_factory.mktemp("window")) as driver:
         yield driver
 
 
@@ -214,7 +214,7 @@ def prepared(driver: Driver) -> Driver:
     session.add_robot((8.0, 2.0))
     session.undo()
     session.playback.is_playing = False
-    do(viewer, "tool:polygon")
+    run_command(viewer, "tool:polygon")
     viewer.tool.press(session, build_event((6.0, 6.0)))
     viewer.tool.press(session, build_event((7.0, 6.0)))
     viewer.tool.press(session, build_event((7.0, 7.0)))

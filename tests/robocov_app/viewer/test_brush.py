@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 from pointer_events import build_event
 from sample_sessions import HALL, LLOYD, RAPF, advance_session, describe_state, get_positions, start_session
 
@@ -215,7 +215,7 @@ def test_nothing_is_painted_before_a_press():
 
 
 def test_the_brush_is_used_in_the_window(tmp_path):
-    with opened(tmp_path, RAPF, LLOYD) as driver:
+    with open_viewer(tmp_path, RAPF, LLOYD) as driver:
         session = driver.session
         plain = driver.picture()
         driver.key("g")

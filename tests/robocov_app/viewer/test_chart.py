@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driven_window import Driver, opened
+from driven_window import Driver, open_viewer
 
 from robocov_app.render.canvas import Canvas
 from robocov_app.viewer.chart import map_curve_colors
@@ -19,7 +19,7 @@ from robocov_app.viewer.session.controller_choice import ControllerChoice
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[Driver]:
-    with opened(tmp_path, ControllerChoice("rapf"), ControllerChoice("rpf")) as opened_driver:
+    with open_viewer(tmp_path, ControllerChoice("rapf"), ControllerChoice("rpf")) as opened_driver:
         yield opened_driver
 
 
@@ -44,7 +44,7 @@ def test_times_keep_apart_in_a_narrow_chart(
         return wide
 
     monkeypatch.setattr(Canvas, "draw_text", noted)
-    with opened(tmp_path, size=(width, 1200), scale=3.0) as driver:
+    with open_viewer(tmp_path, size=(width, 1200), scale=3.0) as driver:
         ends.clear()
         driver.window.chart._page = None
         driver.frames(1)
@@ -71,7 +71,7 @@ def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> 
 
 
 def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
-    with opened(
+    with open_viewer(
         tmp_path,
         ControllerChoice("rapf"),
         ControllerChoice("rapf", {"k_rep": 1.0}),

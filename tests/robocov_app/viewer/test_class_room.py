@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import Driver, opened
+from driven_window import Driver, open_viewer
 from sample_sessions import RAPF, get_positions
 
 from robocov.environment import Environment
@@ -44,7 +44,7 @@ def play(driver: Driver) -> None:
 @pytest.mark.slow
 def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     left = tmp_path / "left"
-    with opened(tmp_path, RAPF, environment=ROOM, robots=4) as driver:
+    with open_viewer(tmp_path, RAPF, environment=ROOM, robots=4) as driver:
         driver.viewer.files.workspace = SessionWorkspace(driver.session, left)
         play(driver)
         driver.key("w")

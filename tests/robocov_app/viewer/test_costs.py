@@ -17,26 +17,27 @@ from robocov_app.render.distance_field import Field
 from robocov_app.viewer import costs as module
 from robocov_app.viewer.costs import Costs, CostService
 
-PLACES = np.array([[1.0, 1.0], [5.0, 3.0]])
-OTHERS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])
+POSITIONS = np.array([[1.0, 1.0], [5.0, 3.0]])
+OTHER_POSITIONS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])
 CROSSED = replace(
     HALL,
     obstacles=(*HALL.obstacles, CircleObstacle((1.0, 2.0), 0.4, path=ObstaclePath(((1, 2), (5, 2)), 0.5))),
 )
-"""A hall through which something goes."""
+"""A hall with a moving obstacle."""
 INSIDE = np.array([[4.2, 1.2]])
-"""Of the pillar."""
+"""Position of a robot inside the pillar."""
 FULL = Environment("full", ((0, 0), (1, 0), (1, 1), (0, 1)), (CircleObstacle((0.5, 0.5), 0.3),))
-PATIENCE = 60.0
-"""Seconds after which nothing will come any more."""
+TIMEOUT_S = 60.0
+"""Time after which a test gives up waiting for another process."""
 
 
-def answered(costs, wanted=1) -> dict[int, module.KnownCost]:
-    """Poll until so many panes have been answered."""
-    answers, end = {}, time.monotonic() + PATIENCE
+def wait_for_answers(costs, count=1) -> dict[int, module.KnownCost]:
+    """Poll until a number of panes have answers."""
+    answers = {}
+    end = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end:
         answers |= dict(costs.poll())
-        if len(answers) >= wanted:
+        if len(answers) >= count:
             return answers
         time.sleep(0.005)
     raise AssertionError(costs.state)
@@ -50,23 +51,33 @@ def worker_costs():
 
 
 class StubWorker:
-    """Answers when it is told to."""
+    """A worker that answers when a test calls `answer`."""
 
     def __init__(self) -> None:
-        self.asked, self.busy, self.is_alive, self.progress, self.trouble = [], False, True, None, ""
-        self._service, self._answer = DirectWorker(CostService(), module._CostWire()), None
+        self.asked = []
+        self.busy = False
+        self.is_alive = True
+        self.progress = None
+        self.trouble = ""
+        self._service = DirectWorker(CostService(), module._CostWire())
+        self._answer = None
 
     def put(self, question) -> None:
         self.asked.append(question)
-        self.busy, self.progress = True, None
+        self.busy = True
+        self.progress = None
         self._service.put(question)
 
     def answer(self) -> None:
-        self._answer, self.trouble = self._service.poll(), self._service.trouble
+        self._answer = self._service.poll()
+        self.trouble = self._service.trouble
         self.busy = False
 
     def die(self) -> None:
-        self._answer, self.trouble, self.busy, self.is_alive = None, "it has ended", False, False
+        self._answer = None
+        self.trouble = "it has ended"
+        self.busy = False
+        self.is_alive = False
 
     def poll(self):
         answer, self._answer = self._answer, None
@@ -75,7 +86,7 @@ class StubWorker:
 
 @pytest.fixture
 def stubbed():
-    """Give costs whose worker does what the test says."""
+    """Return costs with a `StubWorker`, and that worker."""
     costs = Costs(16, direct=True)
     costs._worker = StubWorker()
     costs.set_environment(HALL)
@@ -90,100 +101,100 @@ def ready(stubbed):
     return costs, worker
 
 
-# at once
+# in this process
 
 
-def test_answers_are_those_of_the_cost():
+def test_answers_equal_the_coverage_cost():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.5, PLACES)
-    costs.ask(3, 1.5, OTHERS, np.array([3.5, 0.5]))
+    costs.ask(0, 1.5, POSITIONS)
+    costs.ask(3, 1.5, OTHER_POSITIONS, np.array([3.5, 0.5]))
     assert costs.known == {}
     answers = dict(costs.poll())
     assert answers == costs.known
     cost = CoverageCost(HALL, 32)
-    assert answers[0].result.mean_distance == cost(PLACES).mean_distance
+    assert answers[0].result.mean_distance == cost(POSITIONS).mean_distance
     assert (answers[0].time, answers[0].path) == (1.5, None)
-    np.testing.assert_array_equal(answers[3].path, cost.find_path(OTHERS, np.array([3.5, 0.5])))
+    np.testing.assert_array_equal(answers[3].path, cost.find_path(OTHER_POSITIONS, np.array([3.5, 0.5])))
     assert isinstance(answers[3].field, Field)
     assert answers[3].field is answers[3].field
     assert costs.poll() == []
     costs.close()
 
 
-def test_only_the_newest_question_of_a_pane_counts():
+def test_only_the_newest_question_of_a_pane_is_answered():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
     for when in (1.0, 2.0, 3.0):
-        costs.ask(0, when, PLACES)
+        costs.ask(0, when, POSITIONS)
     assert [known.time for _, known in costs.poll()] == [3.0]
 
 
-def test_positions_are_those_when_it_was_asked():
-    costs, places = Costs(32, direct=True), PLACES.copy()
+def test_positions_are_copied_when_a_question_is_asked():
+    costs = Costs(32, direct=True)
+    positions = POSITIONS.copy()
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, places)
-    places += 0.5
+    costs.ask(0, 1.0, positions)
+    positions += 0.5
     ((_, known),) = costs.poll()
-    np.testing.assert_array_equal(known.result.positions, PLACES)
+    np.testing.assert_array_equal(known.result.positions, POSITIONS)
 
 
-def test_what_cannot_be_computed_is_left_out():
+def test_impossible_questions_have_no_answer():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
     costs.ask(0, 1.0, INSIDE)
-    costs.ask(1, 1.0, PLACES, INSIDE[0])
+    costs.ask(1, 1.0, POSITIONS, INSIDE[0])
     assert [(pane, known.path) for pane, known in costs.poll()] == [(1, None)]
     assert costs.state == ""
 
 
-def test_another_map():
+def test_a_new_map_replaces_earlier_questions():
     costs = Costs(16, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, PLACES)
+    costs.ask(0, 1.0, POSITIONS)
     costs.poll()
-    costs.ask(0, 2.0, PLACES)
+    costs.ask(0, 2.0, POSITIONS)
     costs.set_environment(replace(HALL, obstacles=()))
     assert costs.known == {}
-    # what was asked was asked of the map before
-    assert costs.poll() == []
+    assert costs.poll() == [], "the question was about the previous map"
     costs.ask(0, 2.0, INSIDE)
     assert len(costs.poll()) == 1
     costs = Costs(1, direct=True)
     costs.set_environment(FULL)
-    costs.ask(0, 1.0, PLACES)
+    costs.ask(0, 1.0, POSITIONS)
     assert costs.poll() == []
     assert costs.state.startswith("no cost: ")
     costs.set_environment(HALL)
     assert costs.state == ""
 
 
-def test_what_was_of_another_run_is_forgotten():
+def test_forget_drops_costs_and_questions():
     costs = Costs(16, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, PLACES)
+    costs.ask(0, 1.0, POSITIONS)
     costs.poll()
-    costs.ask(0, 2.0, PLACES)
+    costs.ask(0, 2.0, POSITIONS)
     costs.forget()
     assert costs.known == {}
     assert costs.poll() == []
 
 
-def test_obstacles_that_move_stand_where_they_are_at_the_time():
+def test_moving_obstacles_are_at_the_position_of_the_time():
     costs = Costs(32, direct=True)
     costs.set_environment(CROSSED)
     assert costs.state == ""
     values = []
     for when in (0.0, 2.5, 5.0):
-        costs.ask(0, when, PLACES)
+        costs.ask(0, when, POSITIONS)
         ((_, known),) = costs.poll()
-        assert known.result.mean_distance == CoverageCost(CROSSED.at(when), 32)(PLACES).mean_distance
+        assert known.result.mean_distance == CoverageCost(CROSSED.at(when), 32)(POSITIONS).mean_distance
         assert known.field.largest == known.result.distances.max()
         values.append(known.result.mean_distance)
     assert len(set(values)) == 3
 
 
-def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
+def test_a_robot_under_a_moving_obstacle_owns_no_site():
     costs = Costs(32, direct=True)
     costs.set_environment(CROSSED)
     over = np.array([[1.0, 2.0], [5.0, 3.0]])
@@ -193,30 +204,30 @@ def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
     assert set(known.result.owner.tolist()) == {1}
     assert known.result.mean_distance == CoverageCost(CROSSED.at(0.0), 32)(over[1:]).mean_distance
     np.testing.assert_array_equal(known.path[-1], over[1])
-    # nobody is left
+    # There is no other robot.
     costs.ask(0, 0.0, over[:1])
     assert costs.poll() == []
 
 
-def test_the_time_until_the_first_robot_comes():
+def test_travel_time_of_robots_with_speeds():
     speeds = np.array([0.2, 1.0])
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
-    costs.ask(0, 1.0, PLACES)
-    costs.ask(1, 1.0, PLACES, speeds=speeds)
+    costs.ask(0, 1.0, POSITIONS)
+    costs.ask(1, 1.0, POSITIONS, speeds=speeds)
     without, timed = (known for _, known in costs.poll())
     assert without.travel_time is None
-    assert timed.travel_time == CoverageCost(HALL, 32)(PLACES, speeds).mean_time
-    # the distance is that of the nearest one all the same
+    assert timed.travel_time == CoverageCost(HALL, 32)(POSITIONS, speeds).mean_time
+    # The distance is still that to the nearest robot.
     assert timed.result.mean_distance == without.result.mean_distance
 
 
-# in turn
+# order of the questions
 
 
-def test_nothing_is_asked_before_the_map_is_ready(stubbed):
+def test_questions_wait_until_the_map_is_prepared(stubbed):
     costs, worker = stubbed
-    costs.ask(0, 1.0, PLACES)
+    costs.ask(0, 1.0, POSITIONS)
     assert costs.poll() == []
     assert costs.state == "cost: preparing the map"
     worker.progress = 0.25, 3.0
@@ -232,34 +243,34 @@ def test_nothing_is_asked_before_the_map_is_ready(stubbed):
     assert [each.time for each in worker.asked[1:]] == [1.0]
 
 
-def test_every_pane_has_its_turn(ready):
+def test_panes_take_turns(ready):
     costs, worker = ready
     turns = []
     for frame in range(40):
         for pane in range(3):
-            costs.ask(pane, float(frame), PLACES)
+            costs.ask(pane, float(frame), POSITIONS)
         worker.answer()
         turns += [pane for pane, _ in costs.poll()]
     assert {turns.count(pane) for pane in range(3)} <= {13, 14}
-    # each answer is of the newest question
+    # Each answer belongs to a recent question.
     assert min(known.time for known in costs.known.values()) >= 36.0
 
 
-def test_one_question_at_a_time(ready):
+def test_one_question_is_sent_at_a_time(ready):
     costs, worker = ready
     for pane in range(3):
-        costs.ask(pane, 1.0, PLACES)
+        costs.ask(pane, 1.0, POSITIONS)
     for _ in range(3):
         assert costs.poll() == []
     assert len(worker.asked) == 2  # with the map
 
 
-def test_answers_to_another_run_are_passed_over(ready):
+def test_answers_to_forgotten_questions_are_ignored(ready):
     costs, worker = ready
-    costs.ask(0, 7.0, PLACES)
+    costs.ask(0, 7.0, POSITIONS)
     costs.poll()
     costs.forget()
-    costs.ask(0, 0.0, OTHERS)
+    costs.ask(0, 0.0, OTHER_POSITIONS)
     worker.answer()
     assert costs.poll() == []
     assert costs.known == {}
@@ -267,9 +278,9 @@ def test_answers_to_another_run_are_passed_over(ready):
     assert [(pane, known.time) for pane, known in costs.poll()] == [(0, 0.0)]
 
 
-def test_so_are_those_of_another_map(ready):
+def test_answers_about_an_earlier_map_are_ignored(ready):
     costs, worker = ready
-    costs.ask(2, 7.0, PLACES)
+    costs.ask(2, 7.0, POSITIONS)
     costs.poll()
     costs.set_environment(replace(HALL, obstacles=()))
     costs.ask(2, 8.0, INSIDE)
@@ -282,10 +293,10 @@ def test_so_are_those_of_another_map(ready):
     assert [(pane, known.time) for pane, known in answers] == [(2, 8.0)]
 
 
-def test_a_robot_in_an_obstacle_stops_nothing(ready):
+def test_a_robot_in_an_obstacle_does_not_block_other_questions(ready):
     costs, worker = ready
     costs.ask(0, 1.0, INSIDE)
-    costs.ask(1, 1.0, PLACES)
+    costs.ask(1, 1.0, POSITIONS)
     costs.poll()
     worker.answer()
     assert "outside the free space" in worker.trouble
@@ -295,9 +306,9 @@ def test_a_robot_in_an_obstacle_stops_nothing(ready):
     assert [pane for pane, _ in costs.poll()] == [1]
 
 
-def test_a_process_that_ends_again_and_again_is_said(ready):
+def test_a_process_that_ends_repeatedly_is_reported(ready):
     costs, worker = ready
-    costs.ask(0, 1.0, PLACES)
+    costs.ask(0, 1.0, POSITIONS)
     costs.poll()
     worker.die()
     costs.poll()
@@ -306,64 +317,64 @@ def test_a_process_that_ends_again_and_again_is_said(ready):
     count = len(worker.asked)
     worker.die()
     for _ in range(3):
-        costs.ask(0, 2.0, PLACES)
+        costs.ask(0, 2.0, POSITIONS)
         costs.poll()
     assert costs.state == "no cost: it has ended"
     assert len(worker.asked) == count
 
 
-# by another process
+# in another process
 
 
-def test_another_process_says_the_same(worker_costs):
+def test_another_process_gives_the_same_answers(worker_costs):
     worker_costs.set_environment(HALL)
     point = np.array([3.5, 0.5])
-    worker_costs.ask(0, 1.5, PLACES)
-    worker_costs.ask(5, 1.5, OTHERS, point)
-    answers = answered(worker_costs, 2)
+    worker_costs.ask(0, 1.5, POSITIONS)
+    worker_costs.ask(5, 1.5, OTHER_POSITIONS, point)
+    answers = wait_for_answers(worker_costs, 2)
     cost = CoverageCost(HALL, 32)
-    for pane, places in ((0, PLACES), (5, OTHERS)):
+    for pane, positions in ((0, POSITIONS), (5, OTHER_POSITIONS)):
         assert answers[pane].time == 1.5
-        assert answers[pane].result.mean_distance == cost(places).mean_distance
-        np.testing.assert_array_equal(answers[pane].result.distances, cost(places).distances)
+        assert answers[pane].result.mean_distance == cost(positions).mean_distance
+        np.testing.assert_array_equal(answers[pane].result.distances, cost(positions).distances)
     assert answers[0].path is None
-    np.testing.assert_array_equal(answers[5].path, cost.find_path(OTHERS, point))
+    np.testing.assert_array_equal(answers[5].path, cost.find_path(OTHER_POSITIONS, point))
     assert answers[5].field.largest > 0.0
     assert worker_costs.state == ""
     assert worker_costs.known == answers
-    # no way from the pillar's middle
-    worker_costs.ask(0, 2.0, PLACES, INSIDE[0])
-    assert answered(worker_costs)[0].path is None
+    # There is no path from a point inside the pillar.
+    worker_costs.ask(0, 2.0, POSITIONS, INSIDE[0])
+    assert wait_for_answers(worker_costs)[0].path is None
     worker_costs.forget()
     assert worker_costs.known == {}
-    # another map, on which robots are where there was an obstacle
+    # On another map, robots may be where there was an obstacle.
     worker_costs.set_environment(replace(HALL, obstacles=()))
     worker_costs.ask(0, 3.0, INSIDE)
-    assert answered(worker_costs)[0].time == 3.0
+    assert wait_for_answers(worker_costs)[0].time == 3.0
 
 
 @pytest.mark.slow
-def test_another_process_knows_where_obstacles_are(worker_costs):
+def test_another_process_evaluates_moving_obstacles(worker_costs):
     worker_costs.set_environment(CROSSED)
     speeds = np.array([0.5, 1.0])
     for when in (0.0, 2.5):
-        worker_costs.ask(0, when, PLACES, speeds=speeds)
-        known = answered(worker_costs)[0]
+        worker_costs.ask(0, when, POSITIONS, speeds=speeds)
+        known = wait_for_answers(worker_costs)[0]
         cost = CoverageCost(CROSSED.at(when), 32)
         assert known.time == when
-        assert known.result.mean_distance == cost(PLACES).mean_distance
-        assert known.travel_time == cost(PLACES, speeds).mean_time
-        # of the sites as they are then
+        assert known.result.mean_distance == cost(POSITIONS).mean_distance
+        assert known.travel_time == cost(POSITIONS, speeds).mean_time
+        # The sites are those at that time.
         np.testing.assert_array_equal(known.result.points, cost.points)
         assert known.field.largest == known.result.distances.max()
 
 
 @pytest.mark.slow
-def test_a_map_without_a_cost_is_said():
+def test_a_map_without_a_cost_is_reported():
     costs = Costs(1)
     try:
         costs.set_environment(FULL)
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT_S
         while not costs.state.startswith("no cost") and time.monotonic() < end:
             costs.poll()
             time.sleep(0.005)
@@ -374,15 +385,15 @@ def test_a_map_without_a_cost_is_said():
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
-def test_a_process_that_dies_is_replaced(worker_costs):
+def test_a_killed_process_is_replaced(worker_costs):
     worker_costs.set_environment(HALL)
-    worker_costs.ask(0, 1.0, PLACES)
-    answered(worker_costs)
+    worker_costs.ask(0, 1.0, POSITIONS)
+    wait_for_answers(worker_costs)
     os.kill(worker_costs._worker.process.pid, signal.SIGKILL)
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT_S
     answers = []
     while not answers and time.monotonic() < end:
-        worker_costs.ask(0, 2.0, PLACES)
+        worker_costs.ask(0, 2.0, POSITIONS)
         answers = worker_costs.poll()
         time.sleep(0.005)
     assert answers[0][1].time == 2.0

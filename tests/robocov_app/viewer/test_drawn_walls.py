@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 from sample_sessions import HALL, RAPF
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
@@ -20,7 +20,7 @@ def build_room(*walls: WallObstacle) -> Environment:
 
 
 def test_a_wall_that_ends_near_walls_closes_the_room(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
+    with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
         driver.key("w")
         # Without snapping there would be cracks of two centimeters.
         driver.click_at((5.0, 0.02))
@@ -33,7 +33,7 @@ def test_a_wall_that_ends_near_walls_closes_the_room(tmp_path: Path) -> None:
 
 
 def test_a_wall_far_from_others_stays_where_it_is_drawn(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
+    with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
         driver.key("w")
         for point in ((5.0, 1.0), (5.0, 4.0)):
             driver.click_at(point)
@@ -44,7 +44,7 @@ def test_a_wall_far_from_others_stays_where_it_is_drawn(tmp_path: Path) -> None:
 
 
 def test_a_wall_can_be_drawn_by_dragging(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
+    with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
         driver.key("w")
         driver.drag_at((5.0, 0.02), (5.0, 5.98))
         (wall,) = driver.session.displayed.environment.obstacles
@@ -53,7 +53,7 @@ def test_a_wall_can_be_drawn_by_dragging(tmp_path: Path) -> None:
 
 
 def test_a_very_short_drag_counts_as_a_click(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
+    with open_viewer(tmp_path, RAPF, environment=build_room(), robots=2) as driver:
         driver.key("w")
         driver.drag_at((2.0, 3.0), (2.0, 3.01))
         assert driver.session.displayed.environment.obstacles == ()

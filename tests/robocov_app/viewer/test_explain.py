@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn_run import HALL, ROOMS, SQUARE
-from explained_moments import line, moment, says_no_nonsense, sums_up, texts
 from hypothesis import given
 from hypothesis import strategies as st
+from robot_reports import assert_consistent, assert_forces_sum_up, build_report, get_line, list_texts
 
 from robocov import Rapf, Simulation, Team
 from robocov.observation import Decision
@@ -16,19 +16,20 @@ from robocov_app.viewer.explanation.explain import explain
 from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
 from robocov_app.viewer.explanation.text import format_direction, format_force, format_length
 
-# sizes and directions
+# lengths, forces and directions
 
 
-def test_eight_directions():
-    ways = [format_direction(complex(np.cos(angle), np.sin(angle))) for angle in np.arange(8) * np.pi / 4]
-    assert ways == "east north-east north north-west west south-west south south-east".split()
+def test_format_direction():
+    angles = np.arange(8) * np.pi / 4
+    directions = [format_direction(complex(np.cos(angle), np.sin(angle))) for angle in angles]
+    assert directions == "east north-east north north-west west south-west south south-east".split()
     assert format_direction(0j) == ""
     assert format_direction(-1 - 1e-9j) == "west"
     assert format_direction(complex(2.0, 5e-324)) == "east"
 
 
 @pytest.mark.parametrize(
-    ("meters", "words"),
+    ("meters", "text"),
     [
         (-1e-5, "0 mm"),
         (0, "0 mm"),
@@ -43,23 +44,23 @@ def test_eight_directions():
         (1e9, "over a million m"),
     ],
 )
-def test_lengths(meters, words):
-    assert format_length(meters) == words
+def test_format_length(meters, text):
+    assert format_length(meters) == text
 
 
 @pytest.mark.parametrize(
-    ("newtons", "words"),
+    ("newtons", "text"),
     [(0, "0 N"), (4e-4, "0 N"), (0.0042, "4 mN"), (0.314, "0.31 N"), (2, "2.0 N"), (12.3, "12 N")],
 )
-def test_forces(newtons, words):
-    assert format_force(newtons) == words
+def test_format_force(newtons, text):
+    assert format_force(newtons) == text
 
 
-# moments made by hand
+# given observations and decisions
 
 
-def test_each_force_is_told_with_what_causes_it():
-    report = moment(
+def test_each_force_is_described_with_its_cause():
+    report = build_report(
         [[2, 4], [1.2, 4], [2, 6]],
         goals=[[5, 4], [0, 0], [0, 0]],
         points=[[2, 3.58], [np.nan] * 2, [np.nan] * 2],
@@ -71,7 +72,7 @@ def test_each_force_is_told_with_what_causes_it():
     )
     assert report.title == "Robot 4"
     assert report.verdict == "moving 0.20 m/s east to its goal"
-    assert texts(report) == [
+    assert list_texts(report) == [
         "at (2.00, 4.00) m, 0.20 m/s east",
         "pulled 0.31 N to its goal, 3.0 m away",
         "pushed 0.12 N by robot 7, 80 cm west (2 robots in range)",
@@ -81,15 +82,15 @@ def test_each_force_is_told_with_what_causes_it():
         "32 cm clear of the obstacle south of it",
         "2 robots in communication range, the nearest is robot 7, 80 cm west",
     ]
-    assert line(report, "attraction").vector == (0.31, 0.0)
-    assert line(report, "viscosity").vector == (-0.4, 0.0)
-    sums_up(report)
+    assert get_line(report, "attraction").vector == (0.31, 0.0)
+    assert get_line(report, "viscosity").vector == (-0.4, 0.0)
+    assert_forces_sum_up(report)
 
 
-def test_robots_at_like_distances_are_named_together():
-    report = moment([[4, 4], [3, 4], [4, 5.2], [4, 0.5]], repulsion_robots=[[0.3, -0.2], *[[0, 0]] * 3])
+def test_robots_at_similar_distances_are_named_together():
+    report = build_report([[4, 4], [3, 4], [4, 5.2], [4, 0.5]], repulsion_robots=[[0.3, -0.2], *[[0, 0]] * 3])
     pushed = "pushed 0.36 N south-east by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
-    assert line(report, "repulsion_robots").text == pushed
+    assert get_line(report, "repulsion_robots").text == pushed
 
 
 @pytest.mark.parametrize(
@@ -101,14 +102,14 @@ def test_robots_at_like_distances_are_named_together():
         ((10.05, 2.8), "the obstacle"),
     ],
 )
-def test_an_obstacle_point_is_told_by_what_it_belongs_to(point, name):
-    here = np.array(point) - [0.5, 0.0]
-    report = moment([here], points=[point], environment=ROOMS, repulsion_obstacle=[[-1.0, 0.0]])
-    assert line(report, "repulsion_obstacle").text == f"pushed 1.0 N by {name}, 50 cm east"
+def test_an_obstacle_is_named_by_its_kind(point, name):
+    position = np.array(point) - [0.5, 0.0]
+    report = build_report([position], points=[point], environment=ROOMS, repulsion_obstacle=[[-1.0, 0.0]])
+    assert get_line(report, "repulsion_obstacle").text == f"pushed 1.0 N by {name}, 50 cm east"
 
 
 @pytest.mark.parametrize(
-    ("environment", "here", "goal", "hidden"),
+    ("environment", "position", "goal", "hidden"),
     [
         (ROOMS, (3, 5), (3, 6), ""),
         (ROOMS, (3, 5), (6, 5), ", behind an obstacle"),
@@ -119,19 +120,19 @@ def test_an_obstacle_point_is_told_by_what_it_belongs_to(point, name):
         (HALL, (5, 2), (5, 9), ""),
     ],
 )
-def test_what_hides_a_goal(environment, here, goal, hidden):
-    pull = np.array(goal, dtype=float) - here
+def test_obstructed_goals_are_described(environment, position, goal, hidden):
+    pull = np.array(goal, dtype=float) - position
     away = format_length(float(np.hypot(*pull))) + " away" + hidden
     size = format_force(float(np.hypot(*pull)))
-    report = moment([here], goals=[goal], environment=environment, attraction=[pull])
-    assert line(report, "attraction").text == f"pulled {size} to its goal, {away}"
-    held = moment([here], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
+    report = build_report([position], goals=[goal], environment=environment, attraction=[pull])
+    assert get_line(report, "attraction").text == f"pulled {size} to its goal, {away}"
+    held = build_report([position], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
     assert held.verdict.startswith("at rest, stuck: " if hidden else "at rest ")
-    assert any(text.startswith("stuck: ") for text in texts(held)) == bool(hidden)
+    assert any(text.startswith("stuck: ") for text in list_texts(held)) == bool(hidden)
 
 
-def test_two_forces_that_balance_are_named():
-    report = moment(
+def test_two_balancing_forces_are_named():
+    report = build_report(
         [[3.4, 5]],
         goals=[[6, 5]],
         points=[[4, 5]],
@@ -141,41 +142,41 @@ def test_two_forces_that_balance_are_named():
         swarm_cohesion=[[0.001, 0]],
     )
     assert report.verdict == "at rest, stuck: its goal is 2.6 m away, behind an obstacle"
-    assert "stuck: the pull to its goal (0.31 N) and the push of the obstacle (0.30 N) balance" in texts(
+    assert "stuck: the pull to its goal (0.31 N) and the push of the obstacle (0.30 N) balance" in list_texts(
         report
     )
-    assert "pushed 1 mN east by swarm cohesion" in texts(report)
+    assert "pushed 1 mN east by swarm cohesion" in list_texts(report)
 
 
-def test_three_forces_that_balance_are_named_when_two_do_not():
+def test_three_balancing_forces_are_named():
     forces = {"attraction": [[0, 1]], "repulsion_obstacle": [[0.87, -0.5]], "wind": [[-0.87, -0.5]]}
-    report = moment([[3, 3]], goals=[[3, 5]], **forces)
+    report = build_report([[3, 3]], goals=[[3, 5]], **forces)
     assert report.verdict == "at rest 2.0 m short of its goal: the forces balance"
     balance = "the pull to its goal (1.0 N) and the push of obstacles (1.0 N) and wind (1.0 N) balance"
-    assert balance in texts(report)
+    assert balance in list_texts(report)
 
 
-def test_a_robot_pressed_against_something_is_held_by_it():
+def test_a_robot_pressed_against_an_obstacle_is_held_by_it():
     east = {"goals": [[5, 5]], "attraction": [[10.0, 0.0]], "environment": ROOMS}
-    report = moment([[3.9, 5]], points=[[4, 5]], **east)
+    report = build_report([[3.9, 5]], points=[[4, 5]], **east)
     assert report.verdict == "at rest, stuck: its goal is 1.1 m away, behind an obstacle"
-    assert "stuck: the pull to its goal (10 N) presses it against the obstacle" in texts(report)
-    assert "touches the obstacle east of it" in texts(report)
-    assert "limited: 2.0 m/s² instead of 10 m/s²" in texts(report)
-    blind = moment([[3.9, 5]], sensing_range=0.05, **east)
+    assert "stuck: the pull to its goal (10 N) presses it against the obstacle" in list_texts(report)
+    assert "touches the obstacle east of it" in list_texts(report)
+    assert "limited: 2.0 m/s² instead of 10 m/s²" in list_texts(report)
+    blind = build_report([[3.9, 5]], sensing_range=0.05, **east)
     assert blind.verdict == report.verdict
-    assert "touches the obstacle east of it" in texts(blind)
-    assert "senses nothing within 5 cm" in texts(blind)
-    away = moment([[3.9, 5]], points=[[4, 5]], environment=ROOMS, wind=[[-1.0, 0.0]])
+    assert "touches the obstacle east of it" in list_texts(blind)
+    assert "senses nothing within 5 cm" in list_texts(blind)
+    away = build_report([[3.9, 5]], points=[[4, 5]], environment=ROOMS, wind=[[-1.0, 0.0]])
     assert away.verdict == "setting off west"
-    sliding = moment([[3.9, 5]], points=[[4, 5]], velocities=[[0, -0.5]], **east)
+    sliding = build_report([[3.9, 5]], points=[[4, 5]], velocities=[[0, -0.5]], **east)
     assert sliding.verdict == "sliding 0.50 m/s south along the obstacle"
 
 
-def test_robots_that_touch():
-    report = moment([[4, 4], [4.2, 4]], wind=[[1, 0], [0, 0]])
+def test_touching_robots():
+    report = build_report([[4, 4], [4.2, 4]], wind=[[1, 0], [0, 0]])
     assert report.verdict == "at rest, held by robot 2"
-    assert "wind (1.0 N) presses it against robot 2" in texts(report)
+    assert "wind (1.0 N) presses it against robot 2" in list_texts(report)
 
 
 @pytest.mark.parametrize(
@@ -187,20 +188,20 @@ def test_robots_that_touch():
         (0.5, "at rest 50 cm short of its goal: no force acts on it"),
     ],
 )
-def test_arrivals(distance, verdict):
-    assert moment([[4, 4]], goals=[[4, 4 + distance]]).verdict == verdict
+def test_robots_near_their_goals(distance, verdict):
+    assert build_report([[4, 4]], goals=[[4, 4 + distance]]).verdict == verdict
 
 
-def test_who_is_pushed_has_not_arrived():
-    """It hardly moves, and has swayed enough not to be setting off."""
+def test_a_pushed_robot_has_not_arrived():
+    """It hardly moves, but has moved to and fro too much to be setting off."""
     path = np.array([[4.0, 4.0], [4.0, 4.03], [4.0, 4.0]])
     for goal, away in ((4.1, "10 cm"), (4.5, "50 cm")):
-        report = moment([[4, 4]], goals=[[goal, 4]], wind=[[0.5, 0]], recent=path)
+        report = build_report([[4, 4]], goals=[[goal, 4]], wind=[[0.5, 0]], recent=path)
         assert report.verdict == f"{away} from its goal, not at rest: a force of 0.50 N east acts on it"
 
 
-def test_arrived_at_what_is_inside_an_obstacle():
-    report = moment([[3.85, 5]], goals=[[4.1, 5]], environment=ROOMS)
+def test_arrival_near_a_goal_inside_an_obstacle():
+    report = build_report([[3.85, 5]], goals=[[4.1, 5]], environment=ROOMS)
     assert report.verdict == "arrived: at rest 25 cm from its goal, which is inside an obstacle"
 
 
@@ -214,12 +215,12 @@ def test_arrived_at_what_is_inside_an_obstacle():
         ((0.02, 0), (-1, 0), "setting off west"),
     ],
 )
-def test_motion_by_speed(velocity, force, verdict):
-    report = moment([[4, 4]], velocities=[velocity], goals=[[6, 6]], forces=[force], viscosity=0.0)
+def test_motion_is_described_by_speed(velocity, force, verdict):
+    report = build_report([[4, 4]], velocities=[velocity], goals=[[6, 6]], forces=[force], viscosity=0.0)
     assert report.verdict == verdict
 
 
-def wave(size, turns, drift=0.0, k=31):
+def build_wave(size, turns, drift=0.0, k=31):
     phase = np.linspace(0, 1, k)
     return np.column_stack([4 + size * np.sin(2 * np.pi * turns * phase) + drift * phase, np.full(k, 4.0)])
 
@@ -227,82 +228,87 @@ def wave(size, turns, drift=0.0, k=31):
 @pytest.mark.parametrize(
     ("recent", "speed", "verdict"),
     [
-        (wave(0.0, 0), 0.0, "at rest, no force acts on it"),
-        (wave(0.001, 8), 0.04, "at rest, no force acts on it"),
-        (wave(0.01, 8), 0.2, "trembling in place"),
-        (wave(0.01, 8), 0.0, "trembling in place"),  # at a turn
-        (wave(0.1, 4), 0.5, "trembling in place"),
-        (wave(0.0, 0), 0.2, "trembling in place"),  # too quick for the samples
-        (wave(0.0, 0, drift=2.0), 0.5, "moving 0.50 m/s east"),
-        (wave(0.0, 0, drift=0.08), 0.02, "moving 0.02 m/s east"),
-        (wave(0.0, 0, drift=0.03), 0.3, "moving 0.30 m/s east"),  # has just set off
-        (wave(0.0, 0, drift=2.0), 0.001, "at rest, no force acts on it"),
-        (wave(0.0, 0, drift=2.0)[:1], 0.5, "moving 0.50 m/s east"),
-        (wave(0.0, 0, drift=2.0)[:0], 0.5, "moving 0.50 m/s east"),
+        (build_wave(0.0, 0), 0.0, "at rest, no force acts on it"),
+        (build_wave(0.001, 8), 0.04, "at rest, no force acts on it"),
+        (build_wave(0.01, 8), 0.2, "trembling in place"),
+        (build_wave(0.01, 8), 0.0, "trembling in place"),  # at a turning point
+        (build_wave(0.1, 4), 0.5, "trembling in place"),
+        (build_wave(0.0, 0), 0.2, "trembling in place"),  # too fast for the samples
+        (build_wave(0.0, 0, drift=2.0), 0.5, "moving 0.50 m/s east"),
+        (build_wave(0.0, 0, drift=0.08), 0.02, "moving 0.02 m/s east"),
+        (build_wave(0.0, 0, drift=0.03), 0.3, "moving 0.30 m/s east"),  # has just set off
+        (build_wave(0.0, 0, drift=2.0), 0.001, "at rest, no force acts on it"),
+        (build_wave(0.0, 0, drift=2.0)[:1], 0.5, "moving 0.50 m/s east"),
+        (build_wave(0.0, 0, drift=2.0)[:0], 0.5, "moving 0.50 m/s east"),
         (np.full((5, 2), np.nan), 0.5, "moving 0.50 m/s east"),
     ],
 )
-def test_motion_by_what_was_done_of_late(recent, speed, verdict):
+def test_motion_is_described_by_recent_positions(recent, speed, verdict):
     velocities = [[speed, 0.0]]
-    assert moment([[4, 4]], velocities=velocities, recent=recent, viscosity=0.0).verdict == verdict
+    assert build_report([[4, 4]], velocities=velocities, recent=recent, viscosity=0.0).verdict == verdict
 
 
-def test_trembling_robots_may_be_stuck():
-    report = moment([[3, 5]], goals=[[6, 5]], environment=ROOMS, recent=wave(0.02, 8))
+def test_a_trembling_robot_may_be_stuck():
+    report = build_report([[3, 5]], goals=[[6, 5]], environment=ROOMS, recent=build_wave(0.02, 8))
     assert report.verdict == "trembling in place, stuck: its goal is 3.0 m away, behind an obstacle"
 
 
-def test_who_sways_does_not_set_off_and_who_begins_does():
+def test_a_swaying_robot_is_not_setting_off():
     push = {"forces": [[0.2, 0.0]]}
-    assert moment([[4, 4]], recent=wave(0.002, 2), **push).verdict == "setting off east"
-    assert moment([[4, 4]], recent=wave(0.01, 1), **push).verdict == "a force of 0.20 N east acts on it"
+    assert build_report([[4, 4]], recent=build_wave(0.002, 2), **push).verdict == "setting off east"
+    assert (
+        build_report([[4, 4]], recent=build_wave(0.01, 1), **push).verdict
+        == "a force of 0.20 N east acts on it"
+    )
 
 
-def test_limits():
-    fast = moment([[4, 4]], velocities=[[1, 0]], max_speed=1.0)
-    assert "at its maximum speed, 1.0 m/s" in texts(fast)
-    thrown = moment([[4, 4]], velocities=[[5, 0]], max_speed=1.0)
-    assert "faster than its maximum speed, 1.0 m/s" in texts(thrown)
-    heavy = moment([[4, 4]], forces=[[10, 0]], mass=20.0, max_acceleration=0.6)
-    assert not [text for text in texts(heavy) if "limited" in text]
+def test_speed_and_acceleration_limits_are_described():
+    fast = build_report([[4, 4]], velocities=[[1, 0]], max_speed=1.0)
+    assert "at its maximum speed, 1.0 m/s" in list_texts(fast)
+    thrown = build_report([[4, 4]], velocities=[[5, 0]], max_speed=1.0)
+    assert "faster than its maximum speed, 1.0 m/s" in list_texts(thrown)
+    heavy = build_report([[4, 4]], forces=[[10, 0]], mass=20.0, max_acceleration=0.6)
+    assert not [text for text in list_texts(heavy) if "limited" in text]
 
 
 @pytest.mark.parametrize(
     ("reach", "text"),
     [(3.0, "senses nothing within 3.0 m"), (np.inf, "senses nothing"), (0.0, "senses nothing")],
 )
-def test_what_is_not_sensed(reach, text):
-    report = moment([[4, 4]], sensing_range=reach)
-    assert text in texts(report)
-    assert "no robot in communication range" in texts(report)
+def test_missing_surroundings_are_described(reach, text):
+    report = build_report([[4, 4]], sensing_range=reach)
+    assert text in list_texts(report)
+    assert "no robot in communication range" in list_texts(report)
 
 
-def test_only_those_in_range_are_heard():
-    report = moment([[4, 4], [5, 4], [7, 4]], communication_range=1.5)
-    assert "1 robot in communication range, the nearest is robot 2, 1.0 m east" in texts(report)
+def test_only_robots_in_communication_range_are_counted():
+    report = build_report([[4, 4], [5, 4], [7, 4]], communication_range=1.5)
+    assert "1 robot in communication range, the nearest is robot 2, 1.0 m east" in list_texts(report)
 
 
-def test_the_centroid_is_called_so():
+def test_a_goal_at_the_centroid_is_named():
     positions = np.array([[1.0, 1.0], [7.0, 7.0]])
     cells = partition(positions, SQUARE.region)
-    report = moment(positions, goals=cells.centroid, cells=cells)
+    report = build_report(positions, goals=cells.centroid, cells=cells)
     assert report.verdict.endswith("short of its centroid: no force acts on it")
 
 
-def test_forces_that_no_term_explains():
-    none = moment([[4, 4]], forces=[[1.0, 0.0]])
-    assert line(none, UNEXPLAINED_FORCE).text == "pushed 1.0 N east by its controller"
-    some = moment([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
-    assert line(some, UNEXPLAINED_FORCE).text == "pushed 1.1 N south-east by other forces of its controller"
+def test_unexplained_forces_are_described():
+    none = build_report([[4, 4]], forces=[[1.0, 0.0]])
+    assert get_line(none, UNEXPLAINED_FORCE).text == "pushed 1.0 N east by its controller"
+    some = build_report([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
+    assert (
+        get_line(some, UNEXPLAINED_FORCE).text == "pushed 1.1 N south-east by other forces of its controller"
+    )
     for report in (none, some):
-        sums_up(report)
+        assert_forces_sum_up(report)
 
 
-def test_terms_of_users_may_be_anything():
+def test_invalid_terms_of_user_controllers_are_ignored():
     terms = {
         "viscosity": [[1.0, 0.0]],
         "resultant": [[1.0, 0.0]],
-        "words": "none",
+        "text": "none",
         "short": [],
         "wild": [[np.nan] * 2],
     }
@@ -311,24 +317,24 @@ def test_terms_of_users_may_be_anything():
     decision = Decision(np.array([[1.0, 0.0]]), None, terms)
     report = explain(replace(simulation.observe_and_decide(), decision=decision), team, SQUARE, 0)
     assert [line.kind for line in report.lines if line.kind] == [UNEXPLAINED_FORCE, "viscosity", "resultant"]
-    sums_up(report)
+    assert_forces_sum_up(report)
 
 
-def test_a_force_that_is_no_number():
-    report = moment([[4, 4]], velocities=[[0.5, 0]], forces=[[np.nan, 1.0]])
-    assert "its controller gives a force that is not a number" in texts(report)
-    assert line(report, "resultant").vector == (-1.0, 0.0)
+def test_a_force_that_is_not_finite_is_reported():
+    report = build_report([[4, 4]], velocities=[[0.5, 0]], forces=[[np.nan, 1.0]])
+    assert "its controller gives a force that is not a number" in list_texts(report)
+    assert get_line(report, "resultant").vector == (-1.0, 0.0)
 
 
-def test_braking_before_the_goal_is_no_pull():
-    report = moment([[4, 4]], goals=[[4.2, 4]], velocities=[[0.8, 0]], attraction=[[-3.0, 0.0]])
-    assert line(report, "attraction").text == "braked 3.0 N west on the way to its goal, 20 cm away"
+def test_braking_before_the_goal_is_not_described_as_a_pull():
+    report = build_report([[4, 4]], goals=[[4.2, 4]], velocities=[[0.8, 0]], attraction=[[-3.0, 0.0]])
+    assert get_line(report, "attraction").text == "braked 3.0 N west on the way to its goal, 20 cm away"
     assert report.verdict == "braking from 0.80 m/s east, its goal is 20 cm away"
-    aside = moment([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
-    assert line(aside, "attraction").text == "pulled 1.4 N north-east on the way to its goal, 2.0 m away"
+    aside = build_report([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
+    assert get_line(aside, "attraction").text == "pulled 1.4 N north-east on the way to its goal, 2.0 m away"
 
 
-# anything
+# random observations and decisions
 
 
 numbers = st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, 1e-300, 1e-9, 4.0])
@@ -336,7 +342,7 @@ wild = numbers | st.sampled_from([np.nan, np.inf, -np.inf, 1e300, 1e9])
 
 
 @st.composite
-def moments(draw):
+def draw_arguments(draw):
     n = draw(st.integers(1, 4))
 
     def rows(values):
@@ -373,6 +379,6 @@ def moments(draw):
     }
 
 
-@given(moments())
-def test_no_text_ever_holds_nonsense_and_the_forces_sum_up(given_moment):
-    says_no_nonsense(moment(**given_moment))
+@given(draw_arguments())
+def test_reports_of_random_snapshots_are_consistent(arguments):
+    assert_consistent(build_report(**arguments))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_window import MIDDLE, opened
+from driven_window import MIDDLE, open_viewer
 from sample_sessions import HALL, RAPF, advance_session, start_session
 
 from robocov.mapfile import save_map
@@ -41,7 +41,7 @@ def words(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, words: list[str]) -> None:
-    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+    with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session = driver.session
         driver.frames(2)
         driver.window._cost_curves.update = lambda: None  # type: ignore[method-assign]  # no answer comes any more
@@ -57,7 +57,7 @@ def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, 
 
 
 def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+    with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session, window = driver.session, driver.window
         wanted = {pane.number: pane.distance_curve.interpolate(0.0) for pane in session.timeline.panes}
         for pane in session.timeline.panes:
@@ -79,7 +79,7 @@ def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: 
 
 
 def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+    with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         other = driver.session.timeline.panes[1]
         other.simulation = other.simulation.with_changes(positions=other.simulation.positions + [0.3, 0.0])
         driver.viewer.costs.forget()
@@ -99,7 +99,7 @@ def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path:
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])
 def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size: tuple[int, int]) -> None:
-    with opened(tmp_path, *FOUR, size=size) as driver:
+    with open_viewer(tmp_path, *FOUR, size=size) as driver:
         boxes = driver.window.layout.panes
         driver.frames(2)
         words.clear()
@@ -130,7 +130,7 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
 def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
     tmp_path: Path, words: list[str]
 ) -> None:
-    with opened(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
+    with open_viewer(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
         for pane, value in zip(driver.session.timeline.panes, (1.856, 4.023), strict=True):
             pane.distance_curve.add(0.0, value)
         words.clear()
@@ -139,7 +139,7 @@ def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
 
 
 def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         driver.move(*driver.pixel(MIDDLE))
         slow, fast = list_facts(driver.viewer, 9.0, 60.0, None), list_facts(driver.viewer, 60.0, 60.0, None)
         assert slow.index("9 fps") < slow.index(describe_cursor(driver.viewer))
@@ -147,7 +147,7 @@ def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None
 
 
 def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         viewer, session = driver.viewer, driver.session
         assert suggest_actions(viewer) == ""
         session.timeline.is_settled = True
@@ -250,7 +250,7 @@ def test_a_scale_takes_the_window_that_it_needs_or_says_so(
 
 
 def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         viewer = driver.viewer
         save_map(HALL, tmp_path / "other.json")
         viewer.files.save_session(tmp_path / "first.robocov")
@@ -279,7 +279,7 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
 
 
 def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         viewer = driver.viewer
         save_map(HALL, tmp_path / "other.json")
         viewer.session.fail_robot(2)
@@ -323,7 +323,7 @@ def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 
 def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         viewer, session = driver.viewer, driver.session
         session.playback.is_playing = True
         driver.frames(20)

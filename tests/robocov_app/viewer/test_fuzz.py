@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_window import KEYS, MODIFIERS, Driver, opened, typed
+from driven_window import KEYS, MODIFIERS, Driver, open_viewer, run_text
 from sample_sessions import RAPF, RPF, compute_penetration
 
 from robocov_app.viewer.costs import Costs
@@ -248,7 +248,7 @@ def check(driver: Driver) -> None:
 @pytest.mark.parametrize("seed", [1])
 def test_it_bears_whatever_is_pressed(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     laws = (RAPF, RPF) if seed % 2 else (RAPF,)
-    with limited(monkeypatch), opened(tmp_path, *laws, robots=2, lattice=4) as driver:
+    with limited(monkeypatch), open_viewer(tmp_path, *laws, robots=2, lattice=4) as driver:
         monkey = Monkey(driver, seed)
         for _ in range(5):
             monkey.play(EVENTS // 5)
@@ -271,9 +271,9 @@ def usual(driver: Driver) -> None:
     while len(driver.session.timeline.panes) > 1:
         driver.session.remove_pane(driver.session.timeline.panes[-1])
     viewer.attempt(lambda: viewer.files.open_map("square"))
-    typed(viewer, "robots 2")
+    run_text(viewer, "robots 2")
     for name in ("radius 0.1", "max_speed 1", "speed 1", "controller rapf"):
-        typed(viewer, name)
+        run_text(viewer, name)
     driver.settle()
     driver.settle()
     driver.push("tool:hand")

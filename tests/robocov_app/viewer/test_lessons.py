@@ -1,4 +1,4 @@
-"""Lessons: what they name exists; chapters wait for the simulation, ask, hand over, and give all back."""
+"""Lessons: their chapters play, ask questions and set tasks, and the session is restored at the end."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 from sample_sessions import advance_session, start_session
 
 from robocov.errors import MapError
@@ -25,8 +25,8 @@ LESSON = load_lesson().lesson
 assert LESSON is not None
 
 
-def short(tmp_path: Path, **changes: object) -> Path:
-    """A lesson of two chapters: a robot fails; what comes then is asked, and a robot is to be dragged."""
+def write_short_lesson(tmp_path: Path, **changes: object) -> Path:
+    """Write a lesson of two chapters, in which a robot fails; the second has a question and a task."""
     session = advance_session(start_session(), 20)
     session.fail_robot(2)
     advance_session(session, 20)
@@ -49,11 +49,13 @@ def short(tmp_path: Path, **changes: object) -> Path:
 
 
 @pytest.mark.parametrize("chapter", LESSON.chapters, ids=lambda chapter: chapter.title)
-def test_what_a_chapter_says_is_short_and_what_it_names_exists(chapter) -> None:
-    assert set(chapter.show) <= LAYERS and LAYERS >= BASE_LAYERS
+def test_chapters_are_short_and_their_layers_exist(chapter) -> None:
+    assert set(chapter.show) <= LAYERS
+    assert LAYERS >= BASE_LAYERS
     assert len(re.findall(r"[.!?](?= |$)", chapter.text)) in (2, 3)
-    assert len(chapter.title) <= 44 and "  " not in chapter.text
-    # so fast do people read, and they are to watch too
+    assert len(chapter.title) <= 44
+    assert "  " not in chapter.text
+    # People need time to read, and to watch.
     assert chapter.until.step is not None
     seconds = chapter.until.step / 60 / chapter.speed
     assert len(chapter.text.split()) / seconds < 5.0
@@ -64,83 +66,93 @@ def test_every_chapter_of_the_lesson_ends() -> None:
     assert all(chapter.ends for chapter in check_lesson(load_lesson()))
 
 
-def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, capsys) -> None:
-    with opened(tmp_path) as driver:
+def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsys) -> None:
+    with open_viewer(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(3)
         before = driver.viewer.session
         driver.window.lesson.is_unattended = False
-        driver.window.lesson.start(short(tmp_path))
-        lesson, viewer = driver.window.lesson.player, driver.viewer
-        assert lesson is not None and lesson.chapter.title == "Failure" and viewer.session is not before
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        lesson = driver.window.lesson.player
+        viewer = driver.viewer
+        assert lesson is not None
+        assert lesson.chapter.title == "Failure"
+        assert viewer.session is not before
         driver.frames(6)
         assert viewer.session.displayed.numbers == (1, 2, 3)
         driver.frames(30)
         assert viewer.session.displayed.numbers == (1, 3), "at its step, however long frames take"
-        assert lesson.state == "ended" and not viewer.session.playback.is_playing
+        assert lesson.state == "ended"
+        assert not viewer.session.playback.is_playing
         lesson.skip(1)
-        assert lesson.state == "asking" and lesson.lines == ["What now?", "1  Nothing", "2  Much"]
+        assert lesson.state == "asking"
+        assert lesson.lines == ["What now?", "1  Nothing", "2  Much"]
         driver.frames(10)
         assert viewer.session.displayed.time == 0.0, "it waits for an answer"
         driver.key("1")
-        assert lesson.state == "playing" and lesson.answer == 1
+        assert lesson.state == "playing"
+        assert lesson.answer == 1
         driver.frames(30)
-        assert lesson.state == "task" and lesson.lines == ["Now you: drag robot 1."]
+        assert lesson.state == "task"
+        assert lesson.lines == ["Now you: drag robot 1."]
         viewer.session.place_robot(1, (1.0, 1.0))
         driver.frames(2)
         assert lesson.state == "ended"
         assert lesson.lines == ["✗ Not quite. Correct: Much", "So it is.", "Well done."]
         lesson.advance(lessons.READING_S)
-        assert lesson.state == "ended" and not lesson.is_done, "there is something to read"
+        assert lesson.state == "ended"
+        assert not lesson.is_done, "there is something to read"
         driver.key("space")
         lesson.advance(100.0)
-        assert lesson.state == "ended" and not viewer.session.playback.is_playing, (
-            "it is paused between chapters too"
-        )
+        assert lesson.state == "ended"
+        assert not viewer.session.playback.is_playing, "it is paused between chapters too"
         driver.key("space")
         assert not lesson.is_held
         driver.key("escape")
-        assert (
-            driver.window.lesson.player is None
-            and viewer.session is before
-            and before.displayed.numbers == (1, 2)
-        )
+        assert driver.window.lesson.player is None
+        assert viewer.session is before
+        assert before.displayed.numbers == (1, 2)
 
 
-def test_its_end_is_told_and_nobody_is_asked_who_was_not(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+def test_the_end_is_reported_and_the_selection_restored(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False
-        driver.window.lesson.start(short(tmp_path, robot=1))
+        driver.window.lesson.start(write_short_lesson(tmp_path, robot=1))
         driver.key("right")
         assert driver.viewer.selected_robot == 1
         driver.key("right")
         driver.frames(1)
-        assert driver.window.lesson.player is None and driver.viewer.selected_robot is None
+        assert driver.window.lesson.player is None
+        assert driver.viewer.selected_robot is None
         assert driver.viewer.message.startswith("the lesson has ended")
 
 
-def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+def test_a_lesson_can_be_paused_left_and_resumed(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False
-        driver.window.lesson.start(short(tmp_path))
+        driver.window.lesson.start(write_short_lesson(tmp_path))
         lesson = driver.window.lesson.player
         driver.key("space")
-        assert lesson.state == "playing" and not driver.viewer.session.playback.is_playing
+        assert lesson.state == "playing"
+        assert not driver.viewer.session.playback.is_playing
         driver.frames(60)
-        assert lesson.number == 0 and driver.viewer.session.displayed.time < 0.1
+        assert lesson.number == 0
+        assert driver.viewer.session.displayed.time < 0.1
         driver.key("n")
-        assert lesson.state == "left" and driver.window.lesson.player is lesson
+        assert lesson.state == "left"
+        assert driver.window.lesson.player is lesson
         driver.key("f2")
-        assert lesson.state == "playing" and driver.viewer.session.displayed.time == 0.0
+        assert lesson.state == "playing"
+        assert driver.viewer.session.displayed.time == 0.0
         driver.key("right")
         assert lesson.number == 1
         driver.key("left")
         assert lesson.number == 0
 
 
-def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+def test_answers_and_chapters_are_clicked(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False
-        driver.window.lesson.start(short(tmp_path))
+        driver.window.lesson.start(write_short_lesson(tmp_path))
         lesson = driver.window.lesson.player
         assert lesson is not None
         driver.settle()
@@ -148,20 +160,22 @@ def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_
         assert (lesson.number, lesson.state) == (1, "asking")
         driver.key("space")
         driver.frames(10)
-        assert driver.session.displayed.time == 0.0 and "answer first" in driver.viewer.message
+        assert driver.session.displayed.time == 0.0
+        assert "answer first" in driver.viewer.message
         driver.click(*driver.window.lesson.click_areas[1][0].center)
         assert (lesson.answer, lesson.state) == (2, "playing")
         driver.frames(30)
         assert lesson.state == "task"
         driver.key("f2")
-        assert lesson.state == "left" and not driver.window.lesson.click_areas
+        assert lesson.state == "left"
+        assert not driver.window.lesson.click_areas
         driver.key("f2")
         assert lesson.state == "asking"
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
-def test_all_of_every_chapter_has_room_on_its_page(tmp_path: Path, size: tuple[int, int]) -> None:
-    with opened(tmp_path, size=size) as driver:
+def test_every_chapter_fits_on_its_page(tmp_path: Path, size: tuple[int, int]) -> None:
+    with open_viewer(tmp_path, size=size) as driver:
         driver.window.lesson.is_unattended = False
         driver.key("f2")
         lesson = driver.window.lesson.player
@@ -174,29 +188,29 @@ def test_all_of_every_chapter_has_room_on_its_page(tmp_path: Path, size: tuple[i
             driver.key("right")
 
 
-def test_closing_ends_it_and_what_was_before_is_what_is_kept(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
-        session, shown = driver.session, set(driver.viewer.view.layers)
-        driver.window.lesson.start(short(tmp_path, show=["distances"]))
+def test_closing_the_window_restores_the_session(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        session = driver.session
+        shown = set(driver.viewer.view.layers)
+        driver.window.lesson.start(write_short_lesson(tmp_path, show=["distances"]))
         driver.key("right")
         driver.window.close()
-        assert (
-            driver.window.lesson.player is None
-            and driver.session is session
-            and driver.viewer.view.layers == shown
-        )
+        assert driver.window.lesson.player is None
+        assert driver.session is session
+        assert driver.viewer.view.layers == shown
 
 
-def test_controllers_have_the_names_of_the_window_in_the_lesson() -> None:
+def test_answers_use_the_controller_names_of_the_window() -> None:
     told = {answer for each in LESSON.chapters if each.question for answer in each.question.answers}
-    assert "LA" not in told and told >= {"RAPF", "RPF", "Lloyd"}
+    assert "LA" not in told
+    assert told >= {"RAPF", "RPF", "Lloyd"}
 
 
-def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unattended_lesson_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lessons, "READING_S", 0.1)
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = True
-        driver.window.lesson.start(short(tmp_path))
+        driver.window.lesson.start(write_short_lesson(tmp_path))
         for _ in range(120):
             driver.frames(1)
             if driver.window.lesson.player is None:
@@ -205,9 +219,9 @@ def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest
 
 
 def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["lesson", "check", str(short(tmp_path))]) == 0
+    assert main(["lesson", "check", str(write_short_lesson(tmp_path))]) == 0
     assert "1  Failure" in capsys.readouterr().out
-    never = short(tmp_path, until={"robot": 1, "inside": [50, 50, 51, 51]})
+    never = write_short_lesson(tmp_path, until={"robot": 1, "inside": [50, 50, 51, 51]})
     path = tmp_path / "plain.robocov"
     content = json.loads(never.read_text())
     del content["lesson"]
@@ -223,7 +237,7 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
         load_lesson(path)
 
 
-def test_a_script_goes_the_same_way_bit_for_bit() -> None:
+def test_followed_edits_repeat_bit_for_bit() -> None:
     session = advance_session(start_session(), 10)
     session.playback.is_playing = True
     for k in range(10):
@@ -231,9 +245,11 @@ def test_a_script_goes_the_same_way_bit_for_bit() -> None:
         session.playback.advance(1 / 60)
     session.release()
     advance_session(session, 10)
-    end, went = session.timeline.step, session.timeline.panes[0].simulation.positions.copy()
+    end = session.timeline.step
+    went = session.timeline.panes[0].simulation.positions.copy()
     twin = Session(session.timeline.document.nodes[0].scenario)
-    twin.timeline.document, twin.timeline.head = session.timeline.document, session.timeline.document.nodes[0]
+    twin.timeline.document = session.timeline.document
+    twin.timeline.head = session.timeline.document.nodes[0]
     twin.seek(twin.timeline.head, 0)
     twin.timeline.finish_seek()
     twin.timeline.follow(session.timeline.head)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,7 +44,7 @@ def test_the_keys_are_all_on_one_card(
         boxes.append(box.copy())
         real_card(screen, box, *rest)
 
-    with opened(tmp_path, size=size, scale=scale) as driver:
+    with open_viewer(tmp_path, size=size, scale=scale) as driver:
         window = driver.window
         paler = window.screen.copy()
         keys_page.draw_veil(paler, window.theme)
@@ -65,7 +65,7 @@ def test_the_keys_are_all_on_one_card(
 
 
 def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         before = copy_pixels(driver.window.screen).copy()
         driver.viewer.show_message("many words " * 40, is_error=True)
         driver.frames(1)
@@ -77,7 +77,7 @@ def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Pa
 
 
 def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         window = driver.window
         driver.viewer.inspection.selected = 1
         window.panel.show_tab("robot")

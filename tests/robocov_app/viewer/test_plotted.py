@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 
 from robocov.cost import CoverageCost
 from robocov.team import Team
@@ -19,7 +19,7 @@ MIXED = RobotProperties.from_team(Team.concatenate([FAST, SLOW]))
 
 
 def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path: Path) -> None:
-    with opened(tmp_path, properties=MIXED) as driver:
+    with open_viewer(tmp_path, properties=MIXED) as driver:
         session, pane = driver.session, driver.session.timeline.panes[0]
         np.testing.assert_array_equal(session.displayed.get_setup(pane).speed_limits, [1.0, 1.0, 0.25])
         session.playback.is_playing = True
@@ -43,7 +43,7 @@ def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path
 
 
 def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
-    with opened(tmp_path, properties=MIXED) as driver:
+    with open_viewer(tmp_path, properties=MIXED) as driver:
         chart = driver.window.chart
         driver.session.playback.is_playing = True
         driver.frames(20)
@@ -63,7 +63,7 @@ def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
 
 
 def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
-    with opened(tmp_path, properties=MIXED) as driver:
+    with open_viewer(tmp_path, properties=MIXED) as driver:
         driver.session.playback.is_playing = True
         driver.frames(60)
         driver.session.playback.is_playing = False
@@ -75,7 +75,7 @@ def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
 
 
 def test_where_all_are_equally_fast_there_is_no_choice(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         driver.frames(3)
         assert driver.session.displayed.get_setup(driver.session.timeline.panes[0]).speed_limits is None
         driver.key("y")

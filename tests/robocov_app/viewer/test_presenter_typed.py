@@ -1,4 +1,4 @@
-"""The desk: what is shown, gains, limits and typed commands, without a window."""
+"""Commands of the presenter, without a window: layers, messages, gains, limits and typed commands."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
-from driven_window import do, listed, typed
+from driven_window import build_command_table, run_command, run_text
 from hypothesis import given
 from hypothesis import strategies as st
 from sample_sessions import RAPF, RPF, build_presenter, describe_state, start_session
@@ -19,27 +19,27 @@ from robocov_app.viewer.model import simplify_message
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import MAX_ROBOTS
 
-# what is shown
+# layers and messages
 
 
-def test_layers_theme_fading_and_panel_are_switched() -> None:
+def test_commands_toggle_layers_theme_fading_and_panel() -> None:
     viewer = build_presenter()
-    do(viewer, "layer:cells")
-    do(viewer, "layer:scan")
+    run_command(viewer, "layer:cells")
+    run_command(viewer, "layer:scan")
     assert viewer.view.layers == {"robots", "scan"}
-    for action, what, values in (
+    for command, attribute, (before, after) in (
         ("theme", "theme", ("light", "dark")),
         ("fade", "fades_trajectories", (False, True)),
         ("panel", "has_panel", (True, False)),
     ):
-        assert getattr(viewer.view, what) == values[0]
-        do(viewer, action)
-        assert getattr(viewer.view, what) == values[1]
-        do(viewer, action)
-        assert getattr(viewer.view, what) == values[0]
+        assert getattr(viewer.view, attribute) == before
+        run_command(viewer, command)
+        assert getattr(viewer.view, attribute) == after
+        run_command(viewer, command)
+        assert getattr(viewer.view, attribute) == before
 
 
-def test_messages_stay_for_a_while() -> None:
+def test_messages_disappear_after_a_while() -> None:
     viewer = build_presenter()
     viewer.show_message("hello")
     viewer.pass_time(MESSAGE_S - 0.1)
@@ -48,88 +48,92 @@ def test_messages_stay_for_a_while() -> None:
     assert viewer.message == ""
 
 
-def test_trouble_is_told_without_the_places_in_files() -> None:
+def test_errors_are_shown_without_paths_in_files() -> None:
     viewer = build_presenter()
     viewer.attempt(lambda: viewer.comparison.set_parameter("team.radius", -1.0))
-    assert viewer.has_error_message and viewer.message.startswith("radius: ")
+    assert viewer.has_error_message
+    assert viewer.message.startswith("radius: ")
     assert simplify_message("obstacles: too many") == "too many"
 
 
-def test_a_new_map_is_told_to_the_cost() -> None:
+def test_a_new_map_is_passed_to_the_costs() -> None:
     viewer = build_presenter()
-    told = []
-    viewer.costs.set_environment = told.append  # type: ignore[method-assign]
-    do(viewer, "step")
-    assert told == []
+    maps = []
+    viewer.costs.set_environment = maps.append  # type: ignore[method-assign]
+    run_command(viewer, "step")
+    assert maps == []
     viewer.attempt(lambda: viewer.files.open_map("square"))
-    assert told == [viewer.session.displayed.environment]
+    assert maps == [viewer.session.displayed.environment]
 
 
 # gains and limits
 
 
-def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
+def test_gains_apply_to_the_active_pane_and_limits_to_all() -> None:
     viewer = build_presenter(RAPF, RPF)
     viewer.inspection.active_pane = 1
     viewer.comparison.set_parameter("k_rep", 1.5)
     viewer.comparison.set_parameter("team.max_speed", 0.7)
-    assert [pane.controller.get_value("k_rep") for pane in viewer.session.timeline.panes] == [
-        RAPF.get_value("k_rep"),
-        1.5,
-    ]
-    assert all(pane.setup.properties.max_speed == 0.7 for pane in viewer.session.timeline.panes)
-    names = [each.name for each in viewer.comparison.list_parameters()]
-    assert "k_att" not in names and "team.radius" in names
+    first, second = viewer.session.timeline.panes
+    assert first.controller.get_value("k_rep") == RAPF.get_value("k_rep")
+    assert second.controller.get_value("k_rep") == 1.5
+    for pane in (first, second):
+        assert pane.setup.properties.max_speed == 0.7
+    names = [parameter.name for parameter in viewer.comparison.list_parameters()]
+    assert "k_att" not in names
+    assert "team.radius" in names
 
 
-def test_no_limit_can_be_set_where_there_may_be_none() -> None:
+def test_no_limit_is_accepted_for_optional_limits_only() -> None:
     viewer = build_presenter()
-    typed(viewer, "sensing_range none")
+    run_text(viewer, "sensing_range none")
     assert viewer.pane.setup.properties.sensing_range == math.inf
     with pytest.raises(ParameterError, match="expected a number"):
-        typed(viewer, "max_speed none")
+        run_text(viewer, "max_speed none")
 
 
 # typed commands
 
 
 @pytest.mark.parametrize("text", ["k_rep 0.5", "k_rep=0.5", " k_rep  =  0.5 ", "k_rep 0,5"])
-def test_gains_can_be_typed(text: str) -> None:
+def test_gains_are_typed(text: str) -> None:
     viewer = build_presenter()
-    typed(viewer, text)
+    run_text(viewer, text)
     assert viewer.pane.controller.get_value("k_rep") == 0.5
 
 
-def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
+def test_typed_commands_run(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path)
-    typed(viewer, "robots 4")
-    typed(viewer, "seed 7")
-    typed(viewer, "start far")
+    run_text(viewer, "robots 4")
+    run_text(viewer, "seed 7")
+    run_text(viewer, "start far")
     scenario = viewer.session.timeline.scenario
     assert (scenario.robots, scenario.seed, scenario.start_name) == (4, 7, "far")
-    typed(viewer, "controller rpf")
+    run_text(viewer, "controller rpf")
     assert viewer.pane.controller == RPF
-    typed(viewer, "speed max")
+    run_text(viewer, "speed max")
     assert math.isinf(viewer.session.playback.clock.speed)
-    typed(viewer, "speed 4×")
+    run_text(viewer, "speed 4×")
     assert viewer.session.playback.clock.speed == 4.0
     for _ in range(60):
         viewer.session.playback.step()
-    typed(viewer, "time 0.5")
+    run_text(viewer, "time 0.5")
     assert viewer.session.displayed.time == pytest.approx(0.5)
-    typed(viewer, "robot 3")
+    run_text(viewer, "robot 3")
     assert viewer.selected_robot == 3
-    typed(viewer, "branch 1")
-    typed(viewer, f"save {tmp_path / 'story.robocov'}")
-    typed(viewer, f"open {tmp_path / 'story.robocov'}")
+    run_text(viewer, "branch 1")
+    run_text(viewer, f"save {tmp_path / 'story.robocov'}")
+    run_text(viewer, f"open {tmp_path / 'story.robocov'}")
     assert viewer.message.startswith("session opened: ")
-    typed(viewer, "map square")
+    run_text(viewer, "map square")
     assert viewer.files.map_name == "square"
     words = "robots seed start controller speed time robot map open save branch"
-    assert set(words.split()) == {each.name for each in listed(viewer).commands if each.argument is not None}
+    assert set(words.split()) == {
+        each.name for each in build_command_table(viewer).commands if each.argument is not None
+    }
 
 
-def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Path) -> None:
+def test_a_typed_user_controller_is_offered_afterwards(tmp_path: Path) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
         "import numpy as np\n"
@@ -140,10 +144,10 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
         "        return np.zeros(2)\n"
     )
     viewer = build_presenter()
-    typed(viewer, f"controller {mine}:Still")
+    run_text(viewer, f"controller {mine}:Still")
     assert viewer.controllers[-1] == f"{mine}:Still" == viewer.pane.controller.name
     viewer.session.playback.step()
-    do(viewer, "controller:next")
+    run_command(viewer, "controller:next")
     assert viewer.pane.controller.name == viewer.controllers[0]
 
 
@@ -194,7 +198,7 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
         "max_speed -1",
     ],
 )
-def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> None:
+def test_invalid_commands_are_reported_in_one_line_and_change_nothing(text: str) -> None:
     viewer = build_presenter()
     for _ in range(3):
         viewer.session.playback.step()
@@ -204,9 +208,11 @@ def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> 
         viewer.inspection.selected,
         list(viewer.controllers),
     )
-    viewer.attempt(lambda: typed(viewer, text))
+    viewer.attempt(lambda: run_text(viewer, text))
     assert viewer.has_error_message, text
-    assert viewer.message and "\n" not in viewer.message and "Traceback" not in viewer.message
+    assert viewer.message
+    assert "\n" not in viewer.message
+    assert "Traceback" not in viewer.message
     assert (
         describe_state(viewer.session),
         viewer.files.map_name,
@@ -215,24 +221,24 @@ def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> 
     ) == before
 
 
-def test_a_slip_of_the_finger_is_answered_with_what_was_meant() -> None:
+def test_a_misspelled_command_is_answered_with_the_nearest_name() -> None:
     with pytest.raises(InputError, match="robots"):
-        typed(build_presenter(), "robts 3")
+        run_text(build_presenter(), "robts 3")
 
 
 @given(st.text(max_size=12))
-def test_no_text_is_too_odd(text: str) -> None:
+def test_any_text_is_run_or_refused(text: str) -> None:
     viewer = Presenter(start_session(robots=1), Costs(2, direct=True), set(), Path(), "hall")
     try:
-        typed(viewer, text)
+        run_text(viewer, text)
     except RobocovError as error:
         assert str(error)
 
 
-# names of files
+# file names
 
 
-def test_names_count_on(tmp_path: Path) -> None:
+def test_free_file_names_are_numbered(tmp_path: Path) -> None:
     assert find_free_path(tmp_path, "robocov", ".png").name == "robocov-1.png"
     (tmp_path / "robocov-1.png").write_text("")
     (tmp_path / "robocov-3.png").write_text("")

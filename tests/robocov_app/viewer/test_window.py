@@ -1,4 +1,4 @@
-"""The window, as it is used: everything is pressed, dragged and typed, without a display."""
+"""The window, used by mouse and keys without a display: playback, files, help, palette, sizes, lesson."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
-from driven_window import FRAME, Driver, opened, resized
+from driven_window import FRAME, Driver, open_viewer, resize_window
 from PIL import Image
 from sample_sessions import RAPF, start_session
 
@@ -31,10 +31,12 @@ def test_space_plays_and_pauses(driver: Driver) -> None:
 
 def test_buttons_play_step_settle_and_restart(driver: Driver) -> None:
     driver.push("pause")
-    assert driver.session.playback.is_playing and driver.widget("button", "pause").text == "Pause"
+    assert driver.session.playback.is_playing
+    assert driver.widget("button", "pause").text == "Pause"
     driver.frames(5)
     driver.push("pause")
-    assert not driver.session.playback.is_playing and driver.widget("button", "pause").text == "Play"
+    assert not driver.session.playback.is_playing
+    assert driver.widget("button", "pause").text == "Play"
     end = driver.session.timeline.end_time
     driver.push("step")
     assert driver.session.timeline.end_time == pytest.approx(end + driver.session.timeline.scenario.dt)
@@ -45,8 +47,8 @@ def test_buttons_play_step_settle_and_restart(driver: Driver) -> None:
     assert driver.session.timeline.end_time < 0.1
 
 
-def test_it_stops_when_the_team_has_settled(tmp_path: Path) -> None:
-    with opened(tmp_path, robots=1) as driver:
+def test_playback_stops_when_the_team_has_settled(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, robots=1) as driver:
         driver.key("s")
         for _ in range(2000):
             driver.window.advance(0.1)
@@ -56,18 +58,18 @@ def test_it_stops_when_the_team_has_settled(tmp_path: Path) -> None:
         assert driver.viewer.message.startswith("settled at ")
 
 
-def test_twice_the_speed_is_twice_the_time(driver: Driver) -> None:
+def test_the_speed_multiplies_the_simulated_time(driver: Driver) -> None:
     driver.key("=")
     driver.key("space")
     driver.frames(10)
     assert driver.session.displayed.time == pytest.approx(2 * 10 * FRAME, abs=0.03)
 
 
-# words, pictures, files
+# status line, cursor, files
 
 
-def test_the_status_line_tells_of_the_place_under_the_cursor(tmp_path: Path) -> None:
-    with opened(tmp_path, lattice=48) as driver:
+def test_the_status_line_describes_the_point_under_the_cursor(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, lattice=48) as driver:
         driver.frames(3)
         driver.move(*driver.robot(2))
         assert "robot 2" in describe_cursor(driver.viewer)
@@ -78,7 +80,7 @@ def test_the_status_line_tells_of_the_place_under_the_cursor(tmp_path: Path) -> 
         assert describe_cursor(driver.viewer) == ""
 
 
-def test_over_the_panel_the_cursor_is_an_arrow(driver: Driver) -> None:
+def test_the_cursor_is_an_arrow_over_the_panel(driver: Driver) -> None:
     driver.key("w")
     driver.move(*driver.pixel((4.2, 1.2)))
     driver.frames(1)
@@ -89,7 +91,7 @@ def test_over_the_panel_the_cursor_is_an_arrow(driver: Driver) -> None:
     assert driver.window.cursor.shape == pygame.SYSTEM_CURSOR_ARROW
 
 
-def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -> None:
+def test_a_screenshot_contains_the_window(driver: Driver, tmp_path: Path) -> None:
     picture = driver.picture()
     driver.key("f12")
     with Image.open(tmp_path / "robocov-1.png") as saved:
@@ -100,35 +102,38 @@ def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> None:
+def test_a_run_is_saved_in_the_background(driver: Driver, tmp_path: Path) -> None:
     for _ in range(30):
         driver.session.playback.step()
     driver.key("ctrl+e")
     driver.window.run_saver.finish()
     driver.frames(2)
-    assert not driver.viewer.has_error_message and "saved" in driver.viewer.message
+    assert not driver.viewer.has_error_message
+    assert "saved" in driver.viewer.message
     (record,) = tmp_path.rglob("record.npz")
     assert record.parent != tmp_path
 
 
 @pytest.mark.slow
-def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> None:
+def test_a_video_lasts_as_long_as_the_recording(driver: Driver, tmp_path: Path) -> None:
     driver.key("space")
     driver.key("f9")
     assert driver.viewer.view.is_recording
     driver.frames(60)
-    resized(driver, (1000, 640))
+    resize_window(driver, (1000, 640))
     driver.frames(15)
     driver.key("f9")
     path = tmp_path / "robocov-1.mp4"
-    assert driver.viewer.message.startswith(f"video saved: {path}") and not driver.viewer.view.is_recording
+    assert driver.viewer.message.startswith(f"video saved: {path}")
+    assert not driver.viewer.view.is_recording
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert seconds == pytest.approx(75 * FRAME, abs=0.15) and count == pytest.approx(45, abs=4)
+    assert seconds == pytest.approx(75 * FRAME, abs=0.15)
+    assert count == pytest.approx(45, abs=4)
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
 
 
-def test_closing_ends_the_film(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+def test_closing_the_window_completes_the_video(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
         driver.key("f9")
         driver.frames(10)
         driver.post(pygame.QUIT)
@@ -137,43 +142,49 @@ def test_closing_ends_the_film(tmp_path: Path) -> None:
     assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "robocov-1.mp4"))[0] > 0
 
 
-def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
+def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with opened(tmp_path / "file") as driver:
+    with open_viewer(tmp_path / "file") as driver:
         for key in ("f12", "f9", "ctrl+s"):
             driver.viewer.has_error_message = False
             driver.key(key)
-            assert driver.viewer.has_error_message and driver.viewer.message, key
-        assert driver.window.video is None and not driver.viewer.view.is_recording
+            assert driver.viewer.has_error_message
+            assert driver.viewer.message, key
+        assert driver.window.video is None
+        assert not driver.viewer.view.is_recording
 
 
 # help, palette, theme, size
 
 
 @pytest.mark.parametrize("key", ["f1", "shift+/"])
-def test_the_keys_are_shown_and_go_with_a_key_or_a_click(key: str, driver: Driver) -> None:
+def test_the_help_page_closes_by_key_or_click(key: str, driver: Driver) -> None:
     plain = driver.picture()
     driver.key(key)
-    assert driver.window.is_help_open and not driver.same(plain)
+    assert driver.window.is_help_open
+    assert not driver.same(plain)
     driver.key("escape")
     assert not driver.window.is_help_open
     driver.key(key)
     driver.click(300, 300)
-    assert not driver.window.is_help_open and driver.viewer.selected_robot is None
+    assert not driver.window.is_help_open
+    assert driver.viewer.selected_robot is None
 
 
 @pytest.mark.parametrize("key", ["/", "ctrl+k"])
 def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
     driver.key(key)
     dialogs = driver.window.dialogs
-    assert dialogs.is_open and dialogs.current.text == ""
+    assert dialogs.is_open
+    assert dialogs.current.text == ""
     driver.type("single")
     assert [each.text for each in dialogs.current.options("single")] == ["Single step"]
     driver.key("return")
-    assert driver.session.timeline.end_time > 0.0 and not dialogs.is_open
+    assert driver.session.timeline.end_time > 0.0
+    assert not dialogs.is_open
 
 
-def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
+def test_the_palette_is_navigated_by_keys(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("rob")
     asked = driver.window.dialogs.current
@@ -181,14 +192,16 @@ def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
     driver.key("up")
     assert asked.chosen == 1
     driver.key("backspace")
-    assert asked.text == "ro" and asked.chosen == 0
+    assert asked.text == "ro"
+    assert asked.chosen == 0
     driver.key("down", 30)
     assert asked.chosen == len(asked.options("ro")) - 1
     driver.key("escape")
-    assert not driver.window.dialogs.is_open and driver.session.timeline.end_time == 0.0
+    assert not driver.window.dialogs.is_open
+    assert driver.session.timeline.end_time == 0.0
 
 
-def test_values_are_set_by_typing(driver: Driver) -> None:
+def test_values_are_set_in_the_palette(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("k_rep 0.5")
     driver.key("return")
@@ -201,12 +214,11 @@ def test_values_are_set_by_typing(driver: Driver) -> None:
     driver.type("robots many")
     driver.key("return")
     asked = driver.window.dialogs.current
-    assert asked.text == "robots many" and "whole number" in asked.error  # nothing typed is lost
+    assert asked.text == "robots many"
+    assert "whole number" in asked.error
 
 
-def test_a_key_that_is_held_down_saves_one_picture_but_goes_on_stepping(
-    driver: Driver, tmp_path: Path
-) -> None:
+def test_held_keys_repeat_steps_but_not_screenshots(driver: Driver, tmp_path: Path) -> None:
     for code, name in ((pygame.K_F12, ""), (pygame.K_PERIOD, ".")):
         for _ in range(5):
             driver.post(pygame.KEYDOWN, key=code, mod=0, unicode=name, scancode=0)
@@ -218,13 +230,14 @@ def test_a_key_that_is_held_down_saves_one_picture_but_goes_on_stepping(
     assert (tmp_path / "robocov-2.png").exists()
 
 
-def test_the_theme_is_switched_for_everything(driver: Driver) -> None:
+def test_the_theme_changes_all_parts_of_the_window(driver: Driver) -> None:
     light = driver.picture()
     driver.key("t")
     driver.frames(3, 0.3)
     dark = driver.picture()
     for part in (slice(0, 500), slice(600, 900)):
-        assert light[:, part].mean() > 190 and dark[:, part].mean() < 90
+        assert light[:, part].mean() > 190
+        assert dark[:, part].mean() < 90
     driver.key("t")
     driver.frames(3, 0.3)
     assert driver.picture().mean() > 190
@@ -233,11 +246,11 @@ def test_the_theme_is_switched_for_everything(driver: Driver) -> None:
 @pytest.mark.parametrize(
     ("size", "panes"), [((900, 600), 1), ((1500, 700), 3), ((3840, 2160), 3), ((640, 480), 1)]
 )
-def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int, tmp_path: Path) -> None:
-    with opened(
+def test_windows_of_any_size_can_be_used(size: tuple[int, int], panes: int, tmp_path: Path) -> None:
+    with open_viewer(
         tmp_path, *([RAPF] * panes), size=(1280, 720), scale=2.0 if size[0] > 3000 else 1.0
     ) as driver:
-        resized(driver, size)
+        resize_window(driver, size)
         assert driver.window.layout.size == size
         driver.key("space")
         driver.frames(2)
@@ -251,7 +264,7 @@ def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int,
             driver.push("reset:k_rep")
 
 
-def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver: Driver) -> None:
+def test_long_pages_scroll_by_wheel_and_bar(driver: Driver) -> None:
     assert driver.widget("entry", "team.radius").rect.height == 0  # out of sight
     for _ in range(12):
         driver.wheel(740, 500, -3)
@@ -266,29 +279,32 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
     assert driver.window.canvas._painters[0].camera == camera
 
 
-# tour
+# lesson
 
 
-def test_the_lesson_is_played_and_ends_on_a_key(driver: Driver) -> None:
+def test_the_lesson_ends_by_a_key(driver: Driver) -> None:
     shown = set(driver.viewer.view.layers)
     driver.key("f2")
-    assert driver.window.lesson.player is not None and driver.viewer.session.playback.is_playing
+    assert driver.window.lesson.player is not None
+    assert driver.viewer.session.playback.is_playing
     driver.frames(5)
     driver.key("f12")
     driver.key("t")
     assert driver.window.lesson.player is not None
     driver.key("escape")
-    assert driver.window.lesson.player is None and driver.viewer.view.layers == shown
+    assert driver.window.lesson.player is None
+    assert driver.viewer.view.layers == shown
     assert driver.viewer.session is driver.session
     assert driver.viewer.message == "the lesson has ended; your session from before is back"
 
 
-def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
+def test_the_lesson_pauses_when_the_arena_is_clicked(driver: Driver) -> None:
     driver.key("f2")
     driver.frames(3)
     driver.click(*driver.window.layout.arena[2:])
     driver.click(200, 200)
-    assert driver.window.lesson.player is not None and driver.window.lesson.player.state == "left"
+    assert driver.window.lesson.player is not None
+    assert driver.window.lesson.player.state == "left"
     driver.key("f2")
     assert driver.window.lesson.player.state == "playing"
 
@@ -296,7 +312,7 @@ def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
 # settings
 
 
-def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_are_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "settings"))
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
@@ -314,14 +330,16 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
         driver.tick("cells")
         first.close()
     kept = json.loads((tmp_path / "settings/window.json").read_text())
-    assert kept["theme"] == "dark" and kept["fade"] and kept["tab"] == "show"
-    assert "cells" not in kept["shown"] and (kept["width"], kept["height"]) == (1000, 640)
+    assert kept["theme"] == "dark"
+    assert kept["fade"]
+    assert kept["tab"] == "show"
+    assert "cells" not in kept["shown"]
+    assert (kept["width"], kept["height"]) == (1000, 640)
     with window() as second:
         assert second.screen.get_size() == (1000, 640)
-        assert (
-            second.viewer.view.theme == "dark"
-            and second.viewer.view.fades_trajectories
-            and second.panel.tab == "show"
-        )
-        assert "cells" not in second.viewer.view.layers and "robots" in second.viewer.view.layers
+        assert second.viewer.view.theme == "dark"
+        assert second.viewer.view.fades_trajectories
+        assert second.panel.tab == "show"
+        assert "cells" not in second.viewer.view.layers
+        assert "robots" in second.viewer.view.layers
         second.close()

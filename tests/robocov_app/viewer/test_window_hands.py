@@ -1,4 +1,4 @@
-"""The window, as it is used: the hand and the tools that draw."""
+"""The window, used by mouse and keys: the hand and the tools that draw."""
 
 from __future__ import annotations
 
@@ -7,27 +7,29 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_window import MIDDLE, Driver, opened, place
+from driven_window import MIDDLE, Driver, get_position, open_viewer
 from sample_sessions import RAPF, RPF
 
 # the hand
 
 
-def test_a_robot_that_is_dragged_follows_the_mouse(driver: Driver) -> None:
+def test_a_dragged_robot_follows_the_mouse(driver: Driver) -> None:
     driver.key("space")
     driver.press(*driver.robot(2))
     target = driver.pixel(MIDDLE)
     for _ in range(60):
         driver.move(*target, held=1, settled=False)
         driver.frames()
-    assert np.hypot(*(place(driver, 2) - MIDDLE)) < 0.3
-    assert driver.session.timeline.drag is not None and driver.session.timeline.drag[0] == 2
+    assert np.hypot(*(get_position(driver, 2) - MIDDLE)) < 0.3
+    assert driver.session.timeline.drag is not None
+    assert driver.session.timeline.drag[0] == 2
     driver.release()
     assert driver.session.timeline.drag is None
-    assert driver.viewer.selected_robot == 2 and driver.window.panel.tab == "robot"
+    assert driver.viewer.selected_robot == 2
+    assert driver.window.panel.tab == "robot"
 
 
-def test_a_robot_that_is_let_go_of_in_swing_flies_on(driver: Driver) -> None:
+def test_a_thrown_robot_keeps_moving(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (0.5, 3.0)))
     driver.key("space")
     driver.press(*driver.robot(1))
@@ -39,17 +41,17 @@ def test_a_robot_that_is_let_go_of_in_swing_flies_on(driver: Driver) -> None:
     pane = driver.session.timeline.panes[0]
     fast = float(np.hypot(*pane.simulation.velocities[pane.numbers.index(1)]))
     assert fast > pane.setup.properties.max_speed
-    before = place(driver, 1).copy()
+    before = get_position(driver, 1).copy()
     driver.frames(10)
-    assert place(driver, 1)[0] > before[0] + 0.1
+    assert get_position(driver, 1)[0] > before[0] + 0.1
 
 
-def test_while_paused_a_robot_is_put_where_the_mouse_is(driver: Driver) -> None:
+def test_a_robot_is_placed_at_the_mouse_while_paused(driver: Driver) -> None:
     driver.drag(driver.robot(3), driver.pixel((5.0, 3.4)))
-    assert np.allclose(place(driver, 3), (5.0, 3.4), atol=0.03)
+    assert np.allclose(get_position(driver, 3), (5.0, 3.4), atol=0.03)
 
 
-def test_a_click_on_the_floor_forgets_the_robot_and_a_drag_pans(driver: Driver) -> None:
+def test_a_click_on_the_floor_clears_the_selection_and_a_drag_pans(driver: Driver) -> None:
     driver.click(*driver.robot(1))
     assert driver.viewer.selected_robot == 1
     x, y = driver.pixel(MIDDLE)
@@ -60,14 +62,15 @@ def test_a_click_on_the_floor_forgets_the_robot_and_a_drag_pans(driver: Driver) 
     assert driver.viewer.selected_robot is None
 
 
-def test_an_obstacle_is_moved_and_that_can_be_undone_and_done_again(driver: Driver) -> None:
+def test_moving_an_obstacle_can_be_undone_and_redone(driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.drag_at((4.2, 1.2), (4.6, 1.6), (5.0, 1.8))
     (pillar, _) = driver.session.displayed.environment.obstacles
     assert pillar.center == pytest.approx((5.0, 1.8), abs=0.03)
     assert driver.viewer.message.startswith("circle “pillar” moved")
     driver.key("ctrl+z")
-    assert driver.session.displayed.environment == before and driver.viewer.message.startswith("undone: ")
+    assert driver.session.displayed.environment == before
+    assert driver.viewer.message.startswith("undone: ")
     driver.key("ctrl+y")
     assert driver.session.displayed.environment.obstacles[0] == pillar
     driver.key("ctrl+z")
@@ -75,7 +78,7 @@ def test_an_obstacle_is_moved_and_that_can_be_undone_and_done_again(driver: Driv
     assert driver.session.displayed.environment.obstacles[0] == pillar
 
 
-def test_escape_lets_go_of_what_is_dragged(driver: Driver) -> None:
+def test_escape_releases_a_dragged_obstacle(driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.press(*driver.pixel((4.2, 1.2)))
     driver.move(*driver.pixel((5.0, 1.8)), held=1)
@@ -84,7 +87,7 @@ def test_escape_lets_go_of_what_is_dragged(driver: Driver) -> None:
     assert driver.session.displayed.environment is before
 
 
-def test_the_second_button_does_not_let_go_of_what_the_first_holds(driver: Driver) -> None:
+def test_another_button_does_not_release_a_dragged_obstacle(driver: Driver) -> None:
     driver.press(*driver.pixel((4.2, 1.2)))
     driver.move(*driver.pixel((4.6, 1.4)), held=1)
     driver.post(pygame.MOUSEBUTTONDOWN, pos=driver.at, button=3)
@@ -125,17 +128,18 @@ def test_a_polygon_is_closed_by(how: str, driver: Driver) -> None:
     assert len(obstacle.vertices) == (4 if how == "double click" else 3)
 
 
-def test_a_wall_is_as_wide_as_was_asked(driver: Driver) -> None:
+def test_a_wall_has_the_chosen_width(driver: Driver) -> None:
     driver.key("w")
     driver.key("]")
     driver.click_at((0.4, 3.6))
     driver.click_at((1.4, 3.6))
     driver.key("enter")
     wall = driver.session.displayed.environment.obstacles[-1]
-    assert wall.width == 0.125 and np.allclose(wall.points, ((0.4, 3.6), (1.4, 3.6)), atol=0.02)
+    assert wall.width == 0.125
+    assert np.allclose(wall.points, ((0.4, 3.6), (1.4, 3.6)), atol=0.02)
 
 
-def test_a_circle_is_dragged_from_its_middle_to_its_rim(driver: Driver) -> None:
+def test_a_circle_is_dragged_from_its_center_to_its_rim(driver: Driver) -> None:
     driver.key("c")
     driver.drag_at((1.0, 3.2), (1.2, 3.2), (1.4, 3.2))
     circle = driver.session.displayed.environment.obstacles[-1]
@@ -150,17 +154,15 @@ def test_the_eraser_deletes_obstacles_and_robots(driver: Driver) -> None:
     driver.click(*driver.robot(2))
     assert driver.session.displayed.numbers == (1, 3)
     driver.key("ctrl+z", 2)
-    assert (
-        driver.session.displayed.numbers == (1, 2, 3)
-        and len(driver.session.displayed.environment.obstacles) == 2
-    )
+    assert driver.session.displayed.numbers == (1, 2, 3)
+    assert len(driver.session.displayed.environment.obstacles) == 2
 
 
-def test_robots_join_fail_and_are_revived_by_clicks(driver: Driver) -> None:
+def test_robots_are_added_failed_and_revived_by_clicks(driver: Driver) -> None:
     driver.key("a")
     driver.click_at((5.0, 3.0))
     assert driver.session.displayed.numbers == (1, 2, 3, 4)
-    assert np.allclose(place(driver, 4), (5.0, 3.0), atol=0.02)
+    assert np.allclose(get_position(driver, 4), (5.0, 3.0), atol=0.02)
     driver.key("d")
     driver.click(*driver.robot(4))
     assert driver.session.displayed.numbers == (1, 2, 3)
@@ -175,35 +177,37 @@ def test_robots_join_fail_and_are_revived_by_clicks(driver: Driver) -> None:
         (((0.4, 3.0), (1.2, 3.6), (1.2, 3.0), (0.4, 3.6)), "crosses itself"),
     ],
 )
-def test_an_obstacle_that_cannot_be_is_refused_with_the_reason(corners, why: str, driver: Driver) -> None:
+def test_an_invalid_obstacle_is_refused_with_the_reason(corners, why: str, driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.key("p")
     for corner in corners:
         driver.click_at(corner)
     driver.key("return")
-    assert why in driver.viewer.message and driver.viewer.has_error_message
+    assert why in driver.viewer.message
+    assert driver.viewer.has_error_message
     assert driver.session.displayed.environment is before
 
 
-def test_an_obstacle_over_all_of_the_floor_is_refused(driver: Driver) -> None:
+def test_an_obstacle_that_covers_the_floor_is_refused(driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.key("p")
     for corner in ((0.01, 0.01), (5.99, 0.01), (5.99, 3.99), (0.01, 3.99)):
         driver.click_at(corner)
     driver.key("return")
-    assert driver.viewer.has_error_message and driver.viewer.message
+    assert driver.viewer.has_error_message
+    assert driver.viewer.message
     assert driver.session.displayed.environment is before
 
 
-def test_the_ruler_measures(driver: Driver) -> None:
+def test_the_ruler_measures_a_distance(driver: Driver) -> None:
     driver.key("m")
     driver.drag_at((1.0, 3.0), (3.0, 3.0))
     state = driver.viewer.tool.build_draw_state(driver.session)
     assert state.label.startswith("2.0")
 
 
-def test_what_is_drawn_is_in_the_pane_under_the_mouse(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, RPF) as driver:
+def test_drawing_in_a_pane_activates_it_and_edits_all_panes(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, RAPF, RPF) as driver:
         driver.key("c")
         driver.drag(driver.pixel((1.0, 3.2), 1), driver.pixel((1.4, 3.2), 1))
         assert driver.viewer.active_pane == 1

@@ -1,4 +1,4 @@
-"""The window, as it is used: the time line and the camera."""
+"""The window, used by mouse and keys: the time line and the camera."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import MIDDLE, Driver, opened
+from driven_window import MIDDLE, Driver, open_viewer
 from sample_sessions import RAPF, RPF
 
 from robocov_app.viewer.tools.tool import ViewerDrawState
@@ -14,7 +14,7 @@ from robocov_app.viewer.tools.tool import ViewerDrawState
 # time line
 
 
-def played(driver: Driver, steps: int) -> Driver:
+def play_steps(driver: Driver, steps: int) -> Driver:
     for _ in range(steps):
         driver.session.playback.step()
         driver.window._cost_curves.update()
@@ -22,62 +22,63 @@ def played(driver: Driver, steps: int) -> Driver:
     return driver
 
 
-def at(driver: Driver, time: float) -> tuple[float, float]:
-    """Return the pixel on the time line of a time."""
-    _, top, _, high = driver.window.layout.track
-    return driver.window.chart.to_column(time), top + high / 2
+def find_time(driver: Driver, time: float) -> tuple[float, float]:
+    """Return the pixel of a time, s, on the time line."""
+    _, top, _, height = driver.window.layout.track
+    return driver.window.chart.to_column(time), top + height / 2
 
 
-def test_the_time_line_is_dragged_to_look_back_and_to_the_end_again(driver: Driver) -> None:
-    played(driver, 120)
-    driver.press(*at(driver, 1.0))
-    assert (
-        driver.session.displayed.time == pytest.approx(1.0, abs=0.05) and not driver.session.timeline.is_live
-    )
-    driver.move(*at(driver, 0.4), held=1)
+def test_dragging_the_time_line_shows_the_past_and_the_present(driver: Driver) -> None:
+    play_steps(driver, 120)
+    driver.press(*find_time(driver, 1.0))
+    assert driver.session.displayed.time == pytest.approx(1.0, abs=0.05)
+    assert not driver.session.timeline.is_live
+    driver.move(*find_time(driver, 0.4), held=1)
     assert driver.session.displayed.time == pytest.approx(0.4, abs=0.05)
-    driver.move(*at(driver, 9.0), held=1)
+    driver.move(*find_time(driver, 9.0), held=1)
     assert driver.session.timeline.is_live
     driver.release()
-    driver.move(*at(driver, 0.2))
+    driver.move(*find_time(driver, 0.2))
     assert driver.session.timeline.is_live
 
 
-def test_a_branch_leaves_a_ghost_of_what_came_after(driver: Driver) -> None:
-    played(driver, 120)
-    driver.click(*at(driver, 0.5))
+def test_branching_leaves_a_ghost_curve(driver: Driver) -> None:
+    play_steps(driver, 120)
+    driver.click(*find_time(driver, 0.5))
     driver.key("b")
-    assert driver.session.timeline.is_live and driver.session.playback.is_playing
-    assert driver.session.timeline.end_time < 0.7 and len(driver.session.timeline.ghosts) == 1
+    assert driver.session.timeline.is_live
+    assert driver.session.playback.is_playing
+    assert driver.session.timeline.end_time < 0.7
+    assert len(driver.session.timeline.ghosts) == 1
     driver.frames(3)
 
 
-def test_a_touch_in_the_past_goes_on_from_there(driver: Driver) -> None:
-    played(driver, 120)
-    driver.click(*at(driver, 0.5))
+def test_an_edit_in_the_past_continues_from_there(driver: Driver) -> None:
+    play_steps(driver, 120)
+    driver.click(*find_time(driver, 0.5))
     driver.key("c")
     driver.drag_at((1.0, 3.2), (1.3, 3.2))
-    assert driver.session.timeline.is_live and driver.session.timeline.end_time == pytest.approx(
-        0.5, abs=0.05
-    )
+    assert driver.session.timeline.is_live
+    assert driver.session.timeline.end_time == pytest.approx(0.5, abs=0.05)
     assert [event.kind for event in driver.session.timeline.events] == ["obstacle"]
 
 
-def test_what_happened_is_marked_and_told_under_the_mouse(driver: Driver) -> None:
-    played(driver, 60)
-    driver.move(*at(driver, 0.5))
+def test_events_are_marked_on_the_time_line(driver: Driver) -> None:
+    play_steps(driver, 60)
+    driver.move(*find_time(driver, 0.5))
     quiet = driver.picture()
     driver.viewer.attempt(lambda: driver.session.fail_robot(2))
-    played(driver, 60)
+    play_steps(driver, 60)
     (event,) = driver.session.timeline.events
-    assert event.time == pytest.approx(1.0) and event.text == "robot 2 failed"
+    assert event.time == pytest.approx(1.0)
+    assert event.text == "robot 2 failed"
     assert not driver.same(quiet)
-    driver.move(*at(driver, 1.0))
+    driver.move(*find_time(driver, 1.0))
     assert driver.window.chart.hover == driver.at
 
 
-def test_home_end_and_arrows_go_through_time(driver: Driver) -> None:
-    played(driver, 120)
+def test_home_end_and_arrow_keys_move_through_time(driver: Driver) -> None:
+    play_steps(driver, 120)
     driver.key("home")
     assert driver.session.displayed.time == 0.0
     driver.key("right")
@@ -91,21 +92,23 @@ def test_home_end_and_arrows_go_through_time(driver: Driver) -> None:
 # camera
 
 
-def world(driver: Driver, pane: int = 0) -> np.ndarray:
+def find_cursor(driver: Driver, pane: int = 0) -> np.ndarray:
+    """Return the point of the map under the cursor, (2,) m."""
     return np.array(driver.window.canvas.to_world(driver.at, pane))
 
 
 @pytest.mark.parametrize("amount", [3, -1])
-def test_zooming_keeps_the_place_under_the_cursor(amount: int, driver: Driver) -> None:
+def test_zooming_keeps_the_point_under_the_cursor(amount: int, driver: Driver) -> None:
     driver.wheel(200, 150, 2)
-    before, zoom = world(driver), driver.window.canvas._painters[0].camera.zoom
+    before = find_cursor(driver)
+    zoom = driver.window.canvas._painters[0].camera.zoom
     driver.wheel(200, 150, amount)
-    assert np.allclose(world(driver), before, atol=1e-9)
+    assert np.allclose(find_cursor(driver), before, atol=1e-9)
     assert (driver.window.canvas._painters[0].camera.zoom > zoom) == (amount > 0)
 
 
 @pytest.mark.parametrize("button", [2, 3])
-def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Driver) -> None:
+def test_other_buttons_pan_with_any_tool(button: int, driver: Driver) -> None:
     driver.key("p")
     before = driver.pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (260, 180), button=button)
@@ -124,7 +127,7 @@ def test_panning_back_to_the_start_completes_no_drawing(driver: Driver) -> None:
     driver.key("escape", 2)
 
 
-def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:
+def test_fit_shows_the_whole_map_after_zooming_and_panning(driver: Driver) -> None:
     camera = driver.window.canvas._painters[0].camera
     for key in ("ctrl+=", "ctrl+=", "ctrl+left", "ctrl+up", "ctrl+-", "ctrl+right", "ctrl+down"):
         before = driver.window.canvas._painters[0].camera
@@ -134,10 +137,11 @@ def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(dri
     assert driver.window.canvas._painters[0].camera == camera
 
 
-def test_one_camera_for_all_panes(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, RPF) as driver:
+def test_panes_share_the_camera(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, RAPF, RPF) as driver:
         x, y = driver.pixel(MIDDLE, 1)
         driver.wheel(x, y, 3)
         first, second = driver.window.canvas._painters
-        assert first.camera.zoom == second.camera.zoom and first.camera.center == second.camera.center
+        assert first.camera.zoom == second.camera.zoom
+        assert first.camera.center == second.camera.center
         assert np.allclose(driver.window.canvas.to_world(driver.at, 1), MIDDLE, atol=0.02)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_window import opened
+from driven_window import open_viewer
 from sample_sessions import advance_session, build_presenter, get_positions, start_session
 
 from robocov.errors import MapError
@@ -100,7 +100,7 @@ def test_drafts_are_not_saved_at_each_frame(tmp_path: Path) -> None:
 
 
 def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(2)
         advance_session(driver.session, 10)
         driver.key("ctrl+z")
@@ -119,7 +119,7 @@ def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
 
 
 def test_branches_are_entered_by_keys(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(2)
         advance_session(driver.session, 10)
         driver.session.undo()
@@ -142,7 +142,7 @@ def test_a_file_that_is_no_session_is_rejected(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
+    with open_viewer(tmp_path) as driver:
         driver.session.playback.is_playing = True
         driver.frames(90)
         driver.session.fail_robot(2)

@@ -1,4 +1,4 @@
-"""What the inspector says of moments made by hand and of runs."""
+"""Reports on robots, for given observations and decisions, and after runs."""
 
 import re
 
@@ -14,7 +14,7 @@ from robocov_app.viewer.explanation.explain import RobotReport, explain
 from robocov_app.viewer.explanation.lines import ReportLine
 
 
-def moment(
+def build_report(
     positions,
     *,
     velocities=None,
@@ -28,7 +28,7 @@ def moment(
     names=None,
     **terms,
 ) -> RobotReport:
-    """Explain one robot at a moment made by hand; without `forces` they are the sum of the terms."""
+    """Explain a robot with given observations and terms; by default its forces are the sum of the terms."""
     positions = np.array(positions, dtype=float)
     limits = {name: terms.pop(name) for name in tuple(terms) if name in Team.__dataclass_fields__}
     team = Team.homogeneous(len(positions), **limits)
@@ -48,37 +48,38 @@ def moment(
     return explain(snapshot, team, environment, robot, numbers=names, recent=recent)
 
 
-def run(simulation: Simulation, seconds: float) -> list[RobotReport]:
-    """Let a run go on, and explain all robots at its end with what they did of late."""
+def explain_run(simulation: Simulation, seconds: float) -> list[RobotReport]:
+    """Continue a simulation, and explain all robots at its end with their recent positions."""
     past = [snapshot.positions for snapshot in simulation.snapshots(seconds)]
     recent = np.array(past[-round(SETTLED_WINDOW_S / simulation.dt) - 1 :: 8])
-    team, environment = simulation.team, simulation.environment
+    team = simulation.team
+    environment = simulation.environment
     return [
         explain(simulation.observe_and_decide(), team, environment, robot, recent=recent[:, robot])
         for robot in range(len(team))
     ]
 
 
-def texts(report: RobotReport) -> list[str]:
+def list_texts(report: RobotReport) -> list[str]:
     return [line.text for line in report.lines]
 
 
-def line(report: RobotReport, kind: str) -> ReportLine:
+def get_line(report: RobotReport, kind: str) -> ReportLine:
     (found,) = (line for line in report.lines if line.kind == kind)
     return found
 
 
-def sums_up(report: RobotReport) -> None:
-    total = np.array(line(report, "resultant").vector)
+def assert_forces_sum_up(report: RobotReport) -> None:
+    total = np.array(get_line(report, "resultant").vector)
     parts = [one.vector for one in report.lines if one.vector is not None and one.kind != "resultant"]
     scale = max((np.abs(part).max() for part in parts), default=0.0)
     assert np.sum(parts or [(0.0, 0.0)], axis=0) == pytest.approx(total, abs=1e-5 + 1e-8 * scale)
 
 
-def says_no_nonsense(report: RobotReport) -> None:
-    for text in (report.title, report.verdict, *texts(report)):
+def assert_consistent(report: RobotReport) -> None:
+    for text in (report.title, report.verdict, *list_texts(report)):
         assert text == " ".join(text.split()) != ""
         assert not re.search(r"nan|inf|None|\de[+-]?\d|-0\.00|\bj\b", text), text
     assert all(np.isfinite(one.vector).all() for one in report.lines if one.vector is not None)
     assert report.lines[0].vector is None
-    sums_up(report)
+    assert_forces_sum_up(report)
