@@ -62,8 +62,8 @@ def replace_obstacles(
         try:
             return from_json(to_json(changed), "map")
         except MapError as error:
-            covered = {mistake.path[1] for mistake in error.mistakes if mistake.path[:1] == ("starts",)}
-            covered &= starts.keys()
+            invalid = {mistake.path[1] for mistake in error.mistakes if mistake.path[:1] == ("starts",)}
+            covered = [name for name in starts if name in invalid]
             if not covered:
                 raise MapError(str(error).removeprefix("map: ")) from None
             for name in covered:
