@@ -1,0 +1,41 @@
+"""Attributes of the elements of TMX files: numbers and positions."""
+
+import re
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import quote
+from robocov_app.formats.files.xml_tree import Element
+
+
+def parse_vector(element: Element, x_name: str, y_name: str) -> Array:
+    """Return the numbers in two attributes, (2,), which are 0 by default."""
+    return np.array([parse_number(element, x_name), parse_number(element, y_name)])
+
+
+def parse_number(element: Element, name: str) -> float:
+    """Return the number in an attribute, which is 0 by default."""
+    return float(element.parse_numbers(name, count=1, default="0")[0])
+
+
+def parse_integer(element: Element, name: str, minimum: int, default: str = "") -> int:
+    """Return the integer in an attribute.
+
+    Parameters
+    ----------
+    element : Element
+    name : str
+    minimum : int
+    default : str
+        Value of a missing attribute; an empty one is an error.
+
+    Raises
+    ------
+    MapError
+        If the attribute is not an integer, or out of range.
+    """
+    text = element.attributes.get(name, default)
+    if not re.fullmatch(r"-?[0-9]{1,10}", text) or not minimum <= int(text) < 2**32:
+        element.refuse(f"expected a whole number from {minimum}, got {name} {quote(text)}")
+    return int(text)
