@@ -67,14 +67,14 @@ def _measure_encoding(quick: bool) -> Iterator[Row]:
     rows = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
     frames = list(draw_frames(record, settings, size=SIZE_PX, rows=rows))
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "film.mp4"
+        path = Path(folder) / "video.mp4"
         calls = {
             "draw": lambda: list(draw_frames(record, settings, size=SIZE_PX, rows=rows)),
             "video": lambda: save_video(path, frames),
             "png": lambda: [encode_png(frame) for frame in frames],
         }
         times = measure_in_alternation(calls, 1 if quick else 3)
-    for name, call in (("film encoded", "video"), ("PNGs encoded", "png")):
+    for name, call in (("video encoded", "video"), ("PNGs encoded", "png")):
         yield Row(
             "render",
             name,

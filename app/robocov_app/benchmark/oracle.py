@@ -31,7 +31,7 @@ _LATTICE = 8
 """Cells of the planner's lattice along a side. It is coarse because only paths are planned, no costs."""
 _TIME_TOLERANCE_S = 1e-9
 _UNREACHABLE_M = 1e6
-"""Length that stands for a path that does not exist, when goals are assigned."""
+"""Length of a missing path when goals are assigned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class OracleMemory:
     routes: tuple[Array, ...]
     """Waypoints of each robot, (w, 2) m."""
     legs: IntArray
-    """Index of the waypoint that each robot heads for, (n,)."""
+    """Index of the next waypoint of each robot, (n,)."""
     returns: Array | None = None
     """Points that the last scan of each robot hit, (n, rays, 2) m."""
     stage: int = -1

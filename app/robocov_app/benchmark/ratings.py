@@ -45,15 +45,15 @@ _SUMMARY_COLUMNS = (
 )
 NOTES = (
     "Gap: J / J_ref − 1 at the end, the median over runs with its 95 % interval (bootstrap that draws whole "
-    "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "
-    "in brackets the median above certified lower bounds, where all are known. "
-    "To 5 %: from when on J stays within 5 % of its own end. ∫J / J_ref: the integral of J over the run by "
-    "the reference. Path: mean path length of a robot.",
+    "maps), mean and worst; J_ref is the best known placement, not a proven optimum, so gaps may be too "
+    "small; in brackets the median above certified lower bounds, where all are known. "
+    "To 5 %: the time from which J stays within 5 % of its final value. ∫J / J_ref: the integral of J over "
+    "the run by the reference. Path: mean path length of a robot.",
     "Medians over runs, but: contacts are the runs in which a robot touched a wall or another one; at rest "
-    "is the share of runs in which no robot gets 5 cm in any 4 s at the end; rest is the Kaplan-Meier median "
-    "of when that began, with runs that did not rest as censored. B/s: bytes a robot sends per second, "
-    "heard or not: 20 for a position, 5 for each changed cell of a shared map. µs/s: processor time of "
-    "the law for a robot and second; it is of the machine that ran it.",
+    "is the fraction of runs at whose end no robot moves 5 cm in any 4 s; rest is the Kaplan-Meier median "
+    "of the time when that starts; runs that do not come to rest are censored. B/s: bytes that a robot "
+    "sends per second, received or not: 20 for a position, 5 for each changed cell of a shared map. µs/s: "
+    "processor time of the controller per robot and second, which depends on the machine.",
 )
 
 

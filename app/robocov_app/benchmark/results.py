@@ -63,7 +63,7 @@ def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
     if reference is None:
         raise InputError(
             f"map {map_name}: no reference for a team of {robots}; "
-            "`robocov benchmark references` makes those that are missing"
+            "`robocov benchmark references` computes the missing ones"
         )
     return dict(reference)
 
@@ -130,19 +130,21 @@ def identify_suite() -> dict[str, str]:
 
 
 def describe_method() -> list[str]:
-    """Return the method of the benchmark, and what its figures mean, in sentences."""
+    """Describe the method of the benchmark and its figures, in sentences."""
     return [
         f"Maps, starts, seeds and tracks are those of suite {suite.VERSION}, whose maps have hashes.",
         f"J is the mean geodesic distance to the nearest robot on {suite.LATTICE} x {suite.LATTICE} sites, "
-        "weighed by the density of a map, with obstacles where they are at that moment and robots that work.",
+        "weighted by the density of a map, with the present obstacles and working robots.",
         "The gap is J / J_ref - 1 at the end; J_ref is the lowest of 24 searches for the best placement with "
-        "the whole map known, for as many robots as work at the end. It is an upper bound of the optimum.",
-        "near_final_s: from when on J stays within 5 % of its end. settled_at_s: from when on no robot gets "
-        "5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of |F v|, all robots.",
+        "the whole map known, for the number of robots that work at the end. It is an upper bound of the "
+        "optimum.",
+        "near_final_s: the time from which J stays within 5 % of its final value. settled_at_s: the time "
+        "from which no robot moves 5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of "
+        "|F v|, all robots.",
         "told_bytes: 20 bytes (position and number) a robot and control period, or message; where maps are "
-        "shared also 5 bytes for each cell that has changed on its map, whoever it knows it from, and by "
+        "shared also 5 bytes for each cell that has changed on its map, also through messages, and by "
         "atlas-shared 28 bytes (number, position, time) for each other robot that it knows of, at each plan.",
-        "deciding_s: processor time of the control law alone, all robots; it depends on the machine.",
+        "deciding_s: processor time of the controller alone, all robots; it depends on the machine.",
     ]
 
 
@@ -161,7 +163,7 @@ def read_result(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the file is missing or damaged, no result of the benchmark, or one of another suite.
+        If the file is missing or damaged, is not a result of the benchmark, or belongs to another suite.
     """
     path = path / RESULT_FILE if path.is_dir() else path
     data = read_bytes(path)

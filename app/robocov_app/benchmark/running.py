@@ -101,7 +101,7 @@ def _check_folder(out: Path) -> None:
     if out.is_dir():
         foreign = {path.name for path in out.iterdir()} - {RESULT_FILE, TRACKS_FOLDER}
     if foreign or (out.exists() and not out.is_dir()):
-        raise InputError(f"{out}: it holds something else than a benchmark; choose another --out")
+        raise InputError(f"{out}: expected an empty folder or a benchmark; choose another --out")
 
 
 def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:
@@ -110,7 +110,7 @@ def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:
     for task in generate_tasks(study):
         entry = ledger.read_entry(task)
         if entry is None:
-            raise OutputError(f"{folder}: {task.name} was removed by somebody else")
+            raise OutputError(f"{folder}: {task.name} was removed by another program")
         effort_path = folder / RUNS_FOLDER / task.name / EFFORT_FILE
         effort = effort_path.read_bytes() if effort_path.exists() else b"{}"
         yield build_row(track, task, entry, effort)

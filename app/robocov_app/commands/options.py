@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.settings import OutputSettings, VideoSettings
 
 MAX_DEFAULT_RECORD_ROWS = 4e6
-"""Maximum number of moments times robots in a record whose rate is not given: about 320 MB."""
+"""Maximum number of recorded steps times robots if no rate is given: about 320 MB."""
 _MIN_FIGURE_SIZE_PX = (320, 240)
 _MAX_FIGURE_SIZE_PX = (7680, 4320)
 

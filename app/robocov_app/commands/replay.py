@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class Arguments(JsonOption, WebOptions):
     """Replay a saved run or comparison in the window, or render it as frames and a video.
 
-    In the window, the run is the past: go to any moment of it, and continue from there with other gains,
+    In the window, the run is the past: go to any time of it, and continue from there with other gains,
     another controller or a new wall. A run of a controller outside robocov is shown from its record; the
     controller is only loaded if --controller names it.
 

@@ -15,26 +15,27 @@ A learned policy becomes a controller as a `PolicyController`; a controller acts
     offsets = [0, 1, 2, 3, 4, 5, 7, 8, 10, 11]  # x and y of all in an observation, without the masks
 
 
-    def law(gains):  # a velocity along each offset: away from neighbors, to the middle, ...
+    def policy(gains):  # a velocity along each offset: away from neighbors, to the middle, ...
         return lambda rows: np.einsum("k,nkd->nd", gains, rows[:, offsets].reshape(len(rows), -1, 2))
 
 
-    def mean_return(policy, seeds):
+    def mean_return(act, seeds):
         total = 0.0
         for seed in seeds:
             rows, _ = env.reset(seed=seed)
             over = False
             while not over:
-                rows, reward, _, over, _ = env.step(policy(rows))
+                rows, reward, _, over, _ = env.step(act(rows))
                 total += reward
         return total / len(seeds)
 
 
     rng = np.random.default_rng(0)
     tried = [rng.normal(scale=10.0, size=5) for _ in range(16)]
-    returns = [mean_return(law(gains), seeds=range(2)) for gains in tried]
+    returns = [mean_return(policy(gains), seeds=range(2)) for gains in tried]
     best = tried[int(np.argmax(returns))]
-    print("median", np.median(returns), "best on other starts", mean_return(law(best), seeds=range(10, 14)))
+    best_return = mean_return(policy(best), seeds=range(10, 14))
+    print("median", np.median(returns), "best on other starts", best_return)
 
 Names are loaded on first use; only the two environments need the extra.
 """

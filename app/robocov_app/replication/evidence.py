@@ -51,7 +51,7 @@ class ContenderSummary:
     quartiles : tuple of float
         Quartiles of the gap.
     contact_fraction : float
-        Fraction of runs in which a robot touches something.
+        Fraction of runs with contact.
     stuck_fraction : float
         Fraction of runs that end with a robot stuck; nan if the controller has no goals.
     rest_fraction : float

@@ -121,7 +121,7 @@ def _save_videos(
     settings: OutputSettings,
     interruption: Interruption,
 ) -> None:
-    """Save frames and videos if they are wanted, after all other results are on the disk."""
+    """Save frames and videos if they were requested, after all other results are on the disk."""
     result.save_progress()
     if settings.video.is_wanted:
         from robocov_app.runs.video import save_videos
@@ -210,7 +210,7 @@ def save_figures(
     *,
     is_comparison: bool = False,
 ) -> None:
-    """Draw ``trajectories`` and ``cost`` as PNG and SVG, if figures are wanted.
+    """Draw ``trajectories`` and ``cost`` as PNG and SVG, if figures were requested.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def _build_curves(runs: Sequence[Run], quantity: str) -> list[Curve]:
 
 
 def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
-    """Return the final moments of runs as figures of the coverage cost show them.
+    """Return the final states of runs for figures of the coverage cost.
 
     Parameters
     ----------

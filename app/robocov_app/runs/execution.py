@@ -111,7 +111,7 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
     cost : CoverageCost
         Cost of the record's map.
     interruption : Interruption
-        After an interruption, fewer moments are evaluated.
+        After an interruption, fewer steps are evaluated.
     quiet : bool
         Whether progress is not shown.
 

@@ -23,23 +23,23 @@ _TIME_TOLERANCE_S = 5e-7
 
 
 def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
-    """Select the moment of a run that each frame of a video shows.
+    """Select the recorded step that each frame of a video shows.
 
     Parameters
     ----------
     time : (T,) array, s
-        Ascending times of the moments.
+        Ascending times of the recorded steps.
     fps : float
         Frames per second of the video.
     speed : float
         Simulated seconds per second of the video.
     hold : float, s
-        Duration for which the video shows the last moment.
+        Duration for which the video shows the last step.
 
     Returns
     -------
     (k,) int array
-        Numbers of the moments.
+        Numbers of the steps.
     """
     duration = float(time[-1] - time[0])
     count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
@@ -73,7 +73,7 @@ def draw_frames(
     cost : CostHistory or None
         The coverage cost along the run. Each frame shows the latest value.
     rows : (k,) int array or None
-        Numbers of the moments that the frames show; those of `select_frame_rows` by default.
+        Numbers of the steps that the frames show; those of `select_frame_rows` by default.
     fields : Fields or None
         Distances to the nearest robot, if a layer shows them.
 

@@ -106,7 +106,7 @@ def build_pane_layout(
     fields : Fields or None
         Distances to the nearest robot, if a layer shows them.
     legend_scenes : sequence of Scene or None
-        The scenes that the legend explains. By default the first moments of the records, and the last ones
+        The scenes that the legend explains. By default the first steps of the records, and the last ones
         of those in which robots fail.
 
     Returns

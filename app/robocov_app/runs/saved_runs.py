@@ -145,7 +145,7 @@ def build_roster(record: Record) -> Roster:
 
 
 def name_failed_robot(number: int) -> str:
-    """Return the name of the obstacle that stands for a failed robot."""
+    """Return the name of the obstacle that represents a failed robot."""
     return f"failed robot {number}"
 
 

@@ -25,7 +25,7 @@ from robocov_app.terminal.progress import show_progress
 RUN_VIDEO = "run.mp4"
 COMPARISON_VIDEO = "comparison.mp4"
 VIDEO_HOLD_S = 1.0
-"""Duration for which a video shows its last moment."""
+"""Duration for which a video shows its last step."""
 _COLOR_SCALE_FACTOR = 1.3
 """Upper end of the color scale of a video divided by the largest distance at its end."""
 
@@ -49,13 +49,13 @@ def draw_comparison_frames(
     Parameters
     ----------
     records : sequence of Record
-        One for each pane. Panes of shorter runs stay at their last moment.
+        One for each pane. Panes of shorter runs stay at their last step.
     costs : sequence of CostHistory
         Their costs.
     layout : PaneLayout
     settings : VideoSettings
     hold : float, s
-        Duration for which the last moment is shown.
+        Duration for which the last step is shown.
     fields : Fields or None
         Distances to the nearest robot, if a layer shows them.
 

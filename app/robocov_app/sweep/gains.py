@@ -16,7 +16,7 @@ from robocov_app.sweep.paths import parse_values, require_distinct, validate_at
 from robocov_app.sweep.sampling import Range, Sampling, Scale
 
 NO_LIMIT = "null"
-"""Stands for None in study files, because TOML has no null."""
+"""Represents None in study files, because TOML has no null."""
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ from robocov_app.sweep.sampling import MAX_SEED, Sampling
 from robocov_app.sweep.study_size import DEFAULT_MAX_RUNS, MAX_MAX_RUNS, count_values, require_few_runs
 
 ALL_STARTS = "*"
-"""Stands for all starts of each map."""
+"""Selects all starts of each map."""
 MAX_ROBOTS = 10_000
 _MAX_MAP_NAME_CHARS = 100
 _MIN_LATTICE = 2
@@ -250,7 +250,7 @@ class Study:
         for index, start in enumerate(self.starts):
             if start == ALL_STARTS:
                 raise ParameterError(
-                    f"starts[{index}]: {quote(ALL_STARTS)} stands for all starts. Remove the other starts."
+                    f"starts[{index}]: {quote(ALL_STARTS)} selects all starts. Remove the other starts."
                 )
             for study_map in self.maps:
                 try:

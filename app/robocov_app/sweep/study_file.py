@@ -21,9 +21,9 @@ from robocov_app.sweep.sampling import Range, Sampling, SamplingMethod, Scale
 from robocov_app.sweep.study import Study, StudyMap
 
 ALL_MAPS = "*"
-"""Name that stands for all bundled maps."""
+"""Name that selects all bundled maps."""
 _ANY_KEY = "*"
-"""Key of a table schema that stands for all keys."""
+"""Key of a table schema that matches all keys."""
 _LIST_KEYS = ("maps", "controllers", "robots", "starts")
 """Keys that `Study` expects to be lists; a file may have a single value."""
 

@@ -210,7 +210,7 @@ def merge_repeated_options(kind: Any, words: list[str]) -> list[str]:
 
 
 def _map_multiple_options(kind: Any) -> dict[str, str]:
-    """Return the options that take any number of values: each name or alias, with the name it stands for."""
+    """Return the options that take any number of values: full names by names and aliases."""
     names: dict[str, str] = {}
     for group in (kind, *list_option_groups(kind)):
         plain_hints = get_type_hints(group)

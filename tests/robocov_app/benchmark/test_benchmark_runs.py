@@ -222,7 +222,7 @@ def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Mon
         (("page", "nowhere"), "nowhere: no such file"),
         (("page", "TORN"), "torn.json.gz: cannot be unpacked: Compressed file ended"),
         (("suite", "--quick"), "--quick: robocov benchmark suite has no such option"),
-        (("--controller", "rapf", "--out", "FOREIGN"), "it holds something else than a benchmark"),
+        (("--controller", "rapf", "--out", "FOREIGN"), "expected an empty folder or a benchmark"),
         (("verify", "OTHER"), "expected a result of robocov benchmark"),
     ],
 )

@@ -184,7 +184,7 @@ def test_our_controller_is_compared_with_every_other_one():
     assert (better.verdict, better.runs, better.maps, better.question) == ("holds", 48, 12, RIVALS)
     assert better.criteria[0].interval.estimate == pytest.approx(1.01 / 1.08)
     worse = found["beyond-howard-geodesic-lloyd"]
-    assert worse.verdict == "does not hold" and worse.text.endswith("which goes by the whole map.")
+    assert worse.verdict == "does not hold" and worse.text.endswith("which uses the whole map.")
     closed = found["beyond-howard-closes"]
     assert closed.criteria[0].interval.estimate == pytest.approx(1.0 - 0.01 / 0.05)
     assert closed.verdict == "holds"

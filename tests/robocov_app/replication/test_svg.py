@@ -84,7 +84,7 @@ def test_a_bar_has_a_description(interval, state):
     estimate = 0.15 if math.isnan(interval[0]) else sum(interval) / 2
     svg = str(draw_interval_bar(Criterion("x", Interval(estimate, *interval), high=1.0)))
     assert f'class="estimate {state}"' in svg
-    assert "wanted: at most 1" in svg and 'role="img"' in svg
+    assert "expected: at most 1" in svg and 'role="img"' in svg
     assert ("interval " in svg) is not math.isnan(interval[0])
 
 

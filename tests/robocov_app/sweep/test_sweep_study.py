@@ -104,7 +104,7 @@ WRONG = [
         {"starts": ("corner", "conrer")},
         "starts[1]: map 'A room': unknown start 'conrer': did you mean 'corner'?",
     ),
-    ({"starts": ("corner", "*")}, "starts[1]: '*' stands for all starts. "),
+    ({"starts": ("corner", "*")}, "starts[1]: '*' selects all starts. "),
     ({"starts": ("corner", "corner")}, "starts[1]: duplicate value 'corner', given already at starts[0]"),
     ({"duration": -1}, "duration: expected a number from 0 to 1e+06, got -1"),
     ({"duration": float("nan")}, "duration: expected a number"),

@@ -135,7 +135,7 @@ WRONG = [
     (
         'starts = "*"',
         'starts = ["*", "door"]',
-        "starts[0]: '*' stands for all starts. Remove the other starts.",
+        "starts[0]: '*' selects all starts. Remove the other starts.",
     ),
     ('starts = "*"', "starts = 3", "starts: expected a string, or a list of strings, got 3"),
     ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: duplicate value 1, given already at seeds[0]"),

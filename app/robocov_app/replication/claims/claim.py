@@ -126,7 +126,7 @@ class Claim:
     criteria: tuple[Criterion, ...] = ()
     runs: int = 0
     maps: int = 0
-    explanation: str = "There is no run that could tell."
+    explanation: str = "No run can decide it."
     min_maps: int = MIN_MAPS
     adjusted_p_value: float | None = None
 

@@ -17,7 +17,7 @@ def judge_targets(outcomes: Outcomes) -> Claim:
     claim = Claim(
         "targets",
         EXTENSIONS,
-        "Whether RAPF heads for the centroid of its cell, its geometric median or the best place of a "
+        "Whether RAPF moves to the centroid of its cell, its geometric median or the best position of a "
         "sensor makes no difference to the coverage cost.",
     )
     centroid = TARGETS[0]

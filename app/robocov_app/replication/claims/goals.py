@@ -1,6 +1,6 @@
 """Goals of our own controller, each a claim with one criterion.
 
-A goal is about the runs of the study: it is met or missed by the measured value. Its verdict as a claim tells
+A goal is about the runs of the study: it is met or missed by the measured value. Its verdict as a claim says
 whether other maps could have given another result.
 """
 

@@ -85,7 +85,7 @@ def judge_against_lloyd(outcomes: Outcomes) -> Claim:
         outcomes.compare("rapf-shared", "lloyd"),
         ratio_measure="median of J(RAPF) / J(LA) at the end",
         wins_measure="runs in which RAPF's is the lower one",
-        explain=lambda _: f"LA here slides along what it touches. {describe_other_gains(outcomes)}",
+        explain=lambda _: f"LA here slides along obstacles. {describe_other_gains(outcomes)}",
         max_ratio=CLEARLY_BELOW,
     )
 
@@ -114,7 +114,7 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
         others.append(f"{LABELS[key]} {format_amount(fraction, '%')}")
     explanation = (
         f"On average {format_amount(counts.mean())} robots are stuck in a run. "
-        f"Runs with a stuck robot of other laws: {', '.join(others)}. "
+        f"Runs with a stuck robot of other controllers: {', '.join(others)}. "
         f"Stuck: the goal is more than 0.5 m away and the robot moved less than 0.05 m in the last 5 s."
     )
     return claim.judge(criteria, explanation, known, runs_per_instance=1)

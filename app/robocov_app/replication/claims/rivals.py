@@ -39,7 +39,7 @@ def judge_rivals(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
     for other in (*strongest, *others):
         information = get_information(load_controller_class(other.controller))
         text = f"{own.label} ends at a lower cost than {other.label}"
-        text += "." if information == "own" else f", which goes by the {information}."
+        text += "." if information == "own" else f", which uses the {information}."
         claims.append(
             judge_pairs(
                 Claim(f"beyond-{own.key}-{other.key}", RIVALS, text),

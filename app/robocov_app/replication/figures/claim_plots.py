@@ -38,7 +38,7 @@ def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
                 _list_convex_rows(results.convex), "RAPF by LA, pair by pair (1: equal)", theme
             ),
             "claim-2-nonconvex": plan_pairs_plot(
-                _list_nonconvex_rows(claims), "RAPF by the other law, pair by pair (1: equal)", theme
+                _list_nonconvex_rows(claims), "RAPF by the other controller, pair by pair (1: equal)", theme
             ),
             "claim-3-gains": partial(draw_gain_grids, results.gains, theme) if has_gains else None,
             "claim-4-starts": plan_costs_plot(by_start, theme),

@@ -30,7 +30,7 @@ _MIN_HEIGHT_M = 0.01
 _MAX_HEIGHT_M = 100.0
 _PATH_POINTS = 240
 _GROUND_HEIGHT = 1e-7
-"""Height that stands for the limit 0, relative to the size of the cell."""
+"""Height that represents the limit 0, relative to the size of the cell."""
 _PANELS = (
     (0.0, 0.30, "the cell (m)"),
     (0.37, 0.26, "the frame in it (m)"),
@@ -251,8 +251,8 @@ def _draw_distance(
     _simplify_axes(axes, theme, "height h (m)", grid="y")
     worst = max(inner, key=lambda optimum: optimum.loss)
     note = (
-        f"A sensor over the centroid misses\nat most {100.0 * worst.loss:.2g} % of what it could\n"
-        f"tell, at h = {worst.height:.2g} m."
+        f"A sensor over the centroid loses\nat most {100.0 * worst.loss:.2g} % of the optimum,\n"
+        f"at h = {worst.height:.2g} m."
     )
     axes.annotate(
         note,

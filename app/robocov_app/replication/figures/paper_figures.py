@@ -130,7 +130,7 @@ def _describe_partition(run: Record) -> str:
     centroids = partition(positions, run.environment.region).centroid
     mean_distance = float(np.hypot(*(centroids - positions).T).mean())
     return (
-        f"The robots stand anywhere in “{run.environment.name}”, on average "
+        f"The robots are at random positions in “{run.environment.name}”, on average "
         f"{format_amount(mean_distance, 'm')} from the centers of mass of their cells."
     )
 

@@ -72,7 +72,7 @@ def draw_interval_bar(criterion: Criterion) -> Markup:
     if math.isfinite(interval.low):
         parts.append(f'<path class="interval {state}" d="M{to_x(interval.low)} 17.0H{to_x(interval.high)}"/>')
     parts.append(f'<circle class="estimate {state}" cx="{to_x(interval.estimate)}" cy="17.0" r="5.5"/>')
-    description = f"{criterion.result_text}; wanted: {criterion.range_text}"
+    description = f"{criterion.result_text}; expected: {criterion.range_text}"
     return _build_svg("bar", _BAR_WIDTH_PX, _BAR_HEIGHT_PX, description, parts)
 
 
