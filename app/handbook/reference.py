@@ -21,7 +21,7 @@ from robocov.metrics.run_metrics import COLUMNS
 from robocov_app.cli import COMMANDS, main
 from robocov_app.sweep.study_file import list_study_keys
 from robocov_app.sweep.table import RESULT_COLUMNS
-from robocov_app.viewer.session.file_models import build_session_schema
+from robocov_app.viewer.session.files.models import build_session_schema
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx

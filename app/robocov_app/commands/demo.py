@@ -110,7 +110,7 @@ def _build_launcher(options: Arguments) -> Launcher:
     """Load or build the session, and build the launcher of its window."""
     from robocov.controllers import list_controller_classes
     from robocov_app.viewer.launch import Launcher
-    from robocov_app.viewer.session.file import SUFFIX
+    from robocov_app.viewer.session.files.session_file import SUFFIX
 
     controllers = (*list_controller_classes(), *options.controllers)
     file: Path | None = None
@@ -144,7 +144,7 @@ def _build_launcher(options: Arguments) -> Launcher:
 
 def _load_session(file: Path, controllers: tuple[str, ...]) -> tuple[Session, str]:
     """Load a session, and return it with the name of its map."""
-    from robocov_app.viewer.session.file import load_session
+    from robocov_app.viewer.session.files.session_file import load_session
     from robocov_app.viewer.session.session import Session
 
     saved = load_session(file, controllers)

@@ -96,7 +96,7 @@ def _replay(options: Arguments) -> int:
 
 def _replay_session(path: Path, options: Arguments) -> int:
     """Open the window of a session, at its start."""
-    from robocov_app.viewer.session.file import load_session
+    from robocov_app.viewer.session.files.session_file import load_session
     from robocov_app.viewer.session.session import Session
 
     if options.is_headless:

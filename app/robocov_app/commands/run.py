@@ -18,7 +18,7 @@ from robocov_app.terminal.output import echo, list_files, print_answer
 if TYPE_CHECKING:
     from robocov_app.runs.execution import Run
     from robocov_app.viewer.session.document import Node
-    from robocov_app.viewer.session.file import SavedSession
+    from robocov_app.viewer.session.files.session_file import SavedSession
 
 _SESSION_SUFFIX = ".robocov"
 
@@ -126,7 +126,7 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
     from robocov.kernel_compilation import compile_kernels
     from robocov_app.viewer.branch_output.parts import SelectedBranch
     from robocov_app.viewer.branch_output.save import save_branch
-    from robocov_app.viewer.session.file import load_session, save_session
+    from robocov_app.viewer.session.files.session_file import load_session, save_session
 
     path = Path(options.map)
     settings = options.build_output_settings()

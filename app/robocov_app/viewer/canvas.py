@@ -22,7 +22,7 @@ from robocov_app.toolkit.layout import Layout, is_inside
 from robocov_app.viewer.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.states import PaneSetup
+from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.shared_legend import SharedLegend
 from robocov_app.viewer.tool_overlay import (
     FAILED_RADIUS_PX,

@@ -28,8 +28,8 @@ from robocov_app.viewer.chart_scale import (
     build_time_scale,
 )
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.curves import DISTANCE, TIME, Curve, GhostCurve, PlottedQuantity
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.curves import DISTANCE, TIME, Curve, GhostCurve, PlottedQuantity
 
 REFRESH_INTERVAL_S = 0.1
 """Curves that grow are drawn again after this time, not in each frame."""

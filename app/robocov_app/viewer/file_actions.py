@@ -11,14 +11,14 @@ from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.model import ViewerModel
-from robocov_app.viewer.session.file import SUFFIX, load_session
-from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import (
+from robocov_app.viewer.session.files.session_file import SUFFIX, load_session
+from robocov_app.viewer.session.files.workspace import (
     SessionWorkspace,
     describe_draft,
     find_recoverable_drafts,
     recover_draft,
 )
+from robocov_app.viewer.session.session import Session
 
 MAX_RECENT_FILES = 9
 

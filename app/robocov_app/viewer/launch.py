@@ -22,9 +22,9 @@ from robocov_app.toolkit.window_settings import WindowSettings, limit_window_siz
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
-from robocov_app.viewer.session.run_saver import RunSaver
+from robocov_app.viewer.session.files.run_saver import RunSaver
+from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import find_recoverable_drafts
 from robocov_app.viewer.window import ViewerWindow
 from robocov_app.viewer.window_dialogs import build_lesson_offer
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from robocov.errors import MapError, Mistake
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.file import SavedSession, load_session
-from robocov_app.viewer.session.file_models import ChapterModel, ConditionModel, QuestionModel, TaskModel
+from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, QuestionModel, TaskModel
+from robocov_app.viewer.session.files.session_file import SavedSession, load_session
+from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import SessionWorkspace
 from robocov_app.viewer.tools.tool import ViewerTool
 
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # comes with robocov

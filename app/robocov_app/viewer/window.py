@@ -27,7 +27,7 @@ from robocov_app.viewer.pointer import ViewerPointer
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.robot_inspector import RobotInspector
 from robocov_app.viewer.screen_video import ScreenVideo
-from robocov_app.viewer.session.run_saver import RunSaver
+from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.session_runner import SessionRunner
 from robocov_app.viewer.status import HINT, list_facts, suggest_actions
 from robocov_app.viewer.window_commands import ViewerWindowActions, list_window_commands

@@ -18,8 +18,8 @@ from robocov_app.toolkit.dialogs import (
 from robocov_app.toolkit.palette import create_palette
 from robocov_app.viewer.file_actions import FileActions
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.session.workspace import describe_draft
+from robocov_app.viewer.session.files.session_file import SUFFIX
+from robocov_app.viewer.session.files.workspace import describe_draft
 
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 

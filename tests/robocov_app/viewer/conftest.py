@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from driven_window import Driver, open_viewer
 
-from robocov_app.viewer.session import history, present
+from robocov_app.viewer.session import present
+from robocov_app.viewer.session.past import history
 
 
 @pytest.fixture

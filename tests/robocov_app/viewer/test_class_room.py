@@ -13,9 +13,13 @@ from sample_sessions import RAPF, get_positions
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.viewer.session.file import load_session
+from robocov_app.viewer.session.files.session_file import load_session
+from robocov_app.viewer.session.files.workspace import (
+    SessionWorkspace,
+    find_recoverable_drafts,
+    recover_draft,
+)
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import SessionWorkspace, find_recoverable_drafts, recover_draft
 
 ROOM = Environment("room", ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)))
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov_app.viewer.session import curves as module
-from robocov_app.viewer.session.curves import MAX_CURVE_SAMPLES, Curve
+from robocov_app.viewer.session.past import curves as module
+from robocov_app.viewer.session.past.curves import MAX_CURVE_SAMPLES, Curve
 
 
 def build_curve(*samples: tuple[float, float]) -> Curve:

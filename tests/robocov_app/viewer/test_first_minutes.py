@@ -20,7 +20,7 @@ from robocov_app.toolkit.display import open_display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import Launcher, ViewerSettings
 from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.workspace import SessionWorkspace, find_recoverable_drafts
+from robocov_app.viewer.session.files.workspace import SessionWorkspace, find_recoverable_drafts
 from robocov_app.viewer.status import describe_cursor, list_facts, suggest_actions
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))

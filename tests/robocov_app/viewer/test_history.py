@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from sample_sessions import HALL, RAPF
 
 from robocov.environment import CircleObstacle
-from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import RunHistory
+from robocov_app.viewer.session.past import history as module
+from robocov_app.viewer.session.past.history import RunHistory
+from robocov_app.viewer.session.past.states import PaneSetup, PaneState, RunState
 from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.states import PaneSetup, PaneState, RunState
 
 DT = 1 / 60
 MIN_STATES = 24

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robocov_app.viewer.session.file import build_session_content, format_session, load_session
+from robocov_app.viewer.session.files.session_file import build_session_content, format_session, load_session
 from robocov_app.viewer.session.session import Session
 
 DATA_FOLDER = Path(__file__).parents[2] / "data"

@@ -18,8 +18,8 @@ from robocov_app.viewer.session.pane import (
     resume_simulation,
     start_simulation,
 )
+from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.states import PaneSetup
 
 DT = 1 / 60
 PANE_NUMBER = 7

@@ -18,8 +18,13 @@ from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
 from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.file import build_session_content, format_session, load_session, save_session
-from robocov_app.viewer.session.file_models import build_session_schema
+from robocov_app.viewer.session.files.models import build_session_schema
+from robocov_app.viewer.session.files.session_file import (
+    build_session_content,
+    format_session,
+    load_session,
+    save_session,
+)
 from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.session import Session
 
@@ -35,7 +40,7 @@ class Mine(rc.Lloyd):
 PRINT_POSITIONS = """
 import sys
 from pathlib import Path
-from robocov_app.viewer.session.file import load_session
+from robocov_app.viewer.session.files.session_file import load_session
 from robocov_app.viewer.session.session import Session
 
 session = Session.open(load_session(Path(sys.argv[1])))

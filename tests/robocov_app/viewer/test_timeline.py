@@ -21,7 +21,7 @@ from robocov_app.viewer.session import playback
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.edits import FailRobot, Restart
-from robocov_app.viewer.session.file import build_session_content, format_session, parse_session
+from robocov_app.viewer.session.files.session_file import build_session_content, format_session, parse_session
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_sessions import LLOYD, RAPF, advance_session, start_session
 
-from robocov_app.viewer.session import trails as module
-from robocov_app.viewer.session.trails import MAX_TRAIL_RATE_HZ, MAX_TRAIL_ROWS, Trail, rebuild_trail
+from robocov_app.viewer.session.past import trails as module
+from robocov_app.viewer.session.past.trails import MAX_TRAIL_RATE_HZ, MAX_TRAIL_ROWS, Trail, rebuild_trail
 
 DT = 1 / 60
 ROW_INTERVAL_S = 1 / MAX_TRAIL_RATE_HZ

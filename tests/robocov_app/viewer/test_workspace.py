@@ -11,7 +11,7 @@ from driven_window import open_viewer
 from sample_sessions import advance_session, build_presenter, get_positions, start_session
 
 from robocov.errors import MapError
-from robocov_app.viewer.session.workspace import (
+from robocov_app.viewer.session.files.workspace import (
     DRAFT_KIND,
     SessionWorkspace,
     describe_draft,

@@ -11,7 +11,7 @@ from driven_browser import CHROMIUM, DRIVER, Browser
 
 import robocov
 from robocov_app.notebook import show
-from robocov_app.viewer.session.file import load_session
+from robocov_app.viewer.session.files.session_file import load_session
 from robocov_app.viewer.session.session import Session
 from robocov_app.web import live
 

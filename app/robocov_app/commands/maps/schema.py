@@ -26,5 +26,5 @@ def command(options: Arguments) -> None:
     if options.of == "map":
         from robocov.mapfile import build_map_schema as build_schema
     else:
-        from robocov_app.viewer.session.file_models import build_session_schema as build_schema
+        from robocov_app.viewer.session.files.models import build_session_schema as build_schema
     echo(json.dumps(build_schema(), indent=1))

@@ -18,8 +18,8 @@ from robocov_app.viewer.session.edits import PlaceRobot
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.session.scenario import SessionScenario
-from robocov_app.viewer.session.states import PaneSetup
 
 _TIME_TOLERANCE_S = 1e-9
 

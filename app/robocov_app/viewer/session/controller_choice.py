@@ -11,7 +11,7 @@ from robocov.controllers import CONTROLLERS, get_gains, load_controller_class, m
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option, Value, format_value
 from robocov.errors import RobocovError
-from robocov_app.viewer.session.file_fields import MAX_TEXT_CHARS, build_refusal, convert_field
+from robocov_app.viewer.session.files.fields import MAX_TEXT_CHARS, build_refusal, convert_field
 
 _GAIN_VALUE: TypeAlias = Annotated[float, Field(strict=True)] | Annotated[str, Field(strict=True)] | None
 _GAINS = convert_field(

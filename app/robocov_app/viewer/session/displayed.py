@@ -9,11 +9,11 @@ from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Snapshot
-from robocov_app.viewer.session.decision_replay import rebuild_snapshot
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.states import PaneSetup, PaneState
+from robocov_app.viewer.session.past.decision_replay import rebuild_snapshot
+from robocov_app.viewer.session.past.states import PaneSetup, PaneState
+from robocov_app.viewer.session.past.trails import Trail, rebuild_trail
 from robocov_app.viewer.session.timeline import Timeline
-from robocov_app.viewer.session.trails import Trail, rebuild_trail
 
 MAX_RECENT_POSITIONS = 30
 """Approximate maximum number of recent positions of a robot."""

@@ -14,11 +14,11 @@ from typing import NamedTuple, Self
 
 from robocov.errors import InputError, ParameterError
 from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.curves import Curve, SessionEvent
 from robocov_app.viewer.session.edits import Restart, SessionEdit
 from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
+from robocov_app.viewer.session.past.curves import Curve, SessionEvent
+from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.scenario import SessionScenario
-from robocov_app.viewer.session.states import RunState
 
 MAX_CACHED_STATES = 160
 """Maximum number of states of a node that are kept while another branch is displayed."""

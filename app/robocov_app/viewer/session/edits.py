@@ -14,7 +14,7 @@ from robocov.mapfile import parse_density, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, to_json_value
 from robocov.world.free_positions import find_free_position
 from robocov_app.viewer.session.controller_choice import FileController
-from robocov_app.viewer.session.file_fields import Position, RobotNumber, Step, build_refusal, convert_field
+from robocov_app.viewer.session.files.fields import Position, RobotNumber, Step, build_refusal, convert_field
 from robocov_app.viewer.session.map_edits import paint_density, replace_obstacles
 from robocov_app.viewer.session.pane import Continuation, Pane
 from robocov_app.viewer.session.robot_properties import FileProperties

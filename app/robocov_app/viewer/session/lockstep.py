@@ -26,8 +26,8 @@ from robocov_app.viewer.session.edits import (
     SetDensity,
 )
 from robocov_app.viewer.session.pane import Continuation, Pane, resume_simulation, start_simulation
+from robocov_app.viewer.session.past.states import PaneSetup, RunState
 from robocov_app.viewer.session.scenario import SessionScenario
-from robocov_app.viewer.session.states import PaneSetup, RunState
 
 DRAG_STIFFNESS_PER_KG = 60.0
 """Stiffness of the spring that pulls a dragged robot, divided by its mass, 1/s²."""

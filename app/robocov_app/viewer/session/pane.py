@@ -15,9 +15,9 @@ from robocov.world.free_positions import relocate_robots
 from robocov_app.render.scene import Scene
 from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.curves import Curve
-from robocov_app.viewer.session.states import PaneSetup, PaneState
-from robocov_app.viewer.session.trails import Trail, select_robots
+from robocov_app.viewer.session.past.curves import Curve
+from robocov_app.viewer.session.past.states import PaneSetup, PaneState
+from robocov_app.viewer.session.past.trails import Trail, select_robots
 
 STEPS_BETWEEN_SENSED_POINTS = 3
 """Number of steps between two records of the points that robots sense."""

@@ -10,13 +10,13 @@ import numpy as np
 
 from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
 from robocov_app.render.sensed_points import SensedPoints
-from robocov_app.viewer.session.decision_replay import get_sensor
 from robocov_app.viewer.session.document import MAX_CACHED_STATES, Node, SessionDocument, replay
-from robocov_app.viewer.session.history import RunHistory
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.states import RunState
-from robocov_app.viewer.session.trails import rebuild_trail
+from robocov_app.viewer.session.past.decision_replay import get_sensor
+from robocov_app.viewer.session.past.history import RunHistory
+from robocov_app.viewer.session.past.states import RunState
+from robocov_app.viewer.session.past.trails import rebuild_trail
 
 MAX_SENSED_STATES = 300
 """Maximum number of states from which the sensed points of another branch are recomputed."""

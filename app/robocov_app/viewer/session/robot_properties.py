@@ -20,7 +20,7 @@ from robocov.defaults import (
     DEFAULT_VISCOSITY_N_S_M,
 )
 from robocov.team import UNITS, Team
-from robocov_app.viewer.session.file_fields import convert_field
+from robocov_app.viewer.session.files.fields import convert_field
 
 MAX_PROPERTY = 1e9
 

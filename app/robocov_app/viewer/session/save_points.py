@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from robocov.errors import RobocovError
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.edits import SessionEdit
-from robocov_app.viewer.session.history import RunHistory
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.history import RunHistory
+from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.present import Present, restore_trails
-from robocov_app.viewer.session.states import RunState
 from robocov_app.viewer.session.timeline import Timeline
 
 

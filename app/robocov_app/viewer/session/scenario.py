@@ -13,7 +13,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
 from robocov.scenario import Scenario
 from robocov_app.viewer.session.controller_choice import ControllerChoice, FileController
-from robocov_app.viewer.session.file_fields import Position, Text, convert_field, keep_none
+from robocov_app.viewer.session.files.fields import Position, Text, convert_field, keep_none
 from robocov_app.viewer.session.robot_properties import FileProperties, RobotProperties
 
 MAX_ROBOTS = 1000

@@ -27,7 +27,7 @@ from robocov_app.viewer.session.edits import (
     SetRobotProperties,
     compare_obstacles,
 )
-from robocov_app.viewer.session.file import SavedSession
+from robocov_app.viewer.session.files.session_file import SavedSession
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.playback import Playback

@@ -7,12 +7,12 @@ import numpy as np
 
 from robocov.environment import Point
 from robocov.errors import ParameterError
-from robocov_app.viewer.session.curves import GhostCurve, SessionEvent
 from robocov_app.viewer.session.document import Node, SessionDocument
-from robocov_app.viewer.session.ghosts import build_ghost_curves
-from robocov_app.viewer.session.history import RunHistory
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.curves import GhostCurve, SessionEvent
+from robocov_app.viewer.session.past.ghosts import build_ghost_curves
+from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.present import Present, build_present, cache_present
 from robocov_app.viewer.session.scenario import SessionScenario
 

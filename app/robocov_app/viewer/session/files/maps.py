@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from robocov.environment import Environment
 from robocov.errors import MapError, Mistake, quote_json
 from robocov.mapfile import from_json, list_bundled_maps, load_map, to_json
-from robocov_app.viewer.session.file_models import BundledMapModel
+from robocov_app.viewer.session.files.models import BundledMapModel
 
 DIGEST_CHARS = 16
 

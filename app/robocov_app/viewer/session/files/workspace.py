@@ -7,7 +7,12 @@ from typing import Any
 
 from robocov_app.storage import autosave
 from robocov_app.terminal.output import find_free_path
-from robocov_app.viewer.session.file import SUFFIX, build_session_content, parse_session, save_session
+from robocov_app.viewer.session.files.session_file import (
+    SUFFIX,
+    build_session_content,
+    parse_session,
+    save_session,
+)
 from robocov_app.viewer.session.session import Session
 
 DRAFT_KIND = "robocov-session-draft"

@@ -15,7 +15,7 @@ from robocov_app.viewer.session.edits import (
     RobotEdit,
     SessionEdit,
 )
-from robocov_app.viewer.session.file_fields import Coordinate, RobotNumber, Step, Text
+from robocov_app.viewer.session.files.fields import Coordinate, RobotNumber, Step, Text
 
 MIN_CHAPTER_SPEED = 0.1
 MAX_CHAPTER_SPEED = 16

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.viewer.session.history import RunHistory
-from robocov_app.viewer.session.states import PaneSetup
+from robocov_app.viewer.session.past.history import RunHistory
+from robocov_app.viewer.session.past.states import PaneSetup
 
 MAX_TRAIL_RATE_HZ = 30.0
 """Maximum number of rows for each simulated second."""

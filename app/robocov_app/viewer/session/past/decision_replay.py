@@ -18,7 +18,7 @@ from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
 from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
-from robocov_app.viewer.session.states import PaneSetup, PaneState
+from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 
 RECORD_TOLERANCE = 1e-9
 """Relative and absolute tolerance of forces that agree with those of a record."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from robocov_app.viewer.session.curves import Curve, GhostCurve
 from robocov_app.viewer.session.document import Branch, Node, SessionDocument
+from robocov_app.viewer.session.past.curves import Curve, GhostCurve
 
 MAX_GHOST_BRANCHES = 8
 """Maximum number of branches whose curves are displayed."""

@@ -19,8 +19,8 @@ from robocov.files.strictjson import locate_mistakes, parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.edits import DragRobot, Restart, SessionEdit
-from robocov_app.viewer.session.file_maps import FileContext, refuse_value
-from robocov_app.viewer.session.file_models import LessonModel, NodeModel, SessionModel
+from robocov_app.viewer.session.files.maps import FileContext, refuse_value
+from robocov_app.viewer.session.files.models import LessonModel, NodeModel, SessionModel
 
 FORMAT = "robocov-session"
 VERSION = 1

@@ -9,7 +9,7 @@ from typing import Any, Self, TypeAlias
 
 import numpy as np
 
-from robocov_app.viewer.session.states import RunState
+from robocov_app.viewer.session.past.states import RunState
 
 MAX_HISTORY_BYTES = 24_000_000
 """Memory for the recorded past of a window."""
