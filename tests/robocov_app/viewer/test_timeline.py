@@ -122,7 +122,7 @@ def test_a_controller_that_raises_anything_on_the_way_leaves_the_timeline_as_it_
     before = describe_state(session)
     controllers = (broken,)
     scenario = SessionScenario(session.displayed.environment, controllers, robots=3)
-    node = timeline.document.build_node(timeline.head, timeline.step, "begin", "begun", Restart(scenario))
+    node = timeline.document.build_node(timeline.head, timeline.step, "begin", "started", Restart(scenario))
     node.edits.append(FailRobot(1, step=5))
     with pytest.raises(ParameterError, match="two robots"):
         timeline.seek(node, 20)
@@ -133,7 +133,7 @@ def test_a_controller_that_raises_anything_on_the_way_leaves_the_timeline_as_it_
 def test_a_run_that_cannot_start_is_not_added_to_the_document() -> None:
     timeline = build_branched_session().timeline
     crowded = SessionScenario(timeline.scenario.environment, robots=500)
-    node = timeline.document.build_node(timeline.head, timeline.step, "begin", "begun", Restart(crowded))
+    node = timeline.document.build_node(timeline.head, timeline.step, "begin", "started", Restart(crowded))
     present = (timeline.head, timeline.run, timeline.history)
     with pytest.raises(StartError):
         timeline.seek(node, 0)

@@ -168,7 +168,7 @@ class SessionDocument:
     def start(cls, scenario: SessionScenario) -> Self:
         """Build the document of a new session."""
         document = cls([])
-        document.nodes.append(document.build_node(None, 0, "begin", "begun", Restart(scenario)))
+        document.nodes.append(document.build_node(None, 0, "begin", "started", Restart(scenario)))
         return document
 
     def build_node(
