@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 import pygame
 
 from robocov_app.toolkit.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX
-from robocov_app.toolkit.ui import SidePanel
+from robocov_app.toolkit.panel import SidePanel
 
 LEFT_BUTTON = 1
 RIGHT_BUTTON = 3

@@ -76,6 +76,8 @@ class Tool(Generic[ContextT, EventT]):
         Unique name, as in the command ``tool:name``.
     title : str
         Name in the window.
+    button_text : str
+        Text of its button, if the title is too long; empty for the title.
     key : str
         Key that chooses the tool.
     hint : str
@@ -86,6 +88,7 @@ class Tool(Generic[ContextT, EventT]):
 
     name = ""
     title = ""
+    button_text = ""
     key = ""
     hint = ""
     snaps = False

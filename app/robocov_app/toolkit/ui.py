@@ -17,10 +17,8 @@ Keys of widgets are unique within a page.
 from collections.abc import Callable
 
 import pygame
-from pygame import Rect, Surface
 
-from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.toolkit.layout import Layout
+from robocov_app.look.theme import Theme
 from robocov_app.toolkit.page import Page
 from robocov_app.toolkit.page_events import PageEvents
 from robocov_app.toolkit.widgets import buttons, dropdown, labels, scroll_area, sections, slider, text_field
@@ -66,55 +64,3 @@ class Ui(Page):
     def handle_event(self, event: pygame.event.Event) -> bool:
         """Pass an event to the widgets; return whether it was meant for the page."""
         return self._events.handle(event)
-
-
-class SidePanel:
-    """A panel next to the arena.
-
-    Parameters
-    ----------
-    tab : str
-        Name of the tab that is open first.
-
-    Attributes
-    ----------
-    tab : str
-        Name of the open tab.
-    is_covered : bool
-        Whether something else is drawn in its place, or gets its events.
-    hidden : bool
-        Whether it is not shown.
-    ui : Ui
-        Its page.
-    drawn_state : object
-        What the panel showed when it was drawn last, for panels that draw only changes.
-    """
-
-    def __init__(self, tab: str) -> None:
-        self.tab = tab
-        self.is_covered = False
-        self.hidden = False
-        self.ui = Ui(self.show_content, LIGHT)
-        self.drawn_state: object = None
-
-    def show_content(self, ui: Ui) -> None:
-        """Show and edit the content."""
-
-    def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Move to the place of the panel in a layout, and adopt the scale and the theme."""
-        self.hidden = not layout.panel[2]
-        if self.hidden:
-            self.ui.stop_typing()
-        if theme is not self.ui.theme or layout.scale != self.ui.scale:
-            self.ui = Ui(self.show_content, theme, layout.scale)
-        self.ui.box = Rect(layout.panel)
-        self.ui.needs_redraw = True
-
-    def draw(self, screen: Surface) -> None:
-        """Draw the panel, its open list and its tool tip."""
-        self.ui.draw(screen)
-        self.ui.draw_overlays(screen)
-
-    def handle_event(self, event: pygame.event.Event) -> bool:
-        """Pass an event to the widgets; return whether it was meant for the panel."""
-        return not self.is_covered and not self.hidden and self.ui.handle_event(event)

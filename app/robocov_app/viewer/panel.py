@@ -13,7 +13,8 @@ from robocov.errors import ParameterError
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas
-from robocov_app.toolkit.ui import SidePanel, Ui
+from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
+from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.lines import ReportLine
@@ -23,26 +24,25 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
 from robocov_app.viewer.session.scenario import MAX_PANES
 
-TABS = ("parameters", "show", "robot", "file")
-TAB_WIDTHS_PX = (86, 64, 64, 64)
+TOOL_COLUMNS = 5
 LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
 """Layers that are nearly always visible. Their keys still toggle them."""
 
 _FILE_BUTTONS = (
-    ("Screenshot", "screenshot"),
-    ("Record video", "video"),
-    ("Save session", "save:session"),
-    ("Recover…", "recover"),
-    ("Save run", "save:run"),
-    ("Save map", "save:map"),
-    ("◀ Branch", "branch:previous"),
-    ("Branch ▶", "branch:next"),
-    ("Undo", "undo"),
-    ("Redo", "redo"),
-    ("Keys", "help"),
-    ("Commands…", "palette"),
-    ("Lesson", "tour"),
-    ("Full screen", "fullscreen"),
+    PanelButton("Screenshot", "screenshot"),
+    PanelButton("Record video", "video"),
+    PanelButton("Save session", "save:session"),
+    PanelButton("Recover…", "recover"),
+    PanelButton("Save run", "save:run"),
+    PanelButton("Save map", "save:map"),
+    PanelButton("◀ Branch", "branch:previous"),
+    PanelButton("Branch ▶", "branch:next"),
+    PanelButton("Undo", "undo"),
+    PanelButton("Redo", "redo"),
+    PanelButton("Keys", "help"),
+    PanelButton("Commands…", "palette"),
+    PanelButton("Lesson", "tour"),
+    PanelButton("Full screen", "fullscreen"),
 )
 _REDRAW_INTERVAL_S = 0.25  # while the simulation runs
 _NO_ROBOT_TEXT = "Click a robot, or press Tab, to see why it moves and why it does not."
@@ -62,7 +62,7 @@ _TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a th
 _CONTROLLER_PAIR_PX = (0, 24, 3, 0, 24)  # two of three or four
 
 
-class ViewerPanel(SidePanel):
+class ViewerPanel(CommandPanel):
     """Shows the session's settings and lets the user change them.
 
     Parameters
@@ -73,7 +73,7 @@ class ViewerPanel(SidePanel):
         Titles of the layers by their names.
     commands : CommandTable
         The window's commands.
-    do : callable
+    run_command : callable
         Runs a command by its name.
 
     Attributes
@@ -84,30 +84,30 @@ class ViewerPanel(SidePanel):
         Explanation of the selected robot.
     """
 
+    tabs = ("parameters", "show", "robot", "file")
+    tab_widths = (86, 64, 64, 64)
+
     def __init__(
         self,
         viewer: Presenter,
         layer_titles: dict[str, str],
         commands: CommandTable,
-        do: Callable[[str], None],
+        run_command: Callable[[str], object],
     ) -> None:
+        super().__init__(commands, run_command)
         self.viewer = viewer
         self.titles = layer_titles
         self.report: RobotReport | None = None
-        self.commands = commands
-        self._do = do
         self._age_s = 0.0  # of the picture
-        super().__init__(TABS[0])
 
-    def show_tab(self, name: str) -> None:
-        """Show a page of the panel, if there is one with this name."""
-        if name in TABS:
-            self.tab = name
-            self.viewer.revision += 1
-
-    def show_next_tab(self) -> None:
-        """Show the next page of the panel."""
-        self.show_tab(TABS[(TABS.index(self.tab) + 1) % len(TABS)])
+    def list_pages(self) -> dict[str, PanelPage]:
+        """Return the pages by the names of their tabs."""
+        return {
+            "parameters": self._show_parameters,
+            "show": self._show_layers,
+            "robot": self._show_robot,
+            "file": self._show_files,
+        }
 
     def update(self, seconds: float) -> None:
         """Redraw the panel if its content has changed."""
@@ -130,25 +130,8 @@ class ViewerPanel(SidePanel):
         self._show_environment(ui)
         self._show_controllers(ui)
         self._show_run(ui)
-        self._show_tools(ui)
-        tab = ui.tabs("tab", TABS, self.tab, *TAB_WIDTHS_PX)
-        if tab is not None:
-            self.show_tab(tab)
-        pages = {
-            "parameters": self._show_parameters,
-            "show": self._show_layers,
-            "robot": self._show_robot,
-            "file": self._show_files,
-        }
-        pages[self.tab](ui)
-
-    def _show_button(
-        self, ui: Ui, text: str, command: str, *, is_on: bool = False, is_small: bool = False, why: str = ""
-    ) -> None:
-        """Show a button that runs a command; `why` disables it."""
-        tip = self.commands[command].tip
-        if ui.button(text, key=command, tip=tip, chosen=is_on, small=is_small, disabled_reason=why):
-            self._do(command)
+        self.show_tools(ui, self.viewer.toolbox, TOOL_COLUMNS)
+        self.show_pages(ui, {})
 
     def _show_environment(self, ui: Ui) -> None:
         viewer = self.viewer
@@ -169,14 +152,14 @@ class ViewerPanel(SidePanel):
         robots = ui.text_field("robots", str(len(viewer.robot_numbers)))
         if robots is not None:
             viewer.attempt(partial(self.commands.run_text, f"robots {robots}"))
-        self._show_button(ui, "−", "fewer")
-        self._show_button(ui, "+", "more")
+        self.show_button(ui, "−", "fewer")
+        self.show_button(ui, "+", "more")
         ui.cell()
         ui.label("Seed")
         seed = ui.text_field("seed", str(scenario.seed))
         if seed is not None:
             viewer.attempt(partial(self.commands.run_text, f"seed {seed}"))
-        self._show_button(ui, "↻", "seed:next")
+        self.show_button(ui, "↻", "seed:next")
 
     def _show_controllers(self, ui: Ui) -> None:
         viewer = self.viewer
@@ -198,26 +181,26 @@ class ViewerPanel(SidePanel):
                 continue
             if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
                 viewer.inspection.active_pane = k
-                self._do("pane:remove")
+                self._run_command("pane:remove")
             if count == 2 or k % 2 == 0:
                 ui.cell()
         if count < MAX_PANES:
-            self._show_button(ui, "+ compare" if count != 2 else "+", "pane:add")
+            self.show_button(ui, "+ compare" if count != 2 else "+", "pane:add")
         ui.space(4)
 
     def _show_run(self, ui: Ui) -> None:
         session = self.viewer.session
         ui.header("RUN")
         ui.row(0, 0, 0, 0, height=28, below=5)
-        self._show_button(
+        self.show_button(
             ui,
             "Pause" if session.playback.is_playing else "Play",
             "pause",
-            is_on=not session.playback.is_playing,
+            chosen=not session.playback.is_playing,
         )
-        self._show_button(ui, "Step", "step")
-        self._show_button(ui, "Settle", "settle", is_on=session.playback.stop_when_settled)
-        self._show_button(ui, "Restart", "restart")
+        self.show_button(ui, "Step", "step")
+        self.show_button(ui, "Settle", "settle", chosen=session.playback.stop_when_settled)
+        self.show_button(ui, "Restart", "restart")
         ui.row(46, 0, 42, height=22)
         ui.label("Speed")
         index = float(find_speed_index(session.playback.clock.speed))
@@ -225,16 +208,6 @@ class ViewerPanel(SidePanel):
         if chosen is not None:
             self.viewer.attempt(partial(self.viewer.playback.set_speed, SPEEDS[round(chosen)]))
         ui.label(format_speed(session.playback.clock.speed), key="speed")
-
-    def _show_tools(self, ui: Ui) -> None:
-        toolbox = self.viewer.toolbox
-        ui.header("TOOLS")
-        ui.row(0, 0, 0, 0, 0, below=4)
-        for tool in toolbox.by_name.values():
-            is_on = tool is toolbox.current
-            text = tool.button_text or tool.title
-            self._show_button(ui, text, f"tool:{tool.name}", is_on=is_on, is_small=True)
-        ui.space(6)
 
     def _show_parameters(self, ui: Ui) -> None:
         controller = self.viewer.session.displayed.get_setup(self.viewer.pane).controller
@@ -315,23 +288,23 @@ class ViewerPanel(SidePanel):
                     continue
                 tip = self.commands[f"layer:{name}"].tip
                 if ui.check_box(self.titles[name], key=name, value=name in view.layers, tip=tip) is not None:
-                    self._do(f"layer:{name}")
+                    self._run_command(f"layer:{name}")
             ui.space(5)
             ui.row(0, 0, 0)
-            self._show_button(ui, "Fading", "fade", is_on=view.fades_trajectories)
-            self._show_button(ui, "Dark" if view.theme == "light" else "Light", "theme")
-            self._show_button(ui, "Whole map", "fit")
+            self.show_button(ui, "Fading", "fade", chosen=view.fades_trajectories)
+            self.show_button(ui, "Dark" if view.theme == "light" else "Light", "theme")
+            self.show_button(ui, "Whole map", "fit")
 
     def _show_robot(self, ui: Ui) -> None:
         viewer = self.viewer
         number = viewer.selected_robot
-        why = "" if number is not None else _NO_ROBOT_REASON
+        reason = "" if number is not None else _NO_ROBOT_REASON
         has_failed = number in viewer.session.displayed.get_setup(viewer.pane).failed
         ui.row(0, 0, 0, 0, below=8)
-        self._show_button(ui, "◀", "robot:previous")
-        self._show_button(ui, "▶", "robot:next")
-        self._show_button(ui, "Revive" if has_failed else "Fail", "robot:fail", why=why)
-        self._show_button(ui, "Remove", "robot:remove", why=why)
+        self.show_button(ui, "◀", "robot:previous")
+        self.show_button(ui, "▶", "robot:next")
+        self.show_button(ui, "Revive" if has_failed else "Fail", "robot:fail", disabled_reason=reason)
+        self.show_button(ui, "Remove", "robot:remove", disabled_reason=reason)
         with ui.scroll(f"robot:{number}"):
             if self.report is None:
                 ui.paragraph(_NO_ROBOT_TEXT, color=ui.theme.faint)
@@ -340,9 +313,10 @@ class ViewerPanel(SidePanel):
 
     def _show_files(self, ui: Ui) -> None:
         ui.row(0, 0, height=28, below=5)
-        for text, command in _FILE_BUTTONS:
+        for label, command in _FILE_BUTTONS:
             is_recording = command == "video" and self.viewer.view.is_recording
-            self._show_button(ui, "Stop video" if is_recording else text, command, is_on=is_recording)
+            text = "Stop video" if is_recording else label
+            self.show_button(ui, text, command, chosen=is_recording)
 
 
 def show_report(ui: Ui, report: RobotReport) -> None:

@@ -10,13 +10,12 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.storage.autosave import Draft
 from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.command_window import CommandWindow
 from robocov_app.toolkit.dialogs import Dialogs
-from robocov_app.toolkit.help_page import draw_help_page
-from robocov_app.toolkit.input import MOUSE_EVENTS
 from robocov_app.toolkit.layout import build_layout
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.pointer import LEFT_BUTTON
-from robocov_app.toolkit.window import FPS, BaseWindow
+from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.commands import GROUPS, list_parameter_commands, list_viewer_commands
@@ -34,15 +33,15 @@ from robocov_app.viewer.window_commands import ViewerWindowActions, list_window_
 from robocov_app.viewer.window_dialogs import (
     build_branch_dialog,
     build_file_dialog,
-    build_palette,
     build_recovery_offer,
 )
 
-_KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
+KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
+PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 _LESSON_HINT = "F2 back to the lesson · Esc ends it"
 
 
-class ViewerWindow(BaseWindow):
+class ViewerWindow(CommandWindow):
     """Shows a session, and lets the user change it.
 
     Parameters
@@ -83,7 +82,13 @@ class ViewerWindow(BaseWindow):
         Whether the keys are shown.
     """
 
+    groups = GROUPS
+    keys_hint = KEYS_HINT
+    palette_hint = PALETTE_HINT
     hint = HINT
+
+    panel: ViewerPanel
+    pointer: ViewerPointer
 
     def __init__(
         self,
@@ -94,15 +99,12 @@ class ViewerWindow(BaseWindow):
         is_unattended: bool = False,
         screen: pygame.Surface | None = None,
     ) -> None:
-        super().__init__(size, screen)
+        super().__init__(viewer, Dialogs(), size, scale, screen)
         pygame.display.set_caption("robocov")
         self.viewer = viewer
-        self.scale = scale
         self.is_unattended = is_unattended
-        self.is_help_open = False
         self.video: ScreenVideo | None = None
         self.run_saver = RunSaver(viewer.costs.lattice)
-        self.dialogs = Dialogs()
         self.canvas = ViewerCanvas(viewer, get_theme(viewer.view.theme))
         self.chart = Chart(viewer)
         self.lesson = LessonGuide(viewer, self.canvas.fit, is_unattended=is_unattended)
@@ -116,7 +118,6 @@ class ViewerWindow(BaseWindow):
         self._runner = SessionRunner(viewer)
         self._inspector = RobotInspector(viewer, self.panel)
         self._arranged: tuple[object, ...] | None = None  # key of the layout
-        self._now = 0.0
         self._unrecorded_s = 0.0  # time since the last frame of the video
         self._arrange()
         self.draw()
@@ -133,14 +134,14 @@ class ViewerWindow(BaseWindow):
             open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer.files)),
             list_branches=lambda: self.dialogs.ask(build_branch_dialog(self.viewer)),
             toggle_help=self.toggle_help,
-            open_palette=lambda: self.dialogs.ask(build_palette(self.commands, self._show_result)),
+            open_palette=self.open_palette,
             toggle_lesson=self.lesson.toggle,
             quit=self.quit,
         )
 
-    def _show_result(self, message: str) -> None:
-        """Show the message of a command that was run by its name."""
-        self.viewer.attempt(lambda: message or None)
+    def show_result(self, message: str) -> None:
+        """Show the message of a command of the palette, which may change the explanation of the robot."""
+        super().show_result(message)
         self.panel.report = None
 
     def offer_recovery(self, drafts: Sequence[Draft]) -> None:
@@ -161,15 +162,11 @@ class ViewerWindow(BaseWindow):
 
         return roll_back
 
-    def report_fault(self, message: str, *, in_drawing: bool) -> None:
-        """Show a message on an unexpected exception; if drawing raised it, close what may have caused it."""
-        if in_drawing:
-            self.is_help_open = False
-            self.dialogs.discard()
-            self.lesson.end()
-            self.canvas.fit()
-        self.viewer.show_message(message, is_error=True)
-        self.viewer.revision += 1
+    def restore_view(self) -> None:
+        """Close everything that may be the cause of an exception in drawing."""
+        super().restore_view()
+        self.lesson.end()
+        self.canvas.fit()
 
     def close(self) -> None:
         """Keep a draft of unsaved work, and end lesson, video and the computation of costs."""
@@ -192,12 +189,11 @@ class ViewerWindow(BaseWindow):
 
     def update(self, seconds: float) -> None:
         """Let time pass."""
-        self._now += seconds
         self._unrecorded_s += seconds
         self._pass_time(seconds)
         self._cost_curves.update()
         self._arrange()
-        self._inspector.update(self._now)
+        self._inspector.update(self.viewer.now)
         self.panel.is_covered = self.lesson.shown is not None
         self.panel.update(seconds)
         self.pointer.show_action(self.cursor)
@@ -276,11 +272,7 @@ class ViewerWindow(BaseWindow):
         if not has_lesson and layout.panel[2]:
             self.panel.draw(self.screen)
         self._draw_message(can_suggest=not has_lesson)
-        if self.is_help_open:
-            commands = self.commands.commands
-            draw_help_page(self.screen, self.theme, layout.scale, commands, groups=GROUPS, hint=_KEYS_HINT)
-        self.dialogs.draw(self.screen, self.theme, layout.scale)
-        self.show_screen()
+        self.draw_above_map()
         if self.video is not None:
             self.video.add(self.screen, self._unrecorded_s)
         self._unrecorded_s = 0.0
@@ -305,13 +297,10 @@ class ViewerWindow(BaseWindow):
         draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
 
     def do(self, name: str) -> None:
-        """Run a command by its name, unless the lesson or the help page handles it."""
+        """Run a command by its name; lesson and help take some of them."""
         if self.lesson.handle_command(name):
             return
-        if name == "cancel" and self.is_help_open:
-            self.is_help_open = False
-            return
-        self.commands.run(name)
+        super().do(name)
         self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")
@@ -323,10 +312,6 @@ class ViewerWindow(BaseWindow):
         if self.canvas.find_pane(self.pointer.at) is not None:
             center = self.pointer.at
         self.canvas.zoom(factor, center)
-
-    def toggle_help(self) -> None:
-        """Show or hide the keys."""
-        self.is_help_open = not self.is_help_open
 
     def quit(self) -> None:
         """Close the window."""
@@ -352,44 +337,16 @@ class ViewerWindow(BaseWindow):
         skipped = f", {video.skipped_count} frames left out" if video.skipped_count else ""
         return f"video saved: {video.path} ({video.duration:.1f} s{skipped})"
 
-    def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event."""
-        if event.type == pygame.KEYUP:
-            self.commands.release_key(event)
-        elif event.type == pygame.WINDOWFOCUSLOST:
-            self.commands.reset_keys()
-        if event.type == pygame.QUIT:
-            self.closed = True
-        elif not self.dialogs.handle_event(event):
-            self._handle_event_below_dialogs(event)
+    def open_file(self, path: Path) -> None:
+        """Open a session or a map that was dropped on the window."""
+        self.viewer.files.open_file(path)
 
-    def _handle_event_below_dialogs(self, event: pygame.event.Event) -> None:
-        if event.type == pygame.DROPFILE:
-            self.viewer.attempt(lambda: self.viewer.files.open_file(Path(event.file)))
-        elif event.type == pygame.KEYDOWN:
-            self._press_key(event)
-        elif event.type in MOUSE_EVENTS:
-            self._handle_mouse(event)
-        elif event.type == pygame.WINDOWLEAVE:
-            self.pointer.leave()
-        else:
-            self.panel.handle_event(event)
+    def use_key(self, event: pygame.event.Event) -> bool:
+        """Use a key as the answer to the lesson's question, or in a text field of the panel."""
+        return self.lesson.handle_key(event.unicode) or super().use_key(event)
 
-    def _press_key(self, event: pygame.event.Event) -> None:
-        """Offer a key to the lesson's question, then to a text field of the panel, then to the commands."""
-        if self.lesson.handle_key(event.unicode) or self.panel.handle_event(event):
-            return
-        command = self.commands.press_key(event)
-        if command is not None:
-            self.do(command.name)
-        # The text of the key comes as an event of its own, and is not meant for a dialog that has opened.
-        self.dialogs.ignore_letter(event.unicode)
-
-    def _handle_mouse(self, event: pygame.event.Event) -> None:
-        if event.type == pygame.MOUSEBUTTONDOWN:
-            if self.is_help_open:
-                self.is_help_open = False
-                return
-            if event.button == LEFT_BUTTON and self.lesson.click(event.pos):
-                return
-        self.pointer.handle_event(event, self._now)
+    def handle_mouse(self, event: pygame.event.Event) -> None:
+        """Handle an event of the mouse: by the page of the lesson, else by panel, plot or panes."""
+        is_left_press = event.type == pygame.MOUSEBUTTONDOWN and event.button == LEFT_BUTTON
+        if not (is_left_press and self.lesson.click(event.pos)):
+            super().handle_mouse(event)

@@ -5,29 +5,24 @@ from dataclasses import dataclass
 from functools import partial
 
 from robocov_app.toolkit.command import Command
+from robocov_app.toolkit.command_window import Action, WindowActions
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 
 ZOOM_STEP = 1.25
 PAN_STEP_PX = 60
 
-Action = Callable[[], object]
-
 
 @dataclass(frozen=True)
-class ViewerWindowActions:
+class ViewerWindowActions(WindowActions):
     """Actions of the window that commands start.
 
     Attributes
     ----------
+    show_next_tab, toggle_fullscreen, save_screenshot, toggle_help, open_palette
+        See `WindowActions`.
     zoom : callable
         Zooms by a factor.
-    show_next_tab : callable
-        Shows the next page of the panel.
-    toggle_fullscreen : callable
-        Switches full screen on and off.
-    save_screenshot : callable
-        Saves a picture of the window.
     toggle_recording : callable
         Starts or stops a video.
     save_run : callable
@@ -36,10 +31,6 @@ class ViewerWindowActions:
         Asks for a session or a map, and opens it.
     list_branches : callable
         Asks for a branch, and enters it.
-    toggle_help : callable
-        Shows or hides the keys.
-    open_palette : callable
-        Opens the palette.
     toggle_lesson : callable
         Starts a lesson, leaves it, or returns to it.
     quit : callable
@@ -47,15 +38,10 @@ class ViewerWindowActions:
     """
 
     zoom: Callable[[float], None]
-    show_next_tab: Action
-    toggle_fullscreen: Action
-    save_screenshot: Action
     toggle_recording: Action
     save_run: Action
     open_file: Action
     list_branches: Action
-    toggle_help: Action
-    open_palette: Action
     toggle_lesson: Action
     quit: Action
 

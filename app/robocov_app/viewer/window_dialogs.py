@@ -1,11 +1,10 @@
-"""Dialogs of the window: palette, files, branches, the offers when it is opened."""
+"""Dialogs of the window: files, branches, and the offers when it is opened."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
 from robocov_app.storage.autosave import Draft, remove_draft
-from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.dialogs import (
     Answer,
     Choice,
@@ -15,26 +14,10 @@ from robocov_app.toolkit.dialogs import (
     create_list_choice,
     create_recovery_question,
 )
-from robocov_app.toolkit.palette import create_palette
 from robocov_app.viewer.file_actions import FileActions
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.session_file import SUFFIX
 from robocov_app.viewer.session.files.workspace import describe_draft
-
-PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
-
-
-def build_palette(commands: CommandTable, show_result: Callable[[str], None]) -> Choice:
-    """Return the dialog that finds and runs commands by their names.
-
-    Parameters
-    ----------
-    commands : CommandTable
-        The window's commands.
-    show_result : callable
-        Gets the message of a command; empty for none.
-    """
-    return create_palette(commands, PALETTE_HINT, show_result)
 
 
 def build_file_dialog(files: FileActions) -> Choice:

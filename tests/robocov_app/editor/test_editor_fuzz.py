@@ -14,7 +14,7 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.sketch import dump_sketch
-from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS
 
 EVENTS, BATCH, DRAWN = 2_500, 6, 5
@@ -153,7 +153,7 @@ class Monkey:
         elif which == 2:
             pygame.key.set_mods(self.random.choice((0, 0, *MODIFIERS.values())))
         elif which == 3:
-            window.panel.show_tab(self.random.choice(TABS))
+            window.panel.show_tab(self.random.choice(EditorPanel.tabs))
         elif which == 4:
             window.canvas.fit()
         else:

@@ -15,7 +15,7 @@ from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.fields import format_number
 from robocov_app.editor.ui.map_facts import list_status
-from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.toolkit import help_page
 from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.dialogs import Choice
@@ -46,7 +46,7 @@ def test_every_button_does_what_its_action_does(hands: Hands) -> None:
     hands.push("undo")
     assert hands.shapes[0] == BOX
     hands.push("help")
-    assert hands.window.help
+    assert hands.window.is_help_open
 
 
 def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
@@ -137,10 +137,10 @@ def test_the_snap_page_switches_and_sets(hands: Hands) -> None:
 
 def test_pages_are_turned_by_keys(hands: Hands) -> None:
     seen = []
-    for _ in TABS:
+    for _ in EditorPanel.tabs:
         hands.key("ctrl+tab")
         seen.append(hands.window.panel.tab)
-    assert sorted(seen) == sorted(TABS)
+    assert sorted(seen) == sorted(EditorPanel.tabs)
     hands.key("h")
     assert hands.window.layout.panel[2] == 0
     hands.key("f2")  # the field of the map's name brings the panel back
@@ -331,7 +331,7 @@ def test_light_dark_and_every_size(hands: Hands) -> None:
         hands.frames(2)
         assert hands.window.layout.size == size
         hands.key("f")
-        for tab in TABS:
+        for tab in EditorPanel.tabs:
             hands.window.panel.show_tab(tab)
             hands.frames(1, 0.2)
 

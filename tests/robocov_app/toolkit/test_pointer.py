@@ -6,8 +6,8 @@ import pygame
 import pytest
 
 from robocov_app.toolkit.input import DOUBLE_CLICK_S
+from robocov_app.toolkit.panel import SidePanel
 from robocov_app.toolkit.pointer import Gesture, PanGesture, Pointer
-from robocov_app.toolkit.ui import SidePanel
 
 
 class RecordedPointer(Pointer):

@@ -17,10 +17,10 @@ from robocov.controllers import CONTROLLERS, get_gains
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Command, find_commands
 from robocov_app.toolkit.input import format_key
-from robocov_app.viewer import panel
 from robocov_app.viewer.commands import GROUPS, list_viewer_commands
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.lesson_guide import COMMANDS_WITHIN_LESSON
+from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.tools.toolbox import ViewerToolbox
 
 TITLES = {layer.name: layer.title for layer in standard_layers()}
@@ -116,7 +116,7 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
 ) -> None:
     names = {action.name for action in actions}
     options = {name for law in CONTROLLERS.values() for name in get_gains(law)}
-    for tab in panel.TABS:
+    for tab in ViewerPanel.tabs:
         shared.window.panel.show_tab(tab)
         shared.settle()
         for each in shared.window.panel.ui.widgets.values():

@@ -15,7 +15,7 @@ from sample_sessions import RAPF, RPF
 from robocov.controllers import CONTROLLERS
 from robocov_app.toolkit.input import DOUBLE_CLICK_S, KEY_REPEAT_MS
 from robocov_app.toolkit.tool_tip import TIP_DELAY_S
-from robocov_app.viewer.panel import TABS, label_controllers
+from robocov_app.viewer.panel import ViewerPanel, label_controllers
 
 # the panel
 
@@ -231,7 +231,7 @@ def test_robots_and_seed_are_typed_and_stepped(driver: Driver) -> None:
 
 
 def test_tabs_show_pages_and_check_boxes_toggle_layers(driver: Driver) -> None:
-    for tab in TABS:
+    for tab in ViewerPanel.tabs:
         driver.turn(tab)
         assert driver.window.panel.tab == tab
         assert driver.widget("button", f"tab:{tab}").value
@@ -308,7 +308,7 @@ def test_pages_look_the_same_when_shown_again(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, RPF) as driver:
         driver.move(100, 300)
         pictures = {}
-        for tab in TABS * 2:
+        for tab in ViewerPanel.tabs * 2:
             driver.window.panel.show_tab(tab)
             driver.frames(9)
             if tab in pictures:

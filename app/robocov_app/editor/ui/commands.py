@@ -14,8 +14,8 @@ from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import FAR_STEPS, Edit
 from robocov_app.editor.ui.file_commands import OPEN_SUFFIXES, PICTURE_SUFFIXES, FileCommands
 from robocov_app.toolkit.command import Command, CommandGroup
+from robocov_app.toolkit.command_window import Action, WindowActions
 
-Action = Callable[[], object]
 ArrowAction = Callable[[int, int], object]
 
 GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
@@ -30,40 +30,27 @@ _ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
 
 
 @dataclass(frozen=True)
-class WindowActions:
+class EditorWindowActions(WindowActions):
     """Actions of the window that commands start.
 
     Attributes
     ----------
+    show_next_tab, toggle_fullscreen, save_screenshot, toggle_help, open_palette
+        See `WindowActions`.
     try_map : callable
         Opens the viewer on the map.
-    save_screenshot : callable
-        Saves a picture of the window.
     edit_name : callable
         Puts the text cursor into the field with the name.
     open_menu : callable
         Opens the context menu.
     hold_pan : callable
         Pans with the left button while the key is held down.
-    show_next_tab : callable
-        Shows the next page of the panel.
-    toggle_fullscreen : callable
-        Switches full screen on and off.
-    toggle_help : callable
-        Shows or hides the keys.
-    open_palette : callable
-        Opens the palette.
     """
 
     try_map: Action
-    save_screenshot: Action
     edit_name: Action
     open_menu: Action
     hold_pan: Action
-    show_next_tab: Action
-    toggle_fullscreen: Action
-    toggle_help: Action
-    open_palette: Action
 
 
 class EditorCommandGroup(CommandGroup):
@@ -102,7 +89,7 @@ class EditorCommandGroup(CommandGroup):
 
 
 def list_commands(
-    editor: Editor, canvas: EditorCanvas, documents: FileCommands, window: WindowActions
+    editor: Editor, canvas: EditorCanvas, documents: FileCommands, window: EditorWindowActions
 ) -> list[Command]:
     """Return all commands that take no typed value.
 
@@ -114,7 +101,7 @@ def list_commands(
         The view of the map.
     documents : FileCommands
         Commands on files.
-    window : WindowActions
+    window : EditorWindowActions
         Actions of the window.
     """
     groups = (
@@ -134,7 +121,9 @@ def list_commands(
     return [command for group in groups for command in group.commands]
 
 
-def _list_file_commands(editor: Editor, documents: FileCommands, window: WindowActions) -> EditorCommandGroup:
+def _list_file_commands(
+    editor: Editor, documents: FileCommands, window: EditorWindowActions
+) -> EditorCommandGroup:
     ask_map = partial(documents.ask_path, "Open a map", documents.open, OPEN_SUFFIXES)
     ask_picture = partial(
         documents.ask_path, "Picture under the map", documents.open_background, PICTURE_SUFFIXES
@@ -159,7 +148,7 @@ def _list_file_commands(editor: Editor, documents: FileCommands, window: WindowA
     return group
 
 
-def _list_edit_commands(editor: Editor, window: WindowActions) -> EditorCommandGroup:
+def _list_edit_commands(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
     def select_all() -> None:
         editor.select(Selection.select_all(editor.sketch))
 
@@ -285,7 +274,9 @@ def _list_grid_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_view_commands(editor: Editor, canvas: EditorCanvas, window: WindowActions) -> EditorCommandGroup:
+def _list_view_commands(
+    editor: Editor, canvas: EditorCanvas, window: EditorWindowActions
+) -> EditorCommandGroup:
     def fit_selection() -> None:
         canvas.fit(editor.selection)
 
@@ -325,7 +316,7 @@ def _list_robot_commands(editor: Editor) -> EditorCommandGroup:
     return group
 
 
-def _list_help_commands(editor: Editor, window: WindowActions) -> EditorCommandGroup:
+def _list_help_commands(editor: Editor, window: EditorWindowActions) -> EditorCommandGroup:
     group = EditorCommandGroup("Help", editor)
     group.add("help", "Keys", window.toggle_help, "f1", "shift+/")
     group.add("palette", "Commands by name", window.open_palette, "ctrl+k", "/")

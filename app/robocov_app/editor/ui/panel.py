@@ -26,11 +26,11 @@ from robocov_app.editor.ui.fields import FIELDS, set_picture_opacity
 from robocov_app.editor.ui.map_facts import list_map_facts
 from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas, wrap_text
-from robocov_app.toolkit.ui import SidePanel, Ui
+from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
+from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX
 
-TABS = ("map", "object", "snap", "problems", "history")
-TAB_WIDTHS_PX = (44, 56, 46, 72, 0)  # 0 for the rest
+TOOL_COLUMNS = 4
 ROW_HEIGHT_PX = 20.0  # of a line of a list
 LABEL_WIDTH_PX = 62.0
 SHORT_LABEL_WIDTH_PX = 14.0
@@ -42,21 +42,6 @@ NOTHING_SELECTED = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
     "Tab goes on to the next; Ctrl A takes all."
 )
-
-
-class Button(NamedTuple):
-    """A button of the panel.
-
-    Attributes
-    ----------
-    label : str
-        Its text.
-    command : str
-        Name of the command that it starts.
-    """
-
-    label: str
-    command: str
 
 
 class FieldCell(NamedTuple):
@@ -78,58 +63,67 @@ class FieldCell(NamedTuple):
 
 
 FILE_BUTTONS = (
-    (Button("New", "new"), Button("Open", "open"), Button("Save", "save"), Button("Try it", "try")),
     (
-        Button("Undo", "undo"),
-        Button("Redo", "redo"),
-        Button("Keys", "help"),
-        Button("Commands", "palette"),
+        PanelButton("New", "new"),
+        PanelButton("Open", "open"),
+        PanelButton("Save", "save"),
+        PanelButton("Try it", "try"),
+    ),
+    (
+        PanelButton("Undo", "undo"),
+        PanelButton("Redo", "redo"),
+        PanelButton("Keys", "help"),
+        PanelButton("Commands", "palette"),
     ),
 )
 START_BUTTONS = (
-    Button("Disc", "tool:disc"),
-    Button("Points", "tool:places"),
-    Button("Anywhere", "start:uniform"),
-    Button("Next", "start:next"),
+    PanelButton("Disc", "tool:disc"),
+    PanelButton("Points", "tool:places"),
+    PanelButton("Anywhere", "start:uniform"),
+    PanelButton("Next", "start:next"),
 )
 PICTURE_BUTTONS = (
-    Button("Choose…", "background"),
-    Button("Scale, move", "tool:picture"),
-    Button("Remove", "background:none"),
+    PanelButton("Choose…", "background"),
+    PanelButton("Scale, move", "tool:picture"),
+    PanelButton("Remove", "background:none"),
 )
 PROBLEM_BUTTONS = (
-    Button("Next", "problem:next"),
-    Button("Repair", "repair"),
-    Button("Clip", "clip"),
-    Button("Fix", "problem:fix"),
+    PanelButton("Next", "problem:next"),
+    PanelButton("Repair", "repair"),
+    PanelButton("Clip", "clip"),
+    PanelButton("Fix", "problem:fix"),
 )
-HISTORY_BUTTONS = (Button("Undo", "undo"), Button("Redo", "redo"))
+HISTORY_BUTTONS = (PanelButton("Undo", "undo"), PanelButton("Redo", "redo"))
 _TURN_BUTTONS = (
-    Button("Turn ↺", "rotate:left"),
-    Button("Turn ↻", "rotate:right"),
-    Button("Flip ↔", "mirror:x"),
-    Button("Flip ↕", "mirror:y"),
+    PanelButton("Turn ↺", "rotate:left"),
+    PanelButton("Turn ↻", "rotate:right"),
+    PanelButton("Flip ↔", "mirror:x"),
+    PanelButton("Flip ↕", "mirror:y"),
 )
 _PATH_BUTTONS = (
-    Button("Path", "tool:path"),
-    Button("Loop ↺", "path:repeat"),
-    Button("Play", "path:play"),
-    Button("No path", "path:none"),
+    PanelButton("Path", "tool:path"),
+    PanelButton("Loop ↺", "path:repeat"),
+    PanelButton("Play", "path:play"),
+    PanelButton("No path", "path:none"),
 )
 _START_OBJECT_BUTTONS = (
-    Button("Delete", "delete"),
-    Button("Copy", "duplicate"),
-    Button("Default", "start:default"),
+    PanelButton("Delete", "delete"),
+    PanelButton("Copy", "duplicate"),
+    PanelButton("Default", "start:default"),
 )
-_CORNER_BUTTONS = (Button("Delete", "delete"), Button("Cut off", "bevel"), Button("Round", "round"))
-OBJECT_BUTTONS: dict[str, tuple[tuple[Button, ...], ...]] = {
-    "vertex": ((*_CORNER_BUTTONS, Button("Split", "split")),),
-    "vertices": ((*_CORNER_BUTTONS, Button("Align", "align:left")),),
+_CORNER_BUTTONS = (
+    PanelButton("Delete", "delete"),
+    PanelButton("Cut off", "bevel"),
+    PanelButton("Round", "round"),
+)
+OBJECT_BUTTONS: dict[str, tuple[tuple[PanelButton, ...], ...]] = {
+    "vertex": ((*_CORNER_BUTTONS, PanelButton("Split", "split")),),
+    "vertices": ((*_CORNER_BUTTONS, PanelButton("Align", "align:left")),),
     "boundary": (
         (
-            Button("Simplify", "simplify"),
-            Button("Straighten", "straighten"),
-            Button("Repair", "repair"),
+            PanelButton("Simplify", "simplify"),
+            PanelButton("Straighten", "straighten"),
+            PanelButton("Repair", "repair"),
         ),
     ),
     "disc": (_START_OBJECT_BUTTONS,),
@@ -140,28 +134,28 @@ OBJECT_BUTTONS: dict[str, tuple[tuple[Button, ...], ...]] = {
     "several": (
         _TURN_BUTTONS,
         (
-            Button("Unite", "unite"),
-            Button("Subtract", "subtract"),
-            Button("Intersect", "intersect"),
-            Button("Divide", "divide"),
+            PanelButton("Unite", "unite"),
+            PanelButton("Subtract", "subtract"),
+            PanelButton("Intersect", "intersect"),
+            PanelButton("Divide", "divide"),
         ),
         (
-            Button("Left", "align:left"),
-            Button("Center", "align:center"),
-            Button("Right", "align:right"),
-            Button("Gaps ↔", "distribute:x"),
+            PanelButton("Left", "align:left"),
+            PanelButton("Center", "align:center"),
+            PanelButton("Right", "align:right"),
+            PanelButton("Gaps ↔", "distribute:x"),
         ),
         (
-            Button("Top", "align:top"),
-            Button("Middle", "align:middle"),
-            Button("Bottom", "align:bottom"),
-            Button("Gaps ↕", "distribute:y"),
+            PanelButton("Top", "align:top"),
+            PanelButton("Middle", "align:middle"),
+            PanelButton("Bottom", "align:bottom"),
+            PanelButton("Gaps ↕", "distribute:y"),
         ),
         (
-            Button("Join", "join"),
-            Button("Polygons", "polygons"),
-            Button("Simplify", "simplify"),
-            Button("Delete", "delete"),
+            PanelButton("Join", "join"),
+            PanelButton("Polygons", "polygons"),
+            PanelButton("Simplify", "simplify"),
+            PanelButton("Delete", "delete"),
         ),
     ),
 }
@@ -172,7 +166,7 @@ _NOTED_KINDS = ("polygon", "circle", "wall", "several")
 _SIZED_KINDS = ("polygon", "wall", "several", "boundary")
 
 
-class Panel(SidePanel):
+class EditorPanel(CommandPanel):
     """Shows the editor, and lets it be edited.
 
     Parameters
@@ -187,6 +181,9 @@ class Panel(SidePanel):
         Called when a problem was clicked.
     """
 
+    tabs = ("map", "object", "snap", "problems", "history")
+    tab_widths = (44, 56, 46, 72, 0)
+
     def __init__(
         self,
         editor: Editor,
@@ -194,21 +191,9 @@ class Panel(SidePanel):
         run_command: Callable[[str], object],
         show_problem: Callable[[], object],
     ) -> None:
+        super().__init__(commands, run_command)
         self.editor = editor
-        self._commands = commands
-        self._run_command = run_command
         self._show_problem = show_problem
-        super().__init__(TABS[0])
-
-    def show_tab(self, name: str) -> None:
-        """Show a page."""
-        if name in TABS:
-            self.tab = name
-            self.ui.needs_redraw = True
-
-    def show_next_tab(self) -> None:
-        """Show the next page."""
-        self.show_tab(TABS[(TABS.index(self.tab) + 1) % len(TABS)])
 
     def update(self) -> None:
         """Draw the panel again if anything that it shows has changed."""
@@ -226,56 +211,34 @@ class Panel(SidePanel):
             self.drawn_state = state
             self.ui.needs_redraw = True
 
-    def show_content(self, ui: Ui) -> None:
-        """Show the title of the map, its files, the tools and the open tab."""
-        ui.inset(12, 8, 12)
-        document = self.editor.document
-        suffix = ", not saved" if document.history.has_unsaved_changes else ""
-        ui.header(f"{document.title}{suffix}")
-        for row in FILE_BUTTONS:
-            self._draw_buttons(ui, row)
-        ui.header("TOOLS")
-        ui.row(0, 0, 0, 0, below=4)
-        for tool in self.editor.toolbox.by_name.values():
-            is_chosen = tool is self.editor.tool
-            self._draw_button(ui, Button(tool.title, f"tool:{tool.name}"), is_chosen=is_chosen)
-        self._draw_tabs(ui)
-        pages = {
+    def list_pages(self) -> dict[str, PanelPage]:
+        """Return the pages by the names of their tabs."""
+        return {
             "map": self._draw_map_page,
             "object": self._draw_object_page,
             "snap": self._draw_snap_page,
             "problems": self._draw_problems_page,
             "history": self._draw_history_page,
         }
-        pages[self.tab](ui)
 
-    def _draw_tabs(self, ui: Ui) -> None:
+    def show_content(self, ui: Ui) -> None:
+        """Show the buttons that stay in sight, the tools, and the page that is open."""
+        ui.inset(12, 8, 12)
+        document = self.editor.document
+        suffix = ", not saved" if document.history.has_unsaved_changes else ""
+        ui.header(f"{document.title}{suffix}")
+        for row in FILE_BUTTONS:
+            self.show_buttons(ui, row)
+        self.show_tools(ui, self.editor.toolbox, TOOL_COLUMNS)
         count = len(self.editor.problems)
         titles = {"problems": f"Problems {min(count, MAX_PROBLEM_COUNT)}"} if count else {}
-        ui.space(6)
-        tab = ui.tabs("tab", TABS, self.tab, *TAB_WIDTHS_PX, titles=titles)
-        if tab is not None:
-            self.show_tab(tab)
-
-    def _draw_button(self, ui: Ui, button: Button, *, is_chosen: bool = False) -> None:
-        key = button.command
-        if ui.find("button", key) is not None:
-            # A command may have two buttons on a page.
-            key = f"{key}:again"
-        tip = self._commands[button.command].tip
-        if ui.button(button.label, key=key, tip=tip, chosen=is_chosen, small=True):
-            self._run_command(button.command)
-
-    def _draw_buttons(self, ui: Ui, row: tuple[Button, ...]) -> None:
-        ui.row(*[0.0] * len(row), below=4)
-        for button in row:
-            self._draw_button(ui, button)
+        self.show_pages(ui, titles)
 
     def _draw_layer_check(self, ui: Ui, name: str) -> None:
         self._draw_check(ui, f"show:{name}", LAYERS[name].title, is_on=name in self.editor.shown)
 
     def _draw_check(self, ui: Ui, command: str, title: str, *, is_on: bool) -> None:
-        tip = self._commands[command].tip
+        tip = self.commands[command].tip
         if ui.check_box(title, key=command, value=is_on, tip=tip) is not None:
             self._run_command(command)
 
@@ -316,10 +279,10 @@ class Panel(SidePanel):
             ui.row(48, 0, 16, 44, 44, 23, 23)
             self._draw_field(ui, FieldCell("radius", "Radius", "m"))
             self._draw_field(ui, FieldCell("robots", "Team"))
-            self._draw_button(ui, Button("−", "fewer"))
-            self._draw_button(ui, Button("+", "more"))
+            self.show_button(ui, "−", "fewer", small=True)
+            self.show_button(ui, "+", "more", small=True)
             ui.header("STARTS")
-            self._draw_buttons(ui, START_BUTTONS)
+            self.show_buttons(ui, START_BUTTONS)
             ui.row()
             is_on = "robots" in self.editor.shown
             self._draw_check(ui, "show:robots", "Show the team there", is_on=is_on)
@@ -338,7 +301,7 @@ class Panel(SidePanel):
         ui.header(title.upper())
         self._draw_object_fields(ui, kind)
         for row in OBJECT_BUTTONS[kind]:
-            self._draw_buttons(ui, row)
+            self.show_buttons(ui, row)
         ui.space(4)
         if editor.vertex_owners:
             self._draw_vertex_list(ui)
@@ -377,7 +340,7 @@ class Panel(SidePanel):
 
     def _draw_picture_section(self, ui: Ui) -> None:
         ui.header("PICTURE UNDER THE MAP")
-        self._draw_buttons(ui, PICTURE_BUTTONS)
+        self.show_buttons(ui, PICTURE_BUTTONS)
         scale = FieldCell("picture:scale", "Pixel", "m")
         turn = FieldCell("picture:turn", "Turn", "°")
         self._draw_field_pair(ui, scale, turn)
@@ -392,7 +355,7 @@ class Panel(SidePanel):
 
     def _draw_problems_page(self, ui: Ui) -> None:
         problems = self.editor.problems
-        self._draw_buttons(ui, PROBLEM_BUTTONS)
+        self.show_buttons(ui, PROBLEM_BUTTONS)
         with ui.scroll("problems"):
             if not problems:
                 is_measured = self.editor.measurement is not None
@@ -432,7 +395,7 @@ class Panel(SidePanel):
 
     def _draw_history_page(self, ui: Ui) -> None:
         history = self.editor.document.history
-        self._draw_buttons(ui, HISTORY_BUTTONS)
+        self.show_buttons(ui, HISTORY_BUTTONS)
         undone = history.redo_descriptions
         steps: list[tuple[str, int]] = []  # description, and number of changes to undo to get there
         steps += [(text, k - len(undone)) for k, text in enumerate(reversed(undone))]

@@ -68,51 +68,6 @@ class PlayPresenter(Presenter):
         self.files = PlayFiles(self, folder, title)
 
 
-class PlayWindow(ViewerWindow):
-    """The viewer's window, from which F5 and Escape lead back to the editor.
-
-    Attributes
-    ----------
-    ended : bool
-        Whether to return to the editor.
-    held : int or None
-        The key that started it, until it is released, because it may repeat.
-    """
-
-    viewer: PlayPresenter
-    hint = "F5 back to the editor · F1 keys"
-
-    def __init__(
-        self, viewer: PlayPresenter, screen: pygame.Surface, scale: float, *, is_unattended: bool
-    ) -> None:
-        self.ended = False
-        self.held: int | None = None
-        super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
-
-    def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event; F5 leads back."""
-        is_released = event.type == pygame.KEYUP and event.key == self.held
-        if event.type == pygame.WINDOWFOCUSLOST or is_released:
-            self.held = None
-        if event.type == pygame.KEYDOWN and event.key == self.held:
-            return
-        if event.type == pygame.KEYDOWN and get_key_name(event) == "f5":
-            self.ended = True
-        else:
-            super().handle_event(event)
-
-    def do(self, name: str) -> None:
-        """Run a command; Escape leads back where it would do nothing."""
-        is_open = self.is_help_open or self.dialogs.is_open or self.lesson.player is not None
-        viewer = self.viewer
-        hand = viewer.toolbox.hand
-        is_idle = not is_open and viewer.tool is hand and viewer.selected_robot is None
-        if name == "cancel" and is_idle:
-            self.ended = not hand.cancel(viewer.session)
-        else:
-            super().do(name)
-
-
 class TrialDrafts:
     """Keeps drafts of a map with what is changed in the viewer, about once a second.
 
@@ -142,6 +97,65 @@ class TrialDrafts:
             self._document.update_draft()
         else:
             self._document.save_draft(change.sketch)
+
+
+class PlayWindow(ViewerWindow):
+    """The viewer's window, from which F5 and Escape lead back to the editor.
+
+    Attributes
+    ----------
+    ended : bool
+        Whether to return to the editor.
+    held : int or None
+        The key that started it, until it is released, because it may repeat.
+    drafts : TrialDrafts
+        Keeps drafts of the map.
+    """
+
+    viewer: PlayPresenter
+    hint = "F5 back to the editor · F1 keys"
+
+    def __init__(
+        self,
+        viewer: PlayPresenter,
+        drafts: TrialDrafts,
+        screen: pygame.Surface,
+        scale: float,
+        *,
+        is_unattended: bool,
+    ) -> None:
+        self.ended = False
+        self.held: int | None = None
+        self.drafts = drafts
+        super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
+
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Handle an event; F5 leads back."""
+        is_released = event.type == pygame.KEYUP and event.key == self.held
+        if event.type == pygame.WINDOWFOCUSLOST or is_released:
+            self.held = None
+        if event.type == pygame.KEYDOWN and event.key == self.held:
+            return
+        if event.type == pygame.KEYDOWN and get_key_name(event) == "f5":
+            self.ended = True
+        else:
+            super().handle_event(event)
+
+    def keep_draft(self, *, at_once: bool = False) -> None:
+        """Keep a draft of the map with what is changed here, unless another map was opened."""
+        if not self.viewer.files.has_left_tried_map:
+            self.drafts.update(self.viewer.session.displayed.environment, at_once=at_once)
+
+    def do(self, name: str) -> None:
+        """Run a command; Escape leads back where it would do nothing."""
+        is_open = self.is_help_open or self.dialogs.is_open or self.lesson.player is not None
+        viewer = self.viewer
+        hand = viewer.toolbox.hand
+        is_idle = not is_open and viewer.tool is hand and viewer.selected_robot is None
+        if name == "cancel" and is_idle:
+            self.ended = not hand.cancel(viewer.session)
+        else:
+            super().do(name)
 
 
 def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
@@ -177,7 +191,8 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
         shown = {layer.name for layer in standard_layers() if layer.default}
         viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
         viewer.view.theme = editor.theme
-        trial = PlayWindow(viewer, screen, scale, is_unattended=patient)
+        drafts = TrialDrafts(editor.document, viewer.files.tried)
+        trial = PlayWindow(viewer, drafts, screen, scale, is_unattended=patient)
     except BaseException:
         costs.close()
         raise

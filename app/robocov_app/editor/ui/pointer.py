@@ -10,8 +10,8 @@ from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Snap
 from robocov_app.editor.tools.tool import EditorPointerEvent
 from robocov_app.toolkit.input import ZOOM_PER_NOTCH, get_wheel_notches
+from robocov_app.toolkit.panel import SidePanel
 from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
-from robocov_app.toolkit.ui import SidePanel
 
 
 class EditorPointer(Pointer):

@@ -10,33 +10,31 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.hit_test import find_owners
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.team import TeamRequest, TeamSampler
-from robocov_app.editor.ui.commands import GROUPS, PALETTE_HINT, WindowActions, list_commands
+from robocov_app.editor.ui.commands import GROUPS, PALETTE_HINT, EditorWindowActions, list_commands
 from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
-from robocov_app.editor.ui.panel import Panel
-from robocov_app.editor.ui.play_mode import PlayWindow, TrialDrafts, build_trial_change, start_trial
+from robocov_app.editor.ui.panel import EditorPanel
+from robocov_app.editor.ui.play_mode import PlayWindow, build_trial_change, start_trial
 from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import type_for_tool
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
 from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.command_window import CommandWindow
 from robocov_app.toolkit.display import set_title
-from robocov_app.toolkit.help_page import draw_help_page
 from robocov_app.toolkit.input import MOUSE_EVENTS
 from robocov_app.toolkit.layout import build_layout
 from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.palette import create_palette
 from robocov_app.toolkit.tool import CursorShape
-from robocov_app.toolkit.window import BaseWindow
 
 STATUS_HINT = "F5 try it · F1 keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 
-class EditorWindow(BaseWindow):
+class EditorWindow(CommandWindow):
     """The window of the editor.
 
     Parameters
@@ -60,33 +58,36 @@ class EditorWindow(BaseWindow):
         Commands on files.
     commands : CommandTable
         All commands.
-    panel : Panel
+    panel : EditorPanel
         The panel.
     pointer : EditorPointer
         The mouse over the map.
     trial : PlayWindow or None
         The viewer in which the map is tried.
-    help : bool
-        Whether the keys are shown.
+    team_sampler : TeamSampler
+        Computes the positions of the team at a start.
     """
+
+    groups = GROUPS
+    keys_hint = KEYS_HINT
+    palette_hint = PALETTE_HINT
+
+    panel: EditorPanel
+    pointer: EditorPointer
 
     def __init__(
         self, editor: Editor, size: tuple[int, int], scale: float, drafts: Path | None, patient: bool = False
     ) -> None:
-        super().__init__(size)
+        super().__init__(editor, editor.dialogs, size, scale)
         self.editor = editor
-        self.scale = scale
-        self.help = False
         self.trial: PlayWindow | None = None
         self.canvas = EditorCanvas(editor)
         self.documents = FileCommands(editor, drafts, self.canvas.fit, patient=patient)
-        self.dialogs = editor.dialogs
-        commands = list_commands(editor, self.canvas, self.documents, self._list_actions())
+        commands = list_commands(editor, self.canvas, self.documents, self._build_actions())
         self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
-        self.panel = Panel(editor, self.commands, self.do, self._show_problem)
+        self.panel = EditorPanel(editor, self.commands, self.do, self._show_problem)
         self.pointer = EditorPointer(editor, self.canvas, self.panel, self.open_menu)
         self.team_sampler = TeamSampler()
-        self._trial_drafts: TrialDrafts | None = None
         self._patient = patient
         editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
@@ -95,8 +96,9 @@ class EditorWindow(BaseWindow):
         editor.request_measurement()
         self.draw()
 
-    def _list_actions(self) -> WindowActions:
-        return WindowActions(
+    def _build_actions(self) -> EditorWindowActions:
+        """Return the actions of the window that commands start."""
+        return EditorWindowActions(
             try_map=self.try_it,
             save_screenshot=lambda: self.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
@@ -104,8 +106,8 @@ class EditorWindow(BaseWindow):
             hold_pan=lambda: self.pointer.hold_pan(),
             show_next_tab=lambda: self.panel.show_next_tab(),
             toggle_fullscreen=self.toggle_fullscreen,
-            toggle_help=self._toggle_help,
-            open_palette=self._open_palette,
+            toggle_help=self.toggle_help,
+            open_palette=self.open_palette,
         )
 
     def create_save_point(self) -> Callable[[], None]:
@@ -131,21 +133,16 @@ class EditorWindow(BaseWindow):
 
         return take_back
 
-    def report_fault(self, message: str, *, in_drawing: bool) -> None:
-        """Show a message on an unexpected exception; if drawing raised it, close what may be the cause."""
-        editor = self.editor
-        if in_drawing:
-            self.help = False
-            editor.dialogs.discard()
-            editor.problem = None
-            self.canvas.fit()
-        editor.show_message(message, is_error=True)
-        editor.revision += 1
+    def restore_view(self) -> None:
+        """Close everything that may be the cause of an exception in drawing."""
+        super().restore_view()
+        self.editor.problem = None
+        self.canvas.fit()
 
     def close(self) -> None:
         """End the trial, and everything that is computed beside the window."""
         if self.trial is not None:
-            self._keep_trial_draft(self.trial, at_once=True)
+            self.trial.keep_draft(at_once=True)
             self.trial.close()
         self.team_sampler.close()
         self.dialogs.close()
@@ -177,7 +174,7 @@ class EditorWindow(BaseWindow):
             canvas.team,
             canvas.camera,
             canvas.hovered,
-            self.help,
+            self.is_help_open,
             id(dialog),
             self._arranged,
             pygame.display.get_caption(),
@@ -263,18 +260,7 @@ class EditorWindow(BaseWindow):
             self.panel.draw(self.screen)
         is_error = editor.has_error_message
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
-        if self.help:
-            commands = self.commands.commands
-            draw_help_page(self.screen, theme, layout.scale, commands, groups=GROUPS, hint=KEYS_HINT)
-        self.dialogs.draw(self.screen, theme, layout.scale)
-        self.show_screen()
-
-    def do(self, name: str) -> None:
-        """Run a command; Escape closes the keys first."""
-        if name == "cancel" and self.help:
-            self.help = False
-        else:
-            self.commands.run(name)
+        self.draw_above_map()
 
     def _attempt(self, action: Callable[[], object]) -> None:
         problem = self.editor.problem
@@ -284,12 +270,6 @@ class EditorWindow(BaseWindow):
 
     def _show_problem(self) -> None:
         self.canvas.show_problem(self.editor.problem)
-
-    def _toggle_help(self) -> None:
-        self.help = not self.help
-
-    def _open_palette(self) -> None:
-        self.dialogs.ask(create_palette(self.commands, PALETTE_HINT, self.editor.show_message))
 
     def _edit_name(self) -> None:
         """Put the text cursor into the name of the selected object, or of the map."""
@@ -319,7 +299,6 @@ class EditorWindow(BaseWindow):
         trial = start_trial(self.editor, self.screen, self.scale, patient=self._patient)
         trial.windowed_size = self.windowed_size
         trial.cursor = self.cursor
-        self._trial_drafts = TrialDrafts(self.editor.document, trial.viewer.files.tried)
         self.trial = trial
         self.inner = trial
 
@@ -331,7 +310,7 @@ class EditorWindow(BaseWindow):
         if trial.ended or trial.closed:
             self._end_trial(trial)
         else:
-            self._keep_trial_draft(trial)
+            trial.keep_draft()
 
     def _end_trial(self, trial: PlayWindow) -> None:
         """Return to the editor with what was changed in the viewer."""
@@ -339,7 +318,6 @@ class EditorWindow(BaseWindow):
         trial.run_saver.finish()
         self.trial = None
         self.inner = None
-        self._trial_drafts = None
         self.adopt_display()
         self.windowed_size = trial.windowed_size
         editor = self.editor
@@ -361,62 +339,37 @@ class EditorWindow(BaseWindow):
         else:
             self.do("quit")
 
-    def _keep_trial_draft(self, trial: PlayWindow, *, at_once: bool = False) -> None:
-        viewer = trial.viewer
-        if self._trial_drafts is not None and not viewer.files.has_left_tried_map:
-            self._trial_drafts.update(viewer.session.displayed.environment, at_once=at_once)
-
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event: by the dialog, else by keys, mouse or panel."""
-        kind = event.type
-        if kind == pygame.KEYUP:
-            self.commands.release_key(event)
-            if event.key == pygame.K_SPACE:
-                self.pointer.pans_with_left = False
-        elif kind == pygame.WINDOWFOCUSLOST:
-            self.commands.reset_keys()
+        """Handle an event; screenshots work while a dialog is open, too."""
+        is_space_released = event.type == pygame.KEYUP and event.key == pygame.K_SPACE
+        if is_space_released or event.type == pygame.WINDOWFOCUSLOST:
             self.pointer.pans_with_left = False
-        elif kind == pygame.KEYDOWN and event.key == pygame.K_F12:
-            self.do("screenshot")
-            return
-        if kind in MOUSE_EVENTS and kind != pygame.MOUSEWHEEL:
+        if event.type in MOUSE_EVENTS and event.type != pygame.MOUSEWHEEL:
             self.pointer.at = event.pos
-        if kind == pygame.QUIT:
-            self._take_quit()
-        elif not self.dialogs.handle_event(event):
-            self._take_without_dialog(event)
+        if event.type == pygame.KEYDOWN and event.key == pygame.K_F12:
+            self.do("screenshot")
+        else:
+            super().handle_event(event)
 
-    def _take_quit(self) -> None:
+    def handle_quit(self) -> None:
         """Quit, unless a question is open; dialogs that hold nothing back are closed."""
-        if isinstance(self.editor.dialogs.current, ImportDialog | Menu):
+        if isinstance(self.dialogs.current, ImportDialog | Menu):
             self.dialogs.close()
         if not self.dialogs.is_open:
             self.do("quit")
 
-    def _take_without_dialog(self, event: pygame.event.Event) -> None:
-        kind = event.type
-        if kind == pygame.DROPFILE:
-            self.editor.attempt(lambda: self.documents.open(Path(event.file)))
-        elif kind == pygame.KEYDOWN:
-            self._take_key(event)
-        elif kind == pygame.MOUSEBUTTONDOWN and self.help:
-            self.help = False
-        elif kind in MOUSE_EVENTS:
-            self.pointer.handle_event(event, self.editor.now)
-        elif kind == pygame.WINDOWLEAVE:
-            self.pointer.leave()
-        else:
-            self.panel.handle_event(event)
+    def open_file(self, path: Path) -> None:
+        """Open a map, or import a foreign file, that was dropped on the window."""
+        self.documents.open(path)
 
-    def _take_key(self, event: pygame.event.Event) -> None:
-        """Handle a key: it is for a field of the panel, a value for the tool, or a command."""
-        is_taken = self.panel.handle_event(event)
-        if not is_taken and not self.panel.ui.is_busy:
-            is_taken = type_for_tool(self.editor, event)
-        if not is_taken:
-            command = self.commands.press_key(event)
-            if command is not None:
-                self.do(command.name)
+    def use_key(self, event: pygame.event.Event) -> bool:
+        """Use a key in a field of the panel, or as part of a value for the tool."""
+        if super().use_key(event):
+            return True
+        return not self.panel.ui.is_busy and type_for_tool(self.editor, event)
+
+    def press_key(self, event: pygame.event.Event) -> None:
+        """Handle a key: as input, or as the key of a command."""
+        super().press_key(event)
         if self.trial is not None:
             self.trial.held = event.key
-        self.dialogs.ignore_letter(event.unicode)

@@ -50,8 +50,6 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
 
     Attributes
     ----------
-    button_text : str
-        Text of its button, if the title is too long; empty for the title.
     takes_robots : bool
         Whether a press acts on the robot under the cursor.
     uses_right_button : bool
@@ -64,7 +62,6 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
         Whether the density is being changed right now.
     """
 
-    button_text = ""
     takes_robots = False
     uses_right_button = False
     uses_wheel = False

@@ -1,0 +1,193 @@
+"""Panels next to the arena: pages with tabs, and buttons that run the commands of the window."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.theme import LIGHT, Theme
+from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.layout import Layout
+from robocov_app.toolkit.tool import Toolbox
+from robocov_app.toolkit.ui import Ui
+
+PanelPage: TypeAlias = Callable[[Ui], None]
+"""Shows and edits the content of a page."""
+
+
+class SidePanel:
+    """A panel next to the arena.
+
+    Parameters
+    ----------
+    tab : str
+        Name of the tab that is open first.
+
+    Attributes
+    ----------
+    tab : str
+        Name of the open tab.
+    is_covered : bool
+        Whether something else is drawn in its place, or gets its events.
+    hidden : bool
+        Whether it is not shown.
+    ui : Ui
+        Its page.
+    drawn_state : object
+        State of the content when the panel was drawn last, for panels that draw only changes.
+    """
+
+    def __init__(self, tab: str) -> None:
+        self.tab = tab
+        self.is_covered = False
+        self.hidden = False
+        self.ui = Ui(self.show_content, LIGHT)
+        self.drawn_state: object = None
+
+    def show_content(self, ui: Ui) -> None:
+        """Show and edit the content."""
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Take the place of the panel in a layout, and its colors and scale."""
+        self.hidden = not layout.panel[2]
+        if self.hidden:
+            self.ui.stop_typing()
+        if theme is not self.ui.theme or layout.scale != self.ui.scale:
+            self.ui = Ui(self.show_content, theme, layout.scale)
+        self.ui.box = Rect(layout.panel)
+        self.ui.needs_redraw = True
+
+    def draw(self, screen: Surface) -> None:
+        """Draw the panel, its open list and its tool tip."""
+        self.ui.draw(screen)
+        self.ui.draw_overlays(screen)
+
+    def handle_event(self, event: pygame.event.Event) -> bool:
+        """Pass an event to the widgets; return whether it was meant for the panel."""
+        return not self.is_covered and not self.hidden and self.ui.handle_event(event)
+
+
+class PanelButton(NamedTuple):
+    """A button of the panel.
+
+    Attributes
+    ----------
+    label : str
+        Its text.
+    command : str
+        Name of the command that it runs.
+    """
+
+    label: str
+    command: str
+
+
+class CommandPanel(SidePanel):
+    """A panel with pages, whose buttons run the commands of the window.
+
+    Parameters
+    ----------
+    commands : CommandTable
+        The commands of the window.
+    run_command : callable
+        Runs a command by its name.
+
+    Attributes
+    ----------
+    tabs : tuple of str
+        Names of the pages.
+    tab_widths : tuple of float, px
+        Widths of their tabs at scale 1; tabs of width 0 share the remaining width.
+    commands : CommandTable
+        The commands of the window.
+    """
+
+    tabs: tuple[str, ...] = ()
+    tab_widths: tuple[float, ...] = ()
+
+    def __init__(self, commands: CommandTable, run_command: Callable[[str], object]) -> None:
+        super().__init__(self.tabs[0])
+        self.commands = commands
+        self._run_command = run_command
+
+    def list_pages(self) -> dict[str, PanelPage]:
+        """Return the pages by the names of their tabs."""
+        return {}
+
+    def show_tab(self, name: str) -> None:
+        """Show a page, if there is one of that name."""
+        if name in self.tabs:
+            self.tab = name
+            self.ui.needs_redraw = True
+
+    def show_next_tab(self) -> None:
+        """Show the next page."""
+        self.show_tab(self.tabs[(self.tabs.index(self.tab) + 1) % len(self.tabs)])
+
+    def show_pages(self, ui: Ui, titles: Mapping[str, str]) -> None:
+        """Show the tabs, and the page that is open.
+
+        Parameters
+        ----------
+        ui : Ui
+            The page of the panel.
+        titles : mapping of str to str
+            Texts of tabs by their names; by default the names themselves.
+        """
+        tab = ui.tabs("tab", self.tabs, self.tab, *self.tab_widths, titles=titles)
+        if tab is not None:
+            self.show_tab(tab)
+        pages = self.list_pages()
+        pages[self.tab](ui)
+
+    def show_button(
+        self,
+        ui: Ui,
+        label: str,
+        command: str,
+        *,
+        chosen: bool = False,
+        small: bool = False,
+        disabled_reason: str = "",
+    ) -> None:
+        """Show a button that runs a command.
+
+        Parameters
+        ----------
+        ui : Ui
+            The page of the panel.
+        label : str
+            Its text.
+        command : str
+            Name of the command, whose title is the tool tip.
+        chosen : bool
+            Whether it is highlighted.
+        small : bool
+            Whether its text is small.
+        disabled_reason : str
+            Why it cannot be pressed; empty if it can.
+        """
+        key = command
+        if ui.find("button", key) is not None:
+            # A command may have two buttons on a page.
+            key = f"{key}:again"
+        tip = self.commands[command].tip
+        if ui.button(label, key=key, tip=tip, chosen=chosen, small=small, disabled_reason=disabled_reason):
+            self._run_command(command)
+
+    def show_buttons(self, ui: Ui, row: tuple[PanelButton, ...]) -> None:
+        """Show a row of small buttons of equal width."""
+        ui.row(*[0.0] * len(row), below=4)
+        for button in row:
+            self.show_button(ui, button.label, button.command, small=True)
+
+    def show_tools(self, ui: Ui, toolbox: Toolbox[Any], columns: int) -> None:
+        """Show a button for each tool, in a number of columns."""
+        ui.header("TOOLS")
+        ui.row(*[0.0] * columns, below=4)
+        for tool in toolbox.by_name.values():
+            label = tool.button_text or tool.title
+            is_chosen = tool is toolbox.current
+            self.show_button(ui, label, f"tool:{tool.name}", chosen=is_chosen, small=True)
+        ui.space(6)
