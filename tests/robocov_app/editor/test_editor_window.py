@@ -306,14 +306,14 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
 def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatch) -> None:
     words: set[str] = set()
-    real = help_page.label
+    real = help_page.render_text
 
     def label(text, *rest):
         words.add(text)
         return real(text, *rest)
 
     with opened_editor(tmp_path, size=size, scale=scale) as hands:
-        monkeypatch.setattr(help_page, "label", label)
+        monkeypatch.setattr(help_page, "render_text", label)
         hands.key("f1")
     for action in hands.window.commands.commands:
         if action.keys and not action.hidden:
