@@ -18,8 +18,8 @@ from robocov.errors import MapError, quote, to_one_line
 from robocov.files.writing import replace_file
 from robocov_app.formats import files
 from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.grid_map import BLOCKED, FREE, GridFrame, build_grid_map
 from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
-from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, build_grid_map
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.reports import ExportReport
 
@@ -81,8 +81,14 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(letters[row, column]))}")
     cell = DEFAULT_CELL_M if options.cell is None else options.cell
     notes = (f"no cell size was given: {DEFAULT_CELL_M:g} m taken",) if options.cell is None else ()
-    description = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
-    return build_grid_map(cells, where, path.stem, description, cell, notes=notes)
+    return build_grid_map(
+        cells,
+        GridFrame(cell),
+        where,
+        name=path.stem,
+        description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
+        notes=notes,
+    )
 
 
 def _build_letter_table(options: ReadOptions) -> NDArray[np.uint8]:

@@ -16,7 +16,7 @@ from shapely import MultiPolygon
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, import_map
 from robocov_app.formats.picture import Brightness
-from robocov_app.formats.ros import _classify_raw, _classify_scale, _classify_trinary
+from robocov_app.formats.ros.classification import classify_raw, classify_scale, classify_trinary
 
 IMPORTER = IMPORTERS["ros"]
 
@@ -152,11 +152,11 @@ def test_every_pixel_means_what_map_server_says(
     alpha = np.full((1, 256), opacity, np.uint8) if with_alpha else None
     picture = Brightness(level, 255, alpha)
     if mode == "trinary":
-        cells = _classify_trinary(picture, negate, low, high)
+        cells = classify_trinary(picture, negate=negate, free=low, occupied=high)
     elif mode == "scale":
-        cells = _classify_scale(picture, negate, low, high, 0.5)
+        cells = classify_scale(picture, negate=negate, free=low, occupied=high, threshold=0.5)
     else:
-        cells = _classify_raw(picture, 0.5)
+        cells = classify_raw(picture, 0.5)
     for value in range(256):
         wanted = occupancy(value, mode, negate, low, high, opacity if with_alpha else -1)
         kind = 2 if wanted < 0 else int(wanted >= 50)

@@ -12,11 +12,12 @@ from robocov_app.formats.files import parse_yaml
 from robocov_app.formats.geometry.corners import sharpen_corners
 from robocov_app.formats.geometry.curves import flatten_beziers
 from robocov_app.formats.geometry.enclosed_area import Rule, find_enclosed_area
+from robocov_app.formats.geometry.grid_map import _format_share
 from robocov_app.formats.geometry.import_tally import format_plural
 from robocov_app.formats.geometry.map_layout import build_boundary
 from robocov_app.formats.geometry.polygons import format_decimal
 from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
-from robocov_app.formats.geometry.vectorize import _format_share, trace_outline
+from robocov_app.formats.geometry.vectorize import trace_outline
 from robocov_app.formats.preview import _number
 from robocov_app.formats.reports import format_area
 from robocov_app.formats.svg.path_data import parse_path

@@ -1,122 +1,27 @@
-"""Grids of free, blocked and unknown cells as foreign maps, and the outline of free cells as polygons.
+"""The outline of free cells of a grid as polygons.
 
 Free cells are connected through their sides, never through a corner only: no robot passes there. So
 obstacles that touch at a corner are connected (free cells are 4-connected, obstacles 8-connected), and
 the outline joins them by a neck: polygons that touch in a point are neither open nor closed to algorithms.
 """
 
-import math
 from collections.abc import Callable
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy import ndimage
-from shapely import MultiPolygon, Polygon
+from shapely import MultiPolygon
 
 from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import Point
 from robocov.errors import MapError
-from robocov_app.formats.files import require_coordinate, require_vertices
-from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.reports import format_area
+from robocov_app.formats.files import require_vertices
 
-Cells: TypeAlias = NDArray[np.uint8]
-"""`FREE`, `BLOCKED` or `UNKNOWN`, (rows, columns), the top row first."""
-FREE = 0
-BLOCKED = 1
-UNKNOWN = 2
-RIM = 2
-"""Thickness, in cells, of the solid rim around the known cells if a map is cut to them."""
 NECK = 1 / 32
 """Length, in cells, by which the corners of two free cells are cut where obstacles touch."""
 _STRIP = 512
 """Number of rows processed at once, which bounds the memory."""
-_TOUCHING = np.ones((3, 3), dtype=bool)
-"""Known cells that touch at a corner are connected."""
-
-
-def build_grid_map(
-    cells: Cells,
-    where: str,
-    name: str,
-    description: str,
-    cell: float,
-    *,
-    origin: Point = (0.0, 0.0),
-    yaw: float = 0.0,
-    unknown: Literal["obstacle", "free", "cut"] = "obstacle",
-    unknown_name: str = "unknown",
-    noise: float = 0.0,
-    repaired: tuple[str, ...] = (),
-    notes: tuple[str, ...] = (),
-) -> ForeignMap:
-    """Build a map from the cells of a grid.
-
-    Parameters
-    ----------
-    cells : (rows, columns) array
-    where : str
-        The file, for messages.
-    name, description : str
-    cell : float, m
-        Side of a cell.
-    origin : (float, float), m
-        Lower left corner of the grid.
-    yaw : float, rad
-        Angle by which the grid is turned around that corner.
-    unknown : "obstacle", "free" or "cut"
-        What unknown cells are; with "cut" the map ends around the known ones.
-    unknown_name : str
-        What the report calls unknown cells.
-    noise : float
-        Obstacles of fewer cells are noise.
-    repaired, notes : tuple of str
-        Lines for the import report.
-
-    Raises
-    ------
-    MapError
-        If no cell is free, if the outline has too many vertices, or if a coordinate is out of range.
-    """
-
-    def place(points: Array) -> Array:
-        return _place_on_map(points, cell, origin, yaw)
-
-    _require_coordinates(cells, place, where)
-    upward = cells[::-1]
-    free = upward == FREE
-    if unknown == "free":
-        free |= upward == UNKNOWN
-    if not free.any():
-        hint = ""
-        if (cells == UNKNOWN).any():
-            hint = f" (--unknown free takes {unknown_name} cells as free)"
-        raise MapError(f"{where}: no cell is free{hint}")
-    boundary = None
-    dropped: tuple[str, ...] = ()
-    if unknown == "cut" and (cells == UNKNOWN).any():
-        main = _find_main_island(upward != UNKNOWN, free)
-        lost = int(np.count_nonzero(free & ~main))
-        if lost:
-            area = format_area(lost * cell * cell, 3)
-            dropped = (f"{area} of free space on other islands of known cells",)
-        free &= main
-        boundary = _build_rim(main, where, place)
-    outline = _trace_filled_part(free, where, place)
-    return ForeignMap(
-        name=name,
-        description=description,
-        free=outline,
-        boundary=boundary,
-        vertices_read=count_polygon_vertices(outline),
-        cell=cell,
-        specks=noise * cell * cell,
-        repaired=repaired,
-        dropped=dropped,
-        notes=(*notes, _describe_cells(cells, cell, unknown, unknown_name)),
-    )
 
 
 def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
@@ -144,75 +49,38 @@ def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) 
     """
     if not free.any():
         raise MapError(f"{where}: no cell is free")
-    return _trace_filled_part(free[::-1], where, lambda points: _place_on_map(points, cell, origin))
+    return outline_cells(free[::-1], lambda points: points * cell + origin, where)
+
+
+def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str) -> MultiPolygon:
+    """Return the outline of cells on a map.
+
+    Parameters
+    ----------
+    cells : (rows, columns) array of bool
+        At least one is true. The bottom row first.
+    place : callable
+        Returns positions in the grid, (n, 2) in cells from its lower left corner, on the map, m.
+    where : str
+        The file, for messages.
+
+    Returns
+    -------
+    MultiPolygon, m
+    """
+    # Only the rows and columns that contain cells are traced.
+    row = np.flatnonzero(cells.any(axis=1))
+    column = np.flatnonzero(cells.any(axis=0))
+    corner = np.array([column[0], row[0]], float)
+    outline = trace_outline(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], where)
+    placed: MultiPolygon = shapely.transform(outline, lambda points: place(points + corner))
+    return placed
 
 
 def count_polygon_vertices(area: MultiPolygon) -> int:
     """Return the number of vertices of polygons; the first of a ring counts once."""
     ring_count = sum(1 + len(part.interiors) for part in area.geoms)
     return int(shapely.get_num_coordinates(area)) - ring_count
-
-
-def _place_on_map(points: Array, cell: float | Point, origin: Point, yaw: float = 0.0) -> Array:
-    """Transform positions in the grid, (n, 2) in cells, to meters on the map."""
-    x, y = (points * cell).T
-    if yaw:
-        x, y = x * math.cos(yaw) - y * math.sin(yaw), x * math.sin(yaw) + y * math.cos(yaw)
-    return np.column_stack([x + origin[0], y + origin[1]])
-
-
-def _require_coordinates(cells: Cells, place: Callable[[Array], Array], where: str) -> None:
-    """Raise MapError if a corner of the grid is too far away for a map."""
-    rows, columns = cells.shape
-    corners = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float)
-    for value in place(corners).ravel().tolist():
-        require_coordinate(value, f"{where}: a corner of the grid")
-
-
-def _describe_cells(
-    cells: Cells, cell: float, unknown: Literal["obstacle", "free", "cut"], unknown_name: str
-) -> str:
-    """Return the line of the import report about the cells."""
-    rows, columns = cells.shape
-    shares = [_format_share(int(np.count_nonzero(cells == kind)), cells.size) for kind in (FREE, BLOCKED)]
-    line = f"{columns} x {rows} cells of {cell:.6g} m: {shares[0]} free, {shares[1]} blocked"
-    unknown_count = int(np.count_nonzero(cells == UNKNOWN))
-    if not unknown_count:
-        return line
-    meaning = {"obstacle": "taken as obstacles", "free": "taken as free", "cut": "cut away"}[unknown]
-    return f"{line}, {_format_share(unknown_count, cells.size)} {unknown_name}, {meaning}"
-
-
-def _find_main_island(known: BoolArray, free: BoolArray) -> BoolArray:
-    """Return the connected known cells with the most free ones."""
-    island, count = ndimage.label(known, structure=_TOUCHING)
-    area = np.bincount(island[free], minlength=count + 1)
-    return np.asarray(island == int(area.argmax()))
-
-
-def _build_rim(known: BoolArray, where: str, place: Callable[[Array], Array]) -> Polygon:
-    """Return the outline of known cells and a rim around them, without holes, m."""
-    wide = ndimage.binary_dilation(np.pad(known, RIM), structure=_TOUCHING, iterations=RIM)
-    outline = _trace_filled_part(wide, where, lambda points: place(points - RIM))
-    return Polygon(outline.geoms[0].exterior)
-
-
-def _trace_filled_part(cells: BoolArray, where: str, place: Callable[[Array], Array]) -> MultiPolygon:
-    """Return the outline of cells on the map, m; only the part of the grid that they fill is processed."""
-    row = np.flatnonzero(cells.any(axis=1))
-    column = np.flatnonzero(cells.any(axis=0))
-    corner = np.array([column[0], row[0]], float)
-    part = trace_outline(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], where)
-    outline: MultiPolygon = shapely.transform(part, lambda points: place(points + corner))
-    return outline
-
-
-def _format_share(number: int, total: int) -> str:
-    """Return a share of the cells in percent, never rounded to none or all."""
-    share = 100 * number / total
-    if 0.0 < share < 0.1:
-        return "<0.1 %"
-    return ">99.9 %" if 99.9 < share < 100.0 else f"{share:.3g} %"
 
 
 def trace_outline(free: BoolArray, where: str) -> MultiPolygon:

@@ -18,8 +18,8 @@ from robocov.files.writing import replace_file
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats.colors import PICTURE_TOLERANCE
 from robocov_app.formats.foreign_map import ForeignMap, Thumbnail
+from robocov_app.formats.geometry.grid_map import GridFrame, build_grid_map
 from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
-from robocov_app.formats.geometry.vectorize import build_grid_map
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.picture.brightness import Brightness, describe_transparency
 from robocov_app.formats.picture.classification import (
@@ -85,14 +85,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     notes += describe_doubts(cells, unknown, picture)
     foreign = build_grid_map(
         cells,
+        GridFrame(cell, origin),
         where,
-        picture.texts.get(TITLE_CHUNK, "").strip() or path.stem,
-        f"A picture of {cell:g} m a pixel, imported.",
-        cell,
-        origin=origin,
+        name=picture.texts.get(TITLE_CHUNK, "").strip() or path.stem,
+        description=f"A picture of {cell:g} m a pixel, imported.",
         unknown=unknown,
         unknown_name="transparent",
-        noise=_JPEG_NOISE_CELLS if picture.lossy else 0.0,
+        noise_cells=_JPEG_NOISE_CELLS if picture.lossy else 0.0,
         notes=tuple(notes),
     )
     rows, columns = cells.shape

@@ -9,8 +9,8 @@ from scipy import ndimage
 from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
 from robocov_app.formats.colors import NO_ROLE, ROLES, Role
+from robocov_app.formats.geometry.grid_map import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.geometry.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
-from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.picture.brightness import OPAQUE_ALPHA, STRIP_ROWS, Brightness
 from robocov_app.formats.reports import format_area

@@ -1,0 +1,158 @@
+"""The YAML of a ROS map: picture, scale, position and thresholds."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, cast, get_args
+
+from robocov.errors import MapError, quote, to_one_line
+from robocov_app.formats import files
+
+Mode: TypeAlias = Literal["trinary", "scale", "raw"]
+"""Encoding of occupancy in pixels; see `classification`."""
+OCCUPIED_THRESHOLD = 0.65
+FREE_THRESHOLD = 0.196
+"""Thresholds as map_server writes them."""
+DEFAULT_THRESHOLDS = {"occupied_thresh": OCCUPIED_THRESHOLD, "free_thresh": FREE_THRESHOLD}
+UNKNOWN_LEVEL = 205
+"""Level, of 255, that map savers write for unknown cells."""
+_KNOWN_KEYS = ("image", "resolution", "origin", "negate", "mode", *DEFAULT_THRESHOLDS)
+_MIN_RESOLUTION_M = 1e-4
+_MAX_RESOLUTION_M = 1000.0
+_TRUE_WORDS = ("1", "true", "yes", "on")
+_FALSE_WORDS = ("0", "false", "no", "off")
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """The checked values of the YAML of a map.
+
+    Attributes
+    ----------
+    image : str
+        Name of the picture.
+    mode : "trinary", "scale" or "raw"
+    resolution : float, m
+        Side of a cell.
+    origin : (x, y), m
+        Lower left corner.
+    yaw : float, rad
+    negate : bool
+        Whether light pixels are occupied, not dark ones.
+    occupied, free : float
+        Thresholds of darkness, from 0 to 1.
+    missing_thresholds, unknown_keys : tuple of str
+        Keys that are missing, and keys that a map does not have.
+    """
+
+    image: str
+    mode: Mode
+    resolution: float
+    origin: tuple[float, float]
+    yaw: float
+    negate: bool
+    occupied: float
+    free: float
+    missing_thresholds: tuple[str, ...]
+    unknown_keys: tuple[str, ...]
+
+
+def parse_metadata(document: dict[str, files.Value], where: str) -> Metadata:
+    """Check the YAML of a map.
+
+    Parameters
+    ----------
+    document : dict
+    where : str
+        The file, for messages.
+
+    Raises
+    ------
+    MapError
+        If a value is missing or invalid.
+    """
+    parser = _MetadataParser(document, where)
+    mode = parser.parse_mode()
+    resolution = parser.parse_number("resolution")
+    files.require_length(
+        resolution, f"{where}: resolution", minimum=_MIN_RESOLUTION_M, maximum=_MAX_RESOLUTION_M
+    )
+    x, y, yaw = parser.parse_origin()
+    negate = parser.parse_negate()
+    occupied, free = parser.parse_thresholds()
+    return Metadata(
+        image=parser.get_text("image"),
+        mode=mode,
+        resolution=resolution,
+        origin=(x, y),
+        yaw=yaw,
+        negate=negate,
+        occupied=occupied,
+        free=free,
+        missing_thresholds=tuple(key for key in DEFAULT_THRESHOLDS if key not in document),
+        unknown_keys=tuple(to_one_line(key) for key in document if key not in _KNOWN_KEYS),
+    )
+
+
+class _MetadataParser:
+    """Parses the values of a YAML."""
+
+    def __init__(self, document: dict[str, files.Value], where: str) -> None:
+        self._document = document
+        self._where = where
+
+    def get_text(self, key: str, default: str | None = None) -> str:
+        """Return the text of a key. Raises MapError if it is missing without a default."""
+        value = self._document.get(key, default)
+        if value is None:
+            raise MapError(f"{self._where}: {key}: missing")
+        if not isinstance(value, str):
+            raise MapError(f"{self._where}: {key}: expected one value, got {quote(value)}")
+        return value
+
+    def parse_number(self, key: str, default: str | None = None) -> float:
+        """Return the number of a key. Raises MapError if it is missing without a default."""
+        return _parse_number(self.get_text(key, default), f"{self._where}: {key}")
+
+    def parse_mode(self) -> Mode:
+        """Return the mode of a map."""
+        name = self.get_text("mode", "trinary").lower()
+        for mode in get_args(Mode):
+            if name == mode:
+                return cast(Mode, mode)
+        raise MapError(f"{self._where}: mode: expected one of trinary, scale, raw, got {quote(name)}")
+
+    def parse_origin(self) -> tuple[float, float, float]:
+        """Return the pose of the lower left corner: x and y in m, and the yaw in rad."""
+        where = f"{self._where}: origin"
+        origin = self._document.get("origin", ["0", "0", "0"])
+        if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
+            raise MapError(f"{where}: expected [x, y, yaw], got {quote(origin)}")
+        texts = [*origin, "0"][:3]
+        x, y, yaw = (_parse_number(text, f"{where}[{k}]") for k, text in enumerate(texts))
+        files.require_coordinate(x, f"{where}[0]")
+        files.require_coordinate(y, f"{where}[1]")
+        return x, y, yaw
+
+    def parse_negate(self) -> bool:
+        """Return whether light pixels are occupied."""
+        word = self.get_text("negate", "0").lower()
+        if word not in _TRUE_WORDS + _FALSE_WORDS:
+            raise MapError(f"{self._where}: negate: expected 0 or 1, got {quote(word)}")
+        return word in _TRUE_WORDS
+
+    def parse_thresholds(self) -> tuple[float, float]:
+        """Return the thresholds of darkness of occupied and of free cells."""
+        occupied, free = (self.parse_number(key, str(default)) for key, default in DEFAULT_THRESHOLDS.items())
+        if not 0.0 <= free <= occupied <= 1.0:
+            expected = "expected numbers from 0 to 1, the first not the larger"
+            actual = f"got {free:g}, {occupied:g}"
+            raise MapError(f"{self._where}: free_thresh, occupied_thresh: {expected}, {actual}")
+        return occupied, free
+
+
+def _parse_number(text: files.Value, where: str) -> float:
+    """Return a finite number. Raises MapError if a value is not one."""
+    value = files.parse_number(text) if isinstance(text, str) else math.nan
+    if not math.isfinite(value):
+        raise MapError(f"{where}: expected a number, got {quote(text)}")
+    return value
