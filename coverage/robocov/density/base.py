@@ -7,14 +7,14 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density.cell_edges import CellEdges
+from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, CellEdges
 from robocov.errors import ParameterError, quote
 
 MAX_WEIGHT = 1e6
-"""Largest value of a weight."""
+"""Maximum value of a weight."""
 
 _MIN_MEAN_DENSITY = 1e-9
-"""Mean density of a cell, as a fraction of the largest density, below which it counts as empty."""
+"""Smallest mean density with which a centroid is computed, as a fraction of the largest density."""
 
 
 class Density(ABC):
@@ -79,8 +79,9 @@ class Density(ABC):
             See `compute_moments`.
         area : (n,) array, m²
         centroid : (n, 2) array, m
-            Centroids for density 1. Cells without area or mass keep them. Where the mean density of a cell
-            is below 1e-9 of the maximum, uniform mass is added to make up the difference.
+            Centroids for density 1. Cells without area or mass keep them. If the mean density of a cell is
+            below 1e-9 of the maximum, uniform mass is added to make up the difference, because rounding
+            would otherwise decide where the centroid is.
 
         Returns
         -------
@@ -88,10 +89,10 @@ class Density(ABC):
         centroid : (n, 2) array, m
         """
         moments = self.compute_moments(edges, origins)
-        mass = np.maximum(moments[:, 0], 0.0)
+        mass = np.maximum(moments[:, MASS], 0.0)
         added_mass = np.maximum(_MIN_MEAN_DENSITY * self.max_value * area - mass, 0.0)
         weight = mass + added_mass
-        first_moments = moments[:, 1:3] + added_mass[:, None] * (centroid - origins)
+        first_moments = moments[:, [MOMENT_X, MOMENT_Y]] + added_mass[:, None] * (centroid - origins)
         has_weight = weight > 0.0
         offset = first_moments / np.where(has_weight, weight, 1.0)[:, None]
         return mass, np.where(has_weight[:, None], origins + offset, centroid)
@@ -115,8 +116,9 @@ def require_weight(name: str, value: float, *, above_zero: bool = False) -> None
     """
     is_large_enough = value > 0.0 if above_zero else value >= 0.0
     if not (is_large_enough and value <= MAX_WEIGHT):
-        start = "above" if above_zero else "from"
-        raise ParameterError(f"{name}: expected a number {start} 0 to {MAX_WEIGHT:.0f}, got {quote(value)}")
+        lower_limit = "above" if above_zero else "from"
+        allowed = f"{lower_limit} 0 to {MAX_WEIGHT:.0f}"
+        raise ParameterError(f"{name}: expected a number {allowed}, got {quote(value)}")
 
 
 @dataclass(frozen=True)

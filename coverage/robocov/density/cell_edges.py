@@ -11,6 +11,19 @@ from robocov.compiled import kernel
 REGION = -1
 """Neighbor of an edge of a cell that is part of the region's boundary."""
 
+MASS = 0
+"""Column of the moments of cells: the integral of φ, m²."""
+MOMENT_X = 1
+"""Column of the moments of cells: the integral of φ x, m³."""
+MOMENT_Y = 2
+"""Column of the moments of cells: the integral of φ y, m³."""
+POLAR_MOMENT = 3
+"""Column of the moments of cells: the integral of φ (x² + y²), m⁴."""
+
+_MIN_RELATIVE_LENGTH = 1e-12
+"""Length of an edge, relative to the distances of its ends from the generator, up to which it may be a
+rounding error."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellEdges:
@@ -51,12 +64,12 @@ class CellEdges:
         stops = np.cumsum(np.bincount(cell, minlength=len(generators))).tolist()
         return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
 
-    def compute_moments(self, count: int) -> Array:
+    def compute_moments(self, cell_count: int) -> Array:
         """Compute the moments of cells about their generators, for density 1.
 
         Parameters
         ----------
-        count : int
+        cell_count : int
             Number of cells n.
 
         Returns
@@ -64,7 +77,7 @@ class CellEdges:
         (n, 4) array, m², m³, m³ and m⁴
             Area, first moments in x and y, and polar moment.
         """
-        return _sum_moments(self.start, self.end, self.cell, count)
+        return _sum_moments(self.start, self.end, self.cell, cell_count)
 
     def list_adjacent_pairs(self) -> IntArray:
         """List the pairs of cells that share an edge.
@@ -77,22 +90,24 @@ class CellEdges:
         is_shared = (self.beyond != REGION) & self._has_length()
         first_cell = self.cell[is_shared]
         second_cell = self.beyond[is_shared]
-        count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
+        cell_count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
         # Each pair becomes one number: sorting pairs takes several times as long.
-        numbers = np.unique(np.minimum(first_cell, second_cell) * count + np.maximum(first_cell, second_cell))
-        return np.column_stack(np.divmod(numbers, count)).astype(np.intp, copy=False)
+        low = np.minimum(first_cell, second_cell)
+        high = np.maximum(first_cell, second_cell)
+        numbers = np.unique(low * cell_count + high)
+        return np.column_stack(np.divmod(numbers, cell_count)).astype(np.intp, copy=False)
 
     def _has_length(self) -> BoolArray:
-        """Return a mask of the edges whose length exceeds the rounding error of their coordinates."""
+        """Return whether each edge is longer than the rounding error of its coordinates, (s,)."""
         length = compute_lengths(self.end - self.start)
         distance = compute_lengths(self.start) + compute_lengths(self.end)
-        return np.asarray(length > 1e-12 * distance)
+        return np.asarray(length > _MIN_RELATIVE_LENGTH * distance)
 
 
 @kernel
-def _sum_moments(start: Array, end: Array, cell: IntArray, count: int) -> Array:
+def _sum_moments(start: Array, end: Array, cell: IntArray, cell_count: int) -> Array:
     """Return the sums of the moments of the triangles that the edges span with the generators."""
-    sums = np.zeros((count, 4))
+    sums = np.zeros((cell_count, 4))
     for k in range(len(cell)):
         x = start[k, 0]
         y = start[k, 1]
@@ -100,8 +115,8 @@ def _sum_moments(start: Array, end: Array, cell: IntArray, count: int) -> Array:
         v = end[k, 1]
         c = cell[k]
         cross = x * v - u * y
-        sums[c, 0] += cross / 2.0
-        sums[c, 1] += cross * (x + u) / 6.0
-        sums[c, 2] += cross * (y + v) / 6.0
-        sums[c, 3] += cross * (x * (x + u) + u * u + y * (y + v) + v * v) / 12.0
+        sums[c, MASS] += cross / 2.0
+        sums[c, MOMENT_X] += cross * (x + u) / 6.0
+        sums[c, MOMENT_Y] += cross * (y + v) / 6.0
+        sums[c, POLAR_MOMENT] += cross * (x * (x + u) + u * u + y * (y + v) + v * v) / 12.0
     return sums

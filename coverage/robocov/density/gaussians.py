@@ -6,8 +6,8 @@ normal n, between s₁ and s₂ along its direction t. As div[(1 - g) q / |q|²]
     ∫ d (1 - g) / (d² + s²) ds = [atan(s/d) - 2π T(d, s/d)] from s₁ to s₂
 
 where T is Owen's function (Owen 1956). From q g = -grad g, it adds -n E₀ to the first moment, where
-E₀ = ∫ g ds. From ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds -(d n + s t) nᵀ g, integrated along the edge, to the
-second moments minus the mass. Any other Gaussian is an affine map of this one.
+E₀ = ∫ g ds. From ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds -∫ (d n + s t) nᵀ g ds = -(d E₀ n + E₁ t) nᵀ to the
+second moments minus the mass, where E₁ = ∫ s g ds. Any other Gaussian is an affine map of this one.
 """
 
 import math
@@ -25,7 +25,7 @@ Matrix: TypeAlias = tuple[Point, Point]
 """A 2 x 2 matrix, row by row."""
 
 _MIN_RELATIVE_DETERMINANT = 1e-9
-"""Determinant of a covariance, relative to the product of its diagonal, below which it counts as singular."""
+"""Determinant, relative to the product of the diagonal, up to which a covariance is nearly singular."""
 
 
 class _Factor(NamedTuple):
@@ -36,10 +36,10 @@ class _Factor(NamedTuple):
     yx: float
 
 
-class _EdgeIntegrals(NamedTuple):
-    """Contributions of edges to integrals of the standard Gaussian, (s,) each.
+class _StandardMoments(NamedTuple):
+    """Moments of the standard Gaussian over cells, or contributions of edges to them, one array each.
 
-    The second moments are stored as their differences from the mass, and xy as its negative.
+    The second moments are stored as what they lack: the mass minus the moments xx and yy, and minus xy.
     """
 
     mass: Array
@@ -131,20 +131,20 @@ class Gaussian:
         end = self._standardize(edges.end + edge_offset)
         scale = self.weight * factor.xx * factor.yy
         sums: list[Array] = [
-            np.asarray(np.bincount(edges.cell, integral, minlength=len(origins)) * scale)
-            for integral in _integrate_along_edges(start, end)
+            np.asarray(np.bincount(edges.cell, contribution, minlength=len(origins)) * scale)
+            for contribution in _integrate_along_edges(start, end)
         ]
-        cells = _EdgeIntegrals(*sums)
+        standard = _StandardMoments(*sums)
         # From the standard coordinates to moments about the center of the Gaussian.
-        mass = cells.mass
-        x = factor.xx * cells.x
-        y = factor.yx * cells.x + factor.yy * cells.y
+        mass = standard.mass
+        x = factor.xx * standard.x
+        y = factor.yx * standard.x + factor.yy * standard.y
         polar = (
-            (factor.xx * factor.xx + factor.yx * factor.yx) * (mass - cells.missing_xx)
-            - 2.0 * factor.yy * factor.yx * cells.missing_xy
-            + factor.yy * factor.yy * (mass - cells.missing_yy)
+            (factor.xx * factor.xx + factor.yx * factor.yx) * (mass - standard.missing_xx)
+            - 2.0 * factor.yy * factor.yx * standard.missing_xy
+            + factor.yy * factor.yy * (mass - standard.missing_yy)
         )
-        # From there to moments about the origins.
+        # From the center to moments about the origins of the cells.
         offset_x = offset[:, 0]
         offset_y = offset[:, 1]
         squared_offset = (offset * offset).sum(axis=1)
@@ -242,8 +242,8 @@ class Gaussians(Density):
         return total
 
 
-def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
-    """Integrate the standard Gaussian along edges, whose ends are (s, 2)."""
+def _integrate_along_edges(start: Array, end: Array) -> _StandardMoments:
+    """Return the contributions of edges between (s, 2) points, in the symbols of the module docstring."""
     # SciPy is imported only here, because loading a map does not need it.
     from scipy.special import erf, owens_t
 
@@ -262,29 +262,31 @@ def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
         ratio1 = s1 / divisor
         ratio2 = s2 / divisor
     mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
-    # At distance 0 the two terms cancel.
+    # An edge whose line passes through the center adds nothing.
     mass[~has_distance] = 0.0
     # Far from the center, squares may overflow; the exponential is then still zero, as it should be.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))
-    de0 = d * e0
-    integrals = _EdgeIntegrals(
+    contributions = _StandardMoments(
         mass=mass,
         x=-normal_x * e0,
         y=-normal_y * e0,
-        missing_xx=normal_x * (normal_x * de0 + tangent_x * e1),
-        missing_xy=normal_y * (normal_x * de0 + tangent_x * e1),
-        missing_yy=normal_y * (normal_y * de0 + tangent_y * e1),
+        missing_xx=normal_x * (normal_x * (d * e0) + tangent_x * e1),
+        missing_xy=normal_y * (normal_x * (d * e0) + tangent_x * e1),
+        missing_yy=normal_y * (normal_y * (d * e0) + tangent_y * e1),
     )
-    for integral in integrals:
-        integral[~has_length] = 0.0
-    return integrals
+    for contribution in contributions:
+        contribution[~has_length] = 0.0
+    return contributions
 
 
 def _is_positive_definite(matrix: Matrix) -> bool:
     """Return whether a matrix is symmetric, positive definite, and not nearly singular."""
     (a, b), (c, d) = matrix
     is_symmetric = b == c
-    has_positive_diagonal = a > 0.0 and d > 0.0 and a + d < math.inf
-    return is_symmetric and has_positive_diagonal and a * d - b * c > _MIN_RELATIVE_DETERMINANT * a * d
+    is_finite = a + d < math.inf
+    has_positive_diagonal = a > 0.0 and d > 0.0
+    determinant = a * d - b * c
+    is_regular = determinant > _MIN_RELATIVE_DETERMINANT * a * d
+    return is_symmetric and is_finite and has_positive_diagonal and is_regular

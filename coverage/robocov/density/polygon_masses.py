@@ -7,10 +7,10 @@ import shapely
 
 from robocov.arrays import Array, IntArray
 from robocov.density.base import Density
-from robocov.density.cell_edges import REGION, CellEdges
+from robocov.density.cell_edges import MASS, REGION, CellEdges
 
 _SQUARES_PER_BATCH = 1 << 16
-"""Number of squares that are integrated at once, to limit memory use."""
+"""Number of squares that are integrated at the same time, which limits the memory."""
 
 
 def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
@@ -20,7 +20,7 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     ----------
     density : Density
     polygons : sequence of k shapely polygons, m
-        Valid polygons. Their holes do not count.
+        Valid polygons. Their holes are left out.
 
     Returns
     -------
@@ -33,15 +33,15 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     array([6.])
     """
     polygons = shapely.orient_polygons(polygons)
-    rings, ring_owners = shapely.get_rings(polygons, return_index=True)
+    rings, polygon_of_ring = shapely.get_rings(polygons, return_index=True)
     origins = shapely.get_coordinates(shapely.centroid(polygons))
     points, ring_of_point = shapely.get_coordinates(rings, return_index=True)
-    owners = ring_owners[ring_of_point]
-    points -= origins[owners]
+    polygon_of_point = polygon_of_ring[ring_of_point]
+    points -= origins[polygon_of_point]
     # No edge leads from the last point of a ring to the first point of the next one.
     is_edge = ring_of_point[1:] == ring_of_point[:-1]
-    edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], owners[:-1][is_edge])
-    return np.maximum(density.compute_moments(edges, origins)[:, 0], 0.0)
+    edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], polygon_of_point[:-1][is_edge])
+    return np.maximum(density.compute_moments(edges, origins)[:, MASS], 0.0)
 
 
 def compute_square_means(density: Density, centers: Array, side: float) -> Array:
@@ -66,7 +66,7 @@ def compute_square_means(density: Density, centers: Array, side: float) -> Array
         start = np.tile(corners, (len(batch), 1))
         end = np.tile(next_corners, (len(batch), 1))
         edges = _build_edges(start, end, np.repeat(np.arange(len(batch)), 4))
-        masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, 0]
+        masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, MASS]
     # Rounding must not produce values outside the range of the density, such as negative ones.
     return np.clip(masses / (side * side), density.min_value, density.max_value)
 

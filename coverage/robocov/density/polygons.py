@@ -22,8 +22,17 @@ import shapely
 from robocov.arrays import Array, IntArray, Ring
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import Density, require_weight
-from robocov.density.cell_edges import CellEdges
+from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
 from robocov.errors import ParameterError
+
+_LOW_X = 0
+_LOW_Y = 1
+_HIGH_X = 2
+_HIGH_Y = 3
+"""Columns of a jump: its lower and its upper end, m."""
+_STEP = 4
+"""Column of a jump: φ to the right of it minus φ to the left."""
+_JUMP_COLUMNS = 5
 
 _GAUSS_NODE = 0.5 - 0.5 / 3.0**0.5
 """First node of Gauss's rule with two points on [0, 1], which is exact for cubic polynomials."""
@@ -70,7 +79,7 @@ class WeightedPolygons(Density):
     Parameters
     ----------
     areas : tuple of WeightedArea
-        Where areas overlap, the last one counts.
+        Where areas overlap, the weight is that of the last one.
     background : float
         Density outside all areas, at least 0.
 
@@ -111,8 +120,11 @@ class WeightedPolygons(Density):
 
     @cached_property
     def _jumps(self) -> Array:
-        """Edges across which φ jumps, (e, 5): lower end, upper end (m), and φ right minus φ left of it."""
-        jumps = [np.empty((0, 5))]
+        """The lines across which φ jumps, (j, 5): edges of the areas that are not level.
+
+        For the columns, see the constants at the top of the module.
+        """
+        jumps = [np.empty((0, _JUMP_COLUMNS))]
         covered = shapely.MultiPolygon()
         # The last area is on top.
         for area in reversed(self.areas):
@@ -122,9 +134,10 @@ class WeightedPolygons(Density):
             for ring in shapely.get_rings(shapely.orient_polygons(shapely.get_parts(visible))):
                 points = shapely.get_coordinates(ring)
                 jumps.append(_build_jumps(points, area.weight - self.background))
-        edges = np.concatenate(jumps)
-        is_level = edges[:, 1] >= edges[:, 3]
-        return np.asarray(edges[~is_level & (edges[:, 4] != 0.0)])
+        all_jumps = np.concatenate(jumps)
+        is_level = all_jumps[:, _LOW_Y] >= all_jumps[:, _HIGH_Y]
+        has_step = all_jumps[:, _STEP] != 0.0
+        return np.asarray(all_jumps[~is_level & has_step])
 
     def evaluate(self, points: Array) -> Array:
         """Evaluate the weight of the last area that contains each point, or the background.
@@ -161,19 +174,28 @@ class WeightedPolygons(Density):
 
 
 def _build_jumps(points: Array, step: float) -> Array:
-    """Return the edges of a closed, counter-clockwise ring inside which φ is larger by `step`."""
+    """Return the jumps along a closed, counter-clockwise ring inside which φ is larger by `step`."""
     start = points[:-1]
     end = points[1:]
-    falls = start[:, 1:] > end[:, 1:]
-    low = np.where(falls, end, start)
-    high = np.where(falls, start, end)
+    is_falling = start[:, 1:] > end[:, 1:]
+    low = np.where(is_falling, end, start)
+    high = np.where(is_falling, start, end)
     # The inside of the polygon lies to the left of an edge that rises.
-    jump = np.where(falls, 1.0, -1.0) * step
-    return np.hstack([low, high, jump])
+    signed_step = np.where(is_falling, 1.0, -1.0) * step
+    return np.hstack([low, high, signed_step])
+
+
+class _Segment(NamedTuple):
+    """An edge or a jump that is not level, from its lower to its upper end, relative to a generator."""
+
+    low_x: float
+    low_y: float
+    high_x: float
+    high_y: float
 
 
 class _Strip(NamedTuple):
-    """The area between a jump, on the left, and an edge, on the right, over the heights that both have."""
+    """The area between a jump, on the left, and an edge, on the right, at the heights that both have."""
 
     bottom: float
     top: float
@@ -194,44 +216,43 @@ def _add_jumps(
     """Add to the moments of cells the integrals between each edge and each jump to its left."""
     for e in range(len(cell)):
         c = cell[e]
-        # From here on the edge runs upwards; the sign is negative if it ran downwards.
-        sign = 1.0
-        x = start[e, 0]
-        y = start[e, 1]
-        u = end[e, 0]
-        v = end[e, 1]
-        if y == v:
-            continue
-        if y > v:
+        # An edge that falls is turned around, and its integrals are subtracted.
+        if start[e, 1] < end[e, 1]:
+            sign = 1.0
+            edge = _Segment(start[e, 0], start[e, 1], end[e, 0], end[e, 1])
+        elif start[e, 1] > end[e, 1]:
             sign = -1.0
-            x = end[e, 0]
-            y = end[e, 1]
-            u = start[e, 0]
-            v = start[e, 1]
+            edge = _Segment(end[e, 0], end[e, 1], start[e, 0], start[e, 1])
+        else:
+            continue
         for f in range(len(jumps)):
-            # Relative to the origin of the cell, as its edges are.
-            low_x = jumps[f, 0] - origins[c, 0]
-            low_y = jumps[f, 1] - origins[c, 1]
-            high_x = jumps[f, 2] - origins[c, 0]
-            high_y = jumps[f, 3] - origins[c, 1]
-            bottom = max(y, low_y)
-            top = min(v, high_y)
-            if bottom >= top or max(x, u) <= min(low_x, high_x):
+            jump = _Segment(
+                jumps[f, _LOW_X] - origins[c, 0],
+                jumps[f, _LOW_Y] - origins[c, 1],
+                jumps[f, _HIGH_X] - origins[c, 0],
+                jumps[f, _HIGH_Y] - origins[c, 1],
+            )
+            bottom = max(edge.low_y, jump.low_y)
+            top = min(edge.high_y, jump.high_y)
+            if bottom >= top or max(edge.low_x, edge.high_x) <= min(jump.low_x, jump.high_x):
                 continue
             strip = _Strip(
-                bottom,
-                top,
-                _find_x(low_x, low_y, high_x, high_y, bottom),
-                _find_x(low_x, low_y, high_x, high_y, top),
-                _find_x(x, y, u, v, bottom),
-                _find_x(x, y, u, v, top),
+                bottom=bottom,
+                top=top,
+                left_bottom=_find_x(jump, bottom),
+                left_top=_find_x(jump, top),
+                right_bottom=_find_x(edge, bottom),
+                right_top=_find_x(edge, top),
             )
-            _add_strip(moments, c, strip, sign * jumps[f, 4])
+            _add_strip(moments, c, strip, sign * jumps[f, _STEP])
 
 
 @inlined_kernel
-def _add_strip(moments: Array, c: int, strip: _Strip, jump: float) -> None:
-    """Add a strip to the moments of cell c. The part where the jump is right of the edge is left out."""
+def _add_strip(moments: Array, c: int, strip: _Strip, weight: float) -> None:
+    """Add a strip, times a weight, to the moments of cell c.
+
+    The part where the jump is to the right of the edge is left out.
+    """
     width_bottom = strip.right_bottom - strip.left_bottom
     width_top = strip.right_top - strip.left_top
     if width_bottom > 0.0 or width_top > 0.0:
@@ -243,22 +264,23 @@ def _add_strip(moments: Array, c: int, strip: _Strip, jump: float) -> None:
         if width_top < 0.0:
             last = width_bottom / (width_bottom - width_top)
         fraction = last - first
-        weight = 0.5 * fraction * (strip.top - strip.bottom) * jump
+        node_weight = 0.5 * fraction * (strip.top - strip.bottom) * weight
         for node in (_GAUSS_NODE, 1.0 - _GAUSS_NODE):
             t = first + fraction * node
             right = strip.right_bottom + t * (strip.right_top - strip.right_bottom)
             left = strip.left_bottom + t * (strip.left_top - strip.left_bottom)
-            width = weight * (right - left)
+            mass = node_weight * (right - left)
             height = strip.bottom + t * (strip.top - strip.bottom)
             mean_square = (right * right + right * left + left * left) / 3.0
-            moments[c, 0] += width
-            moments[c, 1] += 0.5 * width * (right + left)
-            moments[c, 2] += height * width
-            moments[c, 3] += width * (mean_square + height * height)
+            moments[c, MASS] += mass
+            moments[c, MOMENT_X] += 0.5 * mass * (right + left)
+            moments[c, MOMENT_Y] += height * mass
+            moments[c, POLAR_MOMENT] += mass * (mean_square + height * height)
 
 
 @kernel
-def _find_x(x: float, y: float, u: float, v: float, height: float) -> float:
-    """Return the x coordinate at a height on the edge from (x, y) to (u, v)."""
-    fraction = min(max((height - y) / (v - y), 0.0), 1.0)
-    return x + fraction * (u - x)
+def _find_x(segment: _Segment, height: float) -> float:
+    """Return the x coordinate of a segment at a height."""
+    fraction = (height - segment.low_y) / (segment.high_y - segment.low_y)
+    fraction = min(max(fraction, 0.0), 1.0)
+    return segment.low_x + fraction * (segment.high_x - segment.low_x)

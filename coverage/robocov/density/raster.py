@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array, IntArray, freeze
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import MAX_WEIGHT, Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
@@ -23,6 +23,13 @@ MAX_RASTER_SIZE = 1024
 
 Interpolation: TypeAlias = Literal["cells", "bilinear"]
 """Whether a raster is constant in each of its pixels, or linear between their centers in both directions."""
+
+_MAX_CACHED_GRIDS = 4
+"""A grid takes ten times the memory of its image. While a user paints a raster, a new one is built for each
+change, but only the last few are still in use."""
+
+_ONE, _U, _V, _UU, _VV = range(5)
+"""Columns of the integrals of φ times 1, u, v, u² and v² over cells."""
 
 _GAUSS_NODE = 0.5 * 0.6**0.5
 """Distance of the outer nodes of Gauss's rule with three points on [0, 1] from the middle one."""
@@ -147,8 +154,7 @@ class Raster(Density):
         offsets = origins - grid.origin
         edge_offsets = offsets[edges.cell]
         integrals = _integrate_cells(
-            grid.coefficients,
-            grid.left,
+            grid,
             (edges.start + edge_offsets) / grid.step,
             (edges.end + edge_offsets) / grid.step,
             edges.cell,
@@ -156,17 +162,15 @@ class Raster(Density):
         )
         # From steps of the grid to meters.
         step_x, step_y = grid.step
-        mass, x, y, xx, yy = (integrals * (step_x * step_y)).T
-        x = x * step_x
-        y = y * step_y
+        integrals = integrals * (step_x * step_y)
+        mass = integrals[:, _ONE]
+        x = integrals[:, _U] * step_x
+        y = integrals[:, _V] * step_y
+        xx = integrals[:, _UU] * (step_x * step_x)
+        yy = integrals[:, _VV] * (step_y * step_y)
         # From moments about the origin of the grid to moments about the given ones.
         offset_x, offset_y = offsets.T
-        polar = (
-            xx * (step_x * step_x)
-            - offset_x * (2.0 * x - offset_x * mass)
-            + yy * (step_y * step_y)
-            - offset_y * (2.0 * y - offset_y * mass)
-        )
+        polar = xx - offset_x * (2.0 * x - offset_x * mass) + yy - offset_y * (2.0 * y - offset_y * mass)
         return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
 
 
@@ -195,9 +199,9 @@ def sample_density(density: Density | None, extent: Iterable[float], columns: in
 class _Grid(NamedTuple):
     """A density that is bilinear in each square of a grid, and integrals of it.
 
-    Lengths are measured in steps of the grid, from its lower left corner. In the square of column i and row
-    j the density is ``a + b ξ + c η + d ξ η``, with ξ and η from 0 to 1. The outermost squares extend to
-    infinity; b, c and d are such that nothing changes outwards.
+    u and v are coordinates in steps of the grid, from its lower left corner. In the square of column i and
+    row j, the density is ``a + b ξ + c η + d ξ η``, with ξ = u - i and η = v - j from 0 to 1. The outermost
+    squares extend to infinity; b, c and d are such that the density is constant outwards.
 
     Attributes
     ----------
@@ -215,27 +219,37 @@ class _Grid(NamedTuple):
     left: Array
 
 
-# A grid takes ten times the memory of its image. While a user paints a raster, a new one is built for each
-# change, but only the last few are still in use.
-@lru_cache(maxsize=4)
+class _Edge(NamedTuple):
+    """An edge of a cell, from (u, v) to (u + du, v + dv) in grid steps."""
+
+    u: float
+    v: float
+    du: float
+    dv: float
+
+
+@lru_cache(maxsize=_MAX_CACHED_GRIDS)
 def _build_grid(raster: Raster) -> _Grid:
+    """Build the grid of a raster. Its squares are the pixels, or lie between the centers of four pixels."""
     values = raster.values
     origin = np.array(raster.extent[:2])
     step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]
     if raster.interpolation == "bilinear":
-        # Squares reach from one pixel center to the next; the border is repeated outside.
+        # Beyond the image, the pixels of its border are repeated.
         padded = np.pad(values, 1, mode="edge")
         lower_left = padded[:-1, :-1]
-        right = padded[:-1, 1:]
-        above = padded[1:, :-1]
-        diagonal = padded[1:, 1:]
-        coefficients = np.stack(
-            [lower_left, right - lower_left, above - lower_left, diagonal - right - above + lower_left]
-        )
+        lower_right = padded[:-1, 1:]
+        upper_left = padded[1:, :-1]
+        upper_right = padded[1:, 1:]
+        constant = lower_left
+        slope_x = lower_right - lower_left
+        slope_y = upper_left - lower_left
+        twist = upper_right - lower_right - upper_left + lower_left
         origin = origin - 0.5 * step
     else:
-        zero = np.zeros_like(values)
-        coefficients = np.stack([values, zero, zero, zero])
+        constant = values
+        slope_x = slope_y = twist = np.zeros_like(values)
+    coefficients = np.stack([constant, slope_x, slope_y, twist])
     return _Grid(origin, step, coefficients, _integrate_rows(coefficients))
 
 
@@ -243,6 +257,7 @@ def _integrate_rows(coefficients: Array) -> Array:
     """Return the integrals along rows to the left of each square; see `_Grid.left`."""
     a, b, c, d = coefficients
     i = np.arange(a.shape[1])
+    # φ along a row is constant + slope ξ. The first entry of each is that at η = 0, the second its increase.
     constant = np.stack([a, c])
     slope = np.stack([b, d])
     # Integrals over ξ from 0 to 1 of φ, ξ φ and ξ² φ.
@@ -256,76 +271,84 @@ def _integrate_rows(coefficients: Array) -> Array:
 
 
 @kernel
-def _integrate_cells(
-    coefficients: Array, left: Array, start: Array, end: Array, cell: IntArray, count: int
-) -> Array:
-    """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges.
+def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell_count: int) -> Array:
+    """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges in grid steps.
 
-    All lengths are in grid steps, and `left` is that of `_Grid`. With P(x, y) the integral of φ along the row
-    from the left side of the image to x, the integral of φ over a polygon is that of P dy along its edges. P
-    is a prefix sum over squares and a polynomial within a square. Each edge is therefore split where it
-    crosses into another square, and Gauss's rule is exact on each part.
+    With P(u, v) the integral of φ at height v from the left side of the image to u, the integral of φ over a
+    polygon is that of P dv along its edges. P is a prefix sum over squares and a polynomial within a square.
+    Each edge is therefore split where it crosses into another square, and Gauss's rule is exact on each part.
     """
-    rows = coefficients.shape[1]
-    columns = coefficients.shape[2]
-    sums = np.zeros((count, 5))
+    _, rows, columns = grid.coefficients.shape
+    sums = np.zeros((cell_count, 5))
     for e in range(len(cell)):
-        c = cell[e]
-        u0 = start[e, 0]
-        v0 = start[e, 1]
-        du = end[e, 0] - u0
-        dv = end[e, 1] - v0
-        line_u = _find_first_line(u0, du, columns)
-        line_v = _find_first_line(v0, dv, rows)
-        # Horizontal edges contribute nothing.
-        t = 0.0 if dv != 0.0 else 1.0
+        edge = _Edge(start[e, 0], start[e, 1], end[e, 0] - start[e, 0], end[e, 1] - start[e, 1])
+        if edge.dv == 0.0:
+            # Along a horizontal edge, P dv is zero.
+            continue
+        line_u = _find_first_line(edge.u, edge.du, columns)
+        line_v = _find_first_line(edge.v, edge.dv, rows)
+        t = 0.0
         while t < 1.0:
-            next_u = _find_crossing(line_u, u0, du, columns)
-            next_v = _find_crossing(line_v, v0, dv, rows)
+            next_u = _find_crossing(line_u, edge.u, edge.du, columns)
+            next_v = _find_crossing(line_v, edge.v, edge.dv, rows)
             stop = max(min(next_u, next_v, 1.0), t)
             if next_u <= stop:
-                line_u += 1 if du > 0.0 else -1
+                line_u += 1 if edge.du > 0.0 else -1
             if next_v <= stop:
-                line_v += 1 if dv > 0.0 else -1
-            middle = 0.5 * (t + stop)
-            i = min(max(int(np.floor(u0 + middle * du)), 0), columns - 1)
-            j = min(max(int(np.floor(v0 + middle * dv)), 0), rows - 1)
-            for node in range(3):
-                node_t = t + (0.5 + _GAUSS_NODE * (node - 1)) * (stop - t)
-                node_weight = 8.0 if node == 1 else 5.0
-                weight = node_weight / 18.0 * (stop - t) * dv
-                v = v0 + node_t * dv
-                xi = u0 + node_t * du - i
-                eta = v - j
-                # Along the row, φ is p + q ξ.
-                p = coefficients[0, j, i] + coefficients[2, j, i] * eta
-                q = coefficients[1, j, i] + coefficients[3, j, i] * eta
-                zeroth = xi * (p + xi * q / 2.0)
-                first = xi * xi * (p / 2.0 + xi * q / 3.0)
-                second = xi * xi * xi * (p / 3.0 + xi * q / 4.0)
-                along_0 = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
-                along_1 = left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first
-                along_2 = left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
-                sums[c, 0] += weight * along_0
-                sums[c, 1] += weight * along_1
-                sums[c, 2] += weight * v * along_0
-                sums[c, 3] += weight * along_2
-                sums[c, 4] += weight * v * v * along_0
+                line_v += 1 if edge.dv > 0.0 else -1
+            _add_part(sums, cell[e], grid, edge, t, stop)
             t = stop
     return sums
 
 
+@inlined_kernel
+def _add_part(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, stop: float) -> None:
+    """Add a part of an edge, from t = start to t = stop, to the sums of cell k; it lies in one square."""
+    coefficients = grid.coefficients
+    left = grid.left
+    _, rows, columns = coefficients.shape
+    middle = 0.5 * (start + stop)
+    i = min(max(int(np.floor(edge.u + middle * edge.du)), 0), columns - 1)
+    j = min(max(int(np.floor(edge.v + middle * edge.dv)), 0), rows - 1)
+    a = coefficients[0, j, i]
+    b = coefficients[1, j, i]
+    c = coefficients[2, j, i]
+    d = coefficients[3, j, i]
+    for node in range(3):
+        t = start + (0.5 + _GAUSS_NODE * (node - 1)) * (stop - start)
+        node_weight = 8.0 if node == 1 else 5.0
+        weight = node_weight / 18.0 * (stop - start) * edge.dv
+        v = edge.v + t * edge.dv
+        xi = edge.u + t * edge.du - i
+        eta = v - j
+        # Along the row, φ is p + q ξ. Its integrals times 1, ξ and ξ² start at the left side of the square.
+        p = a + c * eta
+        q = b + d * eta
+        zeroth = xi * (p + xi * q / 2.0)
+        first = xi * xi * (p / 2.0 + xi * q / 3.0)
+        second = xi * xi * xi * (p / 3.0 + xi * q / 4.0)
+        # The integrals of φ times 1, u and u² start at the left side of the image.
+        row_0 = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
+        row_1 = left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first
+        row_2 = left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
+        sums[k, _ONE] += weight * row_0
+        sums[k, _U] += weight * row_1
+        sums[k, _V] += weight * v * row_0
+        sums[k, _UU] += weight * row_2
+        sums[k, _VV] += weight * v * v * row_0
+
+
 @kernel
-def _find_first_line(start: float, step: float, lines: int) -> int:
+def _find_first_line(start: float, step: float, line_count: int) -> int:
     """Return the first inner grid line that is crossed from coordinate `start` in the direction of `step`."""
     if step > 0.0:
         return int(max(np.floor(start) + 1.0, 1.0))
-    return int(min(np.ceil(start), lines + 0.0) - 1.0)
+    return int(min(np.ceil(start), float(line_count)) - 1.0)
 
 
 @kernel
-def _find_crossing(line: int, start: float, step: float, lines: int) -> float:
-    """Return the fraction of an edge at which it crosses a grid line; infinite if the line is not inside."""
-    if 0 < line < lines and step != 0.0:
+def _find_crossing(line: int, start: float, step: float, line_count: int) -> float:
+    """Return the fraction of an edge at which it crosses a grid line; infinite for other than inner lines."""
+    if 0 < line < line_count and step != 0.0:
         return (line - start) / step
     return np.inf

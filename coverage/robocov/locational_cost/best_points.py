@@ -32,16 +32,16 @@ _MAX_ITERATIONS = 80
 """Most cells need 4; a very thin cell below a low sensor needs a few dozen."""
 _MAX_WEIGHTED_ITERATIONS = 30
 _LAST_STEP = 1e-7
-"""Length of a step, relative to the size of the cell, at which the search ends."""
+"""Length of a step, relative to half the perimeter of the cell, at which the search ends."""
 _LAST_WEIGHTED_STEP = 1e-6
 _NO_STEP = 1e-15
-"""Length of a step, relative to the size of the cell, that changes nothing."""
+"""Length of a step, relative to half the perimeter of the cell, that changes nothing."""
 _MIN_CURVATURE = 1e-14
 """Curvature, relative to the largest one, up to which it may be a rounding error."""
 _MIN_AREA = 1e-9
-"""Area of a cell, relative to the square of its size, up to which it may be a rounding error."""
+"""Area of a cell, relative to the square of half its perimeter, up to which it may be a rounding error."""
 _MIN_WEIGHTED_CLEARANCE = 1e-9
-"""Clearance of a centroid, relative to the size of the cell, in a cell that counts as convex."""
+"""Clearance of a centroid, relative to half the perimeter, up to which a cell is not treated as convex."""
 _MIN_MEAN_DENSITY = 1e-12
 """Mean density of a cell, relative to the largest density, below which the cell keeps its centroid."""
 _MAX_RISE = 0.5
@@ -49,6 +49,9 @@ _MAX_RISE = 0.5
 _MIN_SHORTENING = 0.1
 _MAX_SHORTENING = 0.5
 """Range of the factor by which a step that is not accepted is shortened."""
+_MIN_SLOPE_CHANGE = 1e-300
+_MIN_LENGTH_M = 1e-300
+"""Values that replace smaller ones in divisions, so that nothing is divided by zero."""
 
 
 class _Search(NamedTuple):
@@ -157,7 +160,7 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
     centroid = cells.centroid - cells.generators
     shape = compute_derivatives(cells.edges, centroid, SquaredDistance())
     if density is None or density.is_uniform:
-        is_active = (shape.clearance > 0.0) | (shape.area > _MIN_AREA * np.square(shape.size))
+        is_active = (shape.clearance > 0.0) | (shape.area > _MIN_AREA * np.square(shape.half_perimeter))
         search = _start_search(centroid, is_active)
         for _ in range(_MAX_ITERATIONS + 1):
             if not search.is_active.any():
@@ -165,7 +168,7 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
             derivatives = compute_derivatives(cells.edges, search.trials, f)
             _advance(search, derivatives, f.sign, _LAST_STEP)
         return cells.generators + search.points
-    is_convex = shape.clearance > _MIN_WEIGHTED_CLEARANCE * shape.size
+    is_convex = shape.clearance > _MIN_WEIGHTED_CLEARANCE * shape.half_perimeter
     has_mass = cells.mass > _MIN_MEAN_DENSITY * density.max_value * shape.area
     search = _start_search(centroid, is_convex & has_mass)
     for _ in range(_MAX_WEIGHTED_ITERATIONS + 1):
@@ -173,7 +176,7 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
             break
         derivatives = compute_derivatives(cells.edges, search.trials, f)
         weighted = compute_weighted_derivatives(
-            cells, density, f, shape.size, search.trials, search.is_active
+            cells, density, f, shape.half_perimeter, search.trials, search.is_active
         )
         derivatives = derivatives._replace(**weighted._asdict())
         _advance(search, derivatives, 1.0, _LAST_WEIGHTED_STEP)
@@ -199,57 +202,73 @@ def _start_search(points: Array, is_active: BoolArray) -> _Search:
 def _advance(search: _Search, derivatives: CellDerivatives, sign: float, last_step: float) -> None:
     """Accept the trial points, or shorten the steps to them, and choose the next ones.
 
-    `derivatives` are those at the trial points. A step that is shorter than `last_step`, relative to the
-    size of the cell, ends the search.
+    `derivatives` are those at the trial points. A step that is shorter than `last_step`, relative to half the
+    perimeter of the cell, ends the search.
     """
     for i in range(len(search.points)):
         if not search.is_active[i]:
             continue
-        gradient_x = sign * derivatives.x[i]
-        gradient_y = sign * derivatives.y[i]
         clearance = derivatives.clearance[i]
-        size = derivatives.size[i]
         is_first = np.isnan(search.fraction[i])
-        if (is_first and clearance <= 0.0) or search.clearance[i] == np.inf:
-            # A cell that is not convex does not confine the search.
+        # A cell that is not convex does not confine the search.
+        is_unconfined = search.clearance[i] == np.inf or (is_first and clearance <= 0.0)
+        if is_unconfined:
             clearance = np.inf
-        slope = gradient_x * search.step_x[i] + gradient_y * search.step_y[i]
-        if is_first or (clearance >= 0.0 and slope <= -_MAX_RISE * search.slope[i]):
-            search.points[i, 0] = search.trials[i, 0]
-            search.points[i, 1] = search.trials[i, 1]
-            xx = sign * derivatives.xx[i]
-            xy = sign * derivatives.xy[i]
-            yy = sign * derivatives.yy[i]
-            step_x, step_y = _compute_newton_step(gradient_x, gradient_y, xx, xy, yy, size)
-            search.clearance[i] = clearance
-            search.step_x[i] = step_x
-            search.step_y[i] = step_y
-            search.slope[i] = gradient_x * step_x + gradient_y * step_y
-            search.fraction[i] = 1.0
+        slope = sign * (derivatives.x[i] * search.step_x[i] + derivatives.y[i] * search.step_y[i])
+        # The slope at the start of the step is negative.
+        max_slope = -_MAX_RISE * search.slope[i]
+        if is_first or (clearance >= 0.0 and slope <= max_slope):
+            _accept_trial(search, derivatives, i, sign, clearance)
         elif clearance >= 0.0:
             # Shorten the step to where the slope would be zero if it changed linearly, within limits.
-            zero_slope = search.slope[i] / min(search.slope[i] - slope, -1e-300)
+            zero_slope = search.slope[i] / min(search.slope[i] - slope, -_MIN_SLOPE_CHANGE)
             search.fraction[i] *= min(max(zero_slope, _MIN_SHORTENING), _MAX_SHORTENING)
         else:
             search.fraction[i] *= _MAX_SHORTENING
-        x = search.fraction[i] * search.step_x[i]
-        y = search.fraction[i] * search.step_y[i]
-        length = np.sqrt(x * x + y * y)
-        search.trials[i, 0] = search.points[i, 0] + x
-        search.trials[i, 1] = search.points[i, 1] + y
-        if length <= min(last_step * size, search.clearance[i]):
-            search.points[i, 0] = search.trials[i, 0]
-            search.points[i, 1] = search.trials[i, 1]
-            search.is_active[i] = False
-        elif not length > _NO_STEP * size:
-            search.is_active[i] = False
+        _choose_next_trial(search, i, derivatives.half_perimeter[i], last_step)
+
+
+@kernel
+def _accept_trial(
+    search: _Search, derivatives: CellDerivatives, i: int, sign: float, clearance: float
+) -> None:
+    """Move the best point of cell i to the trial point, and compute the full step from there."""
+    search.points[i, 0] = search.trials[i, 0]
+    search.points[i, 1] = search.trials[i, 1]
+    gradient_x = sign * derivatives.x[i]
+    gradient_y = sign * derivatives.y[i]
+    xx = sign * derivatives.xx[i]
+    xy = sign * derivatives.xy[i]
+    yy = sign * derivatives.yy[i]
+    step_x, step_y = _compute_newton_step(gradient_x, gradient_y, xx, xy, yy, derivatives.half_perimeter[i])
+    search.clearance[i] = clearance
+    search.step_x[i] = step_x
+    search.step_y[i] = step_y
+    search.slope[i] = gradient_x * step_x + gradient_y * step_y
+    search.fraction[i] = 1.0
+
+
+@kernel
+def _choose_next_trial(search: _Search, i: int, half_perimeter: float, last_step: float) -> None:
+    """Choose the next trial point of cell i, or end its search if the step to it is short enough."""
+    x = search.fraction[i] * search.step_x[i]
+    y = search.fraction[i] * search.step_y[i]
+    length = np.sqrt(x * x + y * y)
+    search.trials[i, 0] = search.points[i, 0] + x
+    search.trials[i, 1] = search.points[i, 1] + y
+    if length <= min(last_step * half_perimeter, search.clearance[i]):
+        search.points[i, 0] = search.trials[i, 0]
+        search.points[i, 1] = search.trials[i, 1]
+        search.is_active[i] = False
+    elif not length > _NO_STEP * half_perimeter:
+        search.is_active[i] = False
 
 
 @kernel
 def _compute_newton_step(
-    gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float, size: float
+    gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float, max_length: float
 ) -> tuple[float, float]:
-    """Return Newton's step, or a descent step if the Hessian is not positive definite, clipped to `size`."""
+    """Return Newton's step, or a descent step if the Hessian is not positive definite, of limited length."""
     trace = xx + yy
     determinant = xx * yy - xy * xy
     if trace > 0.0 and determinant > _MIN_CURVATURE * trace * trace:
@@ -257,7 +276,7 @@ def _compute_newton_step(
         y = (xy * gradient_x - xx * gradient_y) / determinant
     else:
         x, y = _compute_descent_step(gradient_x, gradient_y, xx, xy, yy)
-    factor = size / max(np.sqrt(x * x + y * y), size, 1e-300)
+    factor = max_length / max(np.sqrt(x * x + y * y), max_length, _MIN_LENGTH_M)
     return x * factor, y * factor
 
 
@@ -278,21 +297,28 @@ def _compute_descent_step(
     else:
         magnitude = 1.0
         small = xx * yy - xy * xy
-    # Its eigenvector. Of two expressions for it, the longer one is more accurate.
-    tilt = sign * half_difference
-    if tilt >= 0.0:
-        x = radius + tilt
-        y = sign * xy
-    else:
-        x = sign * xy
-        y = radius - tilt
-    length = np.sqrt(x * x + y * y)
-    if length > 0.0:
-        x = x / length
-        y = y / length
-    else:
-        x = 1.0
-        y = 0.0
+    # The steps along the eigenvectors of the large and of the small eigenvalue.
+    x, y = _compute_eigenvector(sign * half_difference, sign * xy, radius)
     along = -(gradient_x * x + gradient_y * y) / magnitude
     across = -(gradient_y * x - gradient_x * y) / max(abs(small), _MIN_CURVATURE * magnitude)
     return along * x - across * y, along * y + across * x
+
+
+@kernel
+def _compute_eigenvector(half_difference: float, xy: float, radius: float) -> tuple[float, float]:
+    """Return a unit eigenvector, of the larger eigenvalue, of a symmetric matrix.
+
+    The matrix is a multiple of the identity plus ((half_difference, xy), (xy, -half_difference)), whose
+    eigenvalues are plus and minus `radius`. Both (radius + half_difference, xy) and
+    (xy, radius - half_difference) are eigenvectors, of which the longer one is more accurate.
+    """
+    if half_difference >= 0.0:
+        x = radius + half_difference
+        y = xy
+    else:
+        x = xy
+        y = radius - half_difference
+    length = np.sqrt(x * x + y * y)
+    if length > 0.0:
+        return x / length, y / length
+    return 1.0, 0.0

@@ -24,12 +24,21 @@ from robocov.density.cell_edges import CellEdges
 from robocov.locational_cost.performance import DISTANCE, SQUARED_DISTANCE, Performance
 
 _GAUSS_RULE = np.stack(np.polynomial.legendre.leggauss(16))
-"""Nodes and weights on [-1, 1]."""
+"""Nodes, in the first row, and weights on [-1, 1]."""
+_NODES = 0
+_WEIGHTS = 1
+"""Rows of `_GAUSS_RULE`."""
 _PANEL_LENGTH = 2.0
 """Length of a panel of the quadrature in τ, where s = w sinh τ. The integrand is analytic for |Im τ| < π/2,
 and 16 nodes per panel leave less than a rounding error."""
-_MIN_LENGTH = 1e-12
-"""Length of an edge, relative to the size of its cell, up to which it may be a rounding error."""
+_MIN_RELATIVE_LENGTH = 1e-12
+"""Length of an edge, relative to half the perimeter of its cell, up to which it may be a rounding error."""
+_MIN_LENGTH_M = 1e-300
+"""Length that replaces shorter ones in divisions, so that nothing is divided by zero."""
+_MAX_SERIES_SQUARE = 0.0625
+"""Square of x below which x - atan x is computed from a series."""
+_SERIES_TERMS = 15
+"""Number of terms of that series, which leave less than a rounding error."""
 
 
 class CellDerivatives(NamedTuple):
@@ -43,7 +52,7 @@ class CellDerivatives(NamedTuple):
         Distance of the point from the boundary of its cell: negative outside the cell, 0 if the cell is
         empty. In a cell that is not convex, it is the distance from the boundary of the part from which
         all of the cell is visible.
-    size : m
+    half_perimeter : m
         Half of the perimeter, which is at least the diameter.
     area : m²
     """
@@ -54,7 +63,7 @@ class CellDerivatives(NamedTuple):
     xy: Array
     yy: Array
     clearance: Array
-    size: Array
+    half_perimeter: Array
     area: Array
 
 
@@ -73,11 +82,14 @@ class _RelativeEdge(NamedTuple):
 
 
 class _EdgeIntegral(NamedTuple):
-    """∫ f ds over an edge, and its derivatives by the point: ∫ f'(r)/r s ds and ∫ f'(r)/r d ds."""
+    """Integrals along an edge, in the symbols of the module docstring."""
 
     total: float
+    """∫ f ds"""
     along: float
+    """∫ f'(r)/r s ds, the derivative of `total` as the point moves backwards along the edge."""
     across: float
+    """∫ f'(r)/r d ds, the derivative of `total` by the distance d."""
 
 
 def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -155,38 +167,45 @@ def _sum_derivatives(
     """Return the derivatives as sums over the edges of each cell."""
     n = len(points)
     sums = CellDerivatives(
-        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+        x=np.zeros(n),
+        y=np.zeros(n),
+        xx=np.zeros(n),
+        xy=np.zeros(n),
+        yy=np.zeros(n),
+        clearance=np.zeros(n),
+        half_perimeter=np.zeros(n),
+        area=np.zeros(n),
     )
-    stop = 0
+    end_edge = 0
     for i in range(n):
         x = points[i, 0]
         y = points[i, 1]
-        first = stop
-        size = 0.0
-        while stop < len(cell) and cell[stop] == i:
-            size += 0.5 * _compute_relative_edge(start, end, stop, x, y).length
-            stop += 1
+        first_edge = end_edge
+        half_perimeter = 0.0
+        while end_edge < len(cell) and cell[end_edge] == i:
+            half_perimeter += 0.5 * _compute_relative_edge(start, end, end_edge, x, y).length
+            end_edge += 1
         clearance = np.inf
-        for k in range(first, stop):
+        for k in range(first_edge, end_edge):
             edge = _compute_relative_edge(start, end, k, x, y)
             nx = edge.normal_x
             ny = edge.normal_y
-            edge_end = edge.start + edge.length
-            integral = _integrate_edge(kind, height, edge.distance, edge.start, edge_end, size)
-            mixed = integral.along * nx * ny
-            difference = 0.5 * (nx - ny) * (nx + ny)
+            integral = _integrate_edge(kind, height, edge, half_perimeter)
             sums.x[i] -= nx * integral.total
             sums.y[i] -= ny * integral.total
+            # The two mixed derivatives differ for one edge, but not in the sum over all edges of the cell.
+            # The contribution to xy is the mean of both.
+            mixed = integral.along * nx * ny
+            half_difference = 0.5 * (nx - ny) * (nx + ny)
             sums.xx[i] += integral.across * nx * nx - mixed
-            # The mean of two expressions, whose sums around the cell are equal.
-            sums.xy[i] += integral.across * nx * ny + integral.along * difference
+            sums.xy[i] += integral.across * nx * ny + integral.along * half_difference
             sums.yy[i] += integral.across * ny * ny + mixed
             sums.area[i] += 0.5 * edge.length * (edge.distance + x * nx + y * ny)
-            # The direction of an edge that may be a rounding error is meaningless.
-            if edge.length > _MIN_LENGTH * size:
+            # If an edge is as short as a rounding error, its direction is meaningless.
+            if edge.length > _MIN_RELATIVE_LENGTH * half_perimeter:
                 clearance = min(clearance, edge.distance)
-        sums.clearance[i] = clearance if first < stop else 0.0
-        sums.size[i] = size
+        sums.clearance[i] = clearance if first_edge < end_edge else 0.0
+        sums.half_perimeter[i] = half_perimeter
     return sums
 
 
@@ -196,51 +215,80 @@ def _compute_relative_edge(start: Array, end: Array, k: int, x: float, y: float)
     along_x = end[k, 0] - start[k, 0]
     along_y = end[k, 1] - start[k, 1]
     length = np.sqrt(along_x * along_x + along_y * along_y)
-    inverse = 1.0 / max(length, 1e-300)
+    inverse = 1.0 / max(length, _MIN_LENGTH_M)
     normal_x = along_y * inverse
     normal_y = -along_x * inverse
     distance = start[k, 0] * normal_x + start[k, 1] * normal_y - (x * normal_x + y * normal_y)
     along = start[k, 1] * normal_x - start[k, 0] * normal_y - (y * normal_x - x * normal_y)
-    return _RelativeEdge(normal_x, normal_y, length, distance, along)
+    return _RelativeEdge(normal_x, normal_y, length, distance, start=along)
 
 
 @kernel
-def _integrate_edge(
-    kind: int, height: float, d: float, first: float, last: float, size: float
-) -> _EdgeIntegral:
-    """Return the integrals over an edge at distance d from a point, from `first` to `last` along its line.
+def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimeter: float) -> _EdgeIntegral:
+    """Return the integrals over an edge."""
+    if kind == SQUARED_DISTANCE:
+        return _integrate_squared_distance(edge)
+    if kind == DISTANCE:
+        return _integrate_distance(edge)
+    return _integrate_sensing(edge, height, half_perimeter)
+
+
+@kernel
+def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
+    """Return the integrals over an edge for f = r²."""
+    d = edge.distance
+    first = edge.start
+    last = edge.start + edge.length
+    length = last - first
+    mean = (first * first + first * last + last * last) / 3.0 + d * d
+    return _EdgeIntegral(total=length * mean, along=length * (last + first), across=2.0 * d * length)
+
+
+@kernel
+def _integrate_distance(edge: _RelativeEdge) -> _EdgeIntegral:
+    """Return the integrals over an edge for f = r."""
+    d = edge.distance
+    first = edge.start
+    last = edge.start + edge.length
+    first_r = np.sqrt(d * d + first * first)
+    last_r = np.sqrt(d * d + last * last)
+    inverse_integral = _integrate_inverse(d, first, last)
+    total = 0.5 * (last * last_r - first * first_r + d * d * inverse_integral)
+    return _EdgeIntegral(total=total, along=last_r - first_r, across=d * inverse_integral)
+
+
+@kernel
+def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float) -> _EdgeIntegral:
+    """Return the integrals over an edge for f = 1/(r²+h²), or for f - 1/h².
 
     A constant that is the same for all edges of a cell may be omitted from f: around the cell it adds 0.
     """
+    d = edge.distance
+    first = edge.start
+    last = edge.start + edge.length
     length = last - first
-    first_r = np.sqrt(d * d + first * first)
-    last_r = np.sqrt(d * d + last * last)
-    if kind == SQUARED_DISTANCE:
-        mean = (first * first + first * last + last * last) / 3.0 + d * d
-        return _EdgeIntegral(length * mean, length * (last + first), 2.0 * d * length)
-    if kind == DISTANCE:
-        inverse = _integrate_inverse(d, first, last)
-        total = 0.5 * (last * last_r - first * first_r + d * d * inverse)
-        return _EdgeIntegral(total, last_r - first_r, d * inverse)
     squared_height = height * height
     w = np.sqrt(d * d + squared_height)
     angle = np.arctan2(w * length, w * w + first * last)
     total = angle / w
-    if size < height:
+    if half_perimeter < height:
         # From far above, f is nearly constant. Integrating f - 1/h² keeps the digits of its variation.
         remainder = _subtract_arctan(last / w) - _subtract_arctan(first / w)
         total = -length * (d / w) ** 2 / squared_height - remainder / w
-    first_square = first_r * first_r + squared_height
-    last_square = last_r * last_r + squared_height
-    along = (first - last) * (first + last) / (first_square * last_square)
-    across = -d / (w * w) * (last / last_square - first / first_square + angle / w)
+    # 1/f at both ends
+    first_r = np.sqrt(d * d + first * first)
+    last_r = np.sqrt(d * d + last * last)
+    first_inverse = first_r * first_r + squared_height
+    last_inverse = last_r * last_r + squared_height
+    along = (first - last) * (first + last) / (first_inverse * last_inverse)
+    across = -d / (w * w) * (last / last_inverse - first / first_inverse + angle / w)
     return _EdgeIntegral(total, along, across)
 
 
 @kernel
 def _integrate_inverse(d: float, first: float, last: float) -> float:
     """Return ∫ 1/r ds over an edge."""
-    d = max(abs(d), 1e-300)
+    d = max(abs(d), _MIN_LENGTH_M)
     return float(np.arcsinh(last / d) - np.arcsinh(first / d))
 
 
@@ -248,11 +296,13 @@ def _integrate_inverse(d: float, first: float, last: float) -> float:
 def _subtract_arctan(x: float) -> float:
     """Return x - atan x without cancellation for small x."""
     square = x * x
-    if square >= 0.0625:
+    if square >= _MAX_SERIES_SQUARE:
         return float(x - np.arctan(x))
+    # x³/3 - x⁵/5 + x⁷/7 ..., by Horner's rule
     series = 0.0
-    for k in range(14, -1, -1):
-        series = series * square + (1.0 - 2.0 * (k % 2)) / (2 * k + 3)
+    for k in range(_SERIES_TERMS - 1, -1, -1):
+        sign = 1.0 if k % 2 == 0 else -1.0
+        series = series * square + sign / (2 * k + 3)
     return x * square * series
 
 
@@ -262,7 +312,7 @@ def _sum_edge_costs(
 ) -> Array:
     """Return the cost of each cell: the sum of ∫ f over the triangles of its point and its edges.
 
-    A triangle counts as negative if the point is on the outer side of the edge.
+    The integral over a triangle is negative if the point is on the outer side of the edge.
     """
     sums = np.zeros(len(points))
     for k in range(len(cell)):
@@ -277,8 +327,8 @@ def _sum_edge_costs(
         elif kind == DISTANCE:
             first_r = np.sqrt(d * d + first * first)
             last_r = np.sqrt(d * d + last * last)
-            inverse = _integrate_inverse(d, first, last)
-            sums[i] += d * (last * last_r - first * first_r + d * d * inverse) / 6.0
+            inverse_integral = _integrate_inverse(d, first, last)
+            sums[i] += d * (last * last_r - first * first_r + d * d * inverse_integral) / 6.0
         else:
             _add_sensing_cost(sums, i, edge, height, rule)
     return sums
@@ -295,14 +345,14 @@ def _add_sensing_cost(sums: Array, i: int, edge: _RelativeEdge, height: float, r
     w = np.sqrt(d * d + height * height)
     first_tau = np.arcsinh(edge.start / w)
     last_tau = np.arcsinh((edge.start + edge.length) / w)
-    panels = max(int(np.ceil((last_tau - first_tau) / _PANEL_LENGTH)), 1)
-    half = 0.5 * (last_tau - first_tau) / panels
-    for panel in range(panels):
+    panel_count = max(int(np.ceil((last_tau - first_tau) / _PANEL_LENGTH)), 1)
+    half_panel = 0.5 * (last_tau - first_tau) / panel_count
+    for panel in range(panel_count):
         for node in range(rule.shape[1]):
-            tau = first_tau + half * (2 * panel + 1 + rule[0, node])
+            tau = first_tau + half_panel * (2 * panel + 1 + rule[_NODES, node])
             s = w * np.sinh(tau)
             ratio = (s * s + d * d) / (height * height)
             # log(1 + r²/h²)/r², times h²; its limit at r = 0 is 1.
             logarithm = np.log1p(ratio) / ratio if ratio > 0.0 else 1.0
-            term = logarithm * w * np.cosh(tau) * rule[1, node]
-            sums[i] += 0.5 * d / (height * height) * term * half
+            term = logarithm * w * np.cosh(tau) * rule[_WEIGHTS, node]
+            sums[i] += 0.5 * d / (height * height) * term * half_panel

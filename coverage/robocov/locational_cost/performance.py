@@ -16,10 +16,11 @@ class SquaredDistance:
     """f = r², equation (12), in m². Its optimum is the centroid, (13)."""
 
     kind: ClassVar[int] = SQUARED_DISTANCE
+    """Number of the function, for kernels."""
     sign: ClassVar[float] = 1.0
     """1 if the cost is to be minimized, -1 if it is to be maximized."""
     height: ClassVar[float] = 1.0
-    """Not used."""
+    """Not used; kernels expect a height for every function."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ _NODES_ALONG = 16
 """Nodes along an edge."""
 _NODES_OUTWARD = 12
 """Nodes from the point to an edge."""
+_MIN_SQUARED_DISTANCE = 1e-300
+"""Squared distance that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
+_MIN_RELATIVE_SIZE = 1e-3
+"""Size of a cell, relative to the height, below which the nodes are spread evenly: f hardly varies there."""
 
 
 class WeightedDerivatives(NamedTuple):
@@ -32,7 +36,7 @@ class WeightedDerivatives(NamedTuple):
 
 
 def compute_weighted_derivatives(
-    cells: Cells, density: Density, f: Performance, size: Array, points: Array, is_needed: BoolArray
+    cells: Cells, density: Density, f: Performance, max_diameter: Array, points: Array, is_needed: BoolArray
 ) -> WeightedDerivatives:
     """Compute gradients and Hessians of weighted locational costs with respect to the points.
 
@@ -43,7 +47,7 @@ def compute_weighted_derivatives(
     density : Density
     f : Performance
         `Distance`, or `Sensing` with its sign reversed, so that the cost is to be minimized.
-    size : (n,) array, m
+    max_diameter : (n,) array, m
         Upper bounds of the diameters of the cells.
     points : (n, 2) array, m
         Relative to the generators.
@@ -59,12 +63,12 @@ def compute_weighted_derivatives(
     selected = np.flatnonzero(is_needed[edges.cell])
     cell = edges.cell[selected]
     t_nodes, t_weights = _build_gauss_rule(_NODES_ALONG)
-    u_nodes, u_weights = _build_outward_rule(f, size, cell)
+    u_nodes, u_weights = _build_outward_rule(f, max_diameter, cell)
     start = edges.start[selected] - points[cell]
     end = edges.end[selected] - points[cell]
     # Offsets of the nodes from the point, by edge, node along it and node outward: (e, 16, 12, 2).
-    rim = start[:, None] + (end - start)[:, None] * t_nodes[:, None]
-    offset = rim[:, :, None, :] * u_nodes[:, None, :, None]
+    on_edge = start[:, None] + (end - start)[:, None] * t_nodes[:, None]
+    offset = on_edge[:, :, None, :] * u_nodes[:, None, :, None]
     double_area = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     weight = double_area[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
     positions = offset + (cells.generators + points)[cell][:, None, None]
@@ -78,16 +82,16 @@ def compute_weighted_derivatives(
         first = 2.0 * weight * inverse * inverse
         second = -8.0 * weight * inverse * inverse * inverse
     else:
-        inverse = 1.0 / np.sqrt(np.maximum(square, 1e-300))
+        inverse = 1.0 / np.sqrt(np.maximum(square, _MIN_SQUARED_DISTANCE))
         first = weight * inverse
         second = -weight * inverse * inverse * inverse
-    count = len(points)
+    cell_count = len(points)
     return WeightedDerivatives(
-        x=_sum_by_cell(-first * dx, cell, count),
-        y=_sum_by_cell(-first * dy, cell, count),
-        xx=_sum_by_cell(first + second * dx * dx, cell, count),
-        xy=_sum_by_cell(second * dx * dy, cell, count),
-        yy=_sum_by_cell(first + second * dy * dy, cell, count),
+        x=_sum_by_cell(-first * dx, cell, cell_count),
+        y=_sum_by_cell(-first * dy, cell, cell_count),
+        xx=_sum_by_cell(first + second * dx * dx, cell, cell_count),
+        xy=_sum_by_cell(second * dx * dy, cell, cell_count),
+        yy=_sum_by_cell(first + second * dy * dy, cell, cell_count),
     )
 
 
@@ -97,19 +101,19 @@ def _build_gauss_rule(count: int) -> tuple[Array, Array]:
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
-def _build_outward_rule(f: Performance, size: Array, cell: IntArray) -> tuple[Array, Array]:
+def _build_outward_rule(f: Performance, max_diameter: Array, cell: IntArray) -> tuple[Array, Array]:
     """Return nodes u from the point to each edge, and their weights times u, (e, 12) each."""
     plain_nodes, plain_weights = _build_gauss_rule(_NODES_OUTWARD)
-    nodes = np.tile(plain_nodes, (len(size), 1))
-    weights = np.tile(plain_weights, (len(size), 1))
+    nodes = np.tile(plain_nodes, (len(max_diameter), 1))
+    weights = np.tile(plain_weights, (len(max_diameter), 1))
     if isinstance(f, Sensing):
         # The steeper f is near the point, the more nodes lie there.
-        bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
+        bend = np.arcsinh(np.maximum(max_diameter / f.height, _MIN_RELATIVE_SIZE))[:, None]
         weights = weights * bend * np.cosh(bend * nodes) / np.sinh(bend)
         nodes = np.sinh(bend * nodes) / np.sinh(bend)
     return nodes[cell], (nodes * weights)[cell]
 
 
-def _sum_by_cell(integrand: Array, cell: IntArray, count: int) -> Array:
+def _sum_by_cell(integrand: Array, cell: IntArray, cell_count: int) -> Array:
     """Return the sums of an integrand over the nodes of each cell, (n,)."""
-    return np.asarray(np.bincount(cell, integrand.sum(axis=(1, 2)), count))
+    return np.asarray(np.bincount(cell, integrand.sum(axis=(1, 2)), cell_count))

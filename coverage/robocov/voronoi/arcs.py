@@ -12,6 +12,7 @@ import numpy as np
 
 from robocov.arrays import Array, compute_lengths
 from robocov.compiled import kernel
+from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT
 
 START_X = 0
 """Column of a piece: x of its start relative to the generator, m."""
@@ -27,6 +28,7 @@ CELL = 5
 """Column of a piece: the cell that it bounds."""
 BEYOND = 6
 """Column of a piece: the robot on the other side, or `robocov.density.cell_edges.REGION`."""
+PIECE_COLUMNS = 7
 
 _MAX_SERIES_SQUARED_SINE = 0.04
 """sin² of the half angle up to which the series is used: for small angles rounding spoils the closed form."""
@@ -35,7 +37,7 @@ _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(1
 """Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
 _MIN_LENGTH_M = 1e-300
-"""Smallest length by which anything is divided."""
+"""Length that replaces shorter ones in divisions, so that nothing is divided by zero."""
 _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
@@ -73,18 +75,20 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
         normal_x = v - y
         normal_y = x - u
         squared_length = normal_x * normal_x + normal_y * normal_y
-        unit_area, unit_lever, unit_spread = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
+        # The moments of the circular segment. The normal provides one more factor of length in the first one.
+        unit_area, unit_first, unit_polar = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
         area = unit_area * squared_length
-        lever = unit_lever * squared_length
-        spread = unit_spread * squared_length * squared_length
+        first = unit_first * squared_length
+        polar = unit_polar * squared_length * squared_length
         i = int(pieces[k, CELL])
-        moments[i, 0] += 0.5 * cross + area
-        moments[i, 1] += middle_x * (cross / 3.0 + area) + lever * normal_x
-        moments[i, 2] += middle_y * (cross / 3.0 + area) + lever * normal_y
+        moments[i, MASS] += 0.5 * cross + area
+        moments[i, MOMENT_X] += middle_x * (cross / 3.0 + area) + first * normal_x
+        moments[i, MOMENT_Y] += middle_y * (cross / 3.0 + area) + first * normal_y
+        # The polar moment of the triangle, and that of the segment by the parallel axis theorem.
         squares = x * (x + u) + u * u + y * (y + v) + v * v
-        shift = lever * (middle_x * normal_x + middle_y * normal_y)
+        mixed = first * (middle_x * normal_x + middle_y * normal_y)
         squared_middle = middle_x * middle_x + middle_y * middle_y
-        moments[i, 3] += cross * squares / 12.0 + spread + 2.0 * shift + area * squared_middle
+        moments[i, POLAR_MOMENT] += cross * squares / 12.0 + polar + 2.0 * mixed + area * squared_middle
     return moments
 
 
@@ -106,9 +110,9 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
         for coefficient in series:
             h = h * squared_sine + coefficient
     area = s * (2.0 / 3.0 + squared_sine * h) / 4.0
-    lever = squared_sine * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
-    spread = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - squared_sine) * h) / 16.0
-    return area, lever, spread
+    first = squared_sine * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
+    polar = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - squared_sine) * h) / 16.0
+    return area, first, polar
 
 
 def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
@@ -131,17 +135,20 @@ def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
 def _split_piece(piece: list[float], max_deviation: float) -> Array:
     """Return the vertices of the chords of one piece."""
     x, y, u, v, half_angle = piece
-    chords = _count_chords(np.hypot(u - x, v - y), half_angle, max_deviation)
-    if chords == 1:
+    chord_count = _count_chords(np.hypot(u - x, v - y), half_angle, max_deviation)
+    if chord_count == 1:
         return np.array([[x, y], [u, v]])
-    angle = half_angle * np.linspace(-1.0, 1.0, chords + 1)
+    angle = half_angle * np.linspace(-1.0, 1.0, chord_count + 1)
     # Coordinates along the line between the ends, and to the right of it, as fractions of its length.
     along = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
-    aside = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
-    line = np.column_stack([x + along * (u - x) + aside * (v - y), y + along * (v - y) + aside * (x - u)])
-    line[0] = x, y
-    line[-1] = u, v
-    return line
+    rightward = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
+    vertex_x = x + along * (u - x) + rightward * (v - y)
+    vertex_y = y + along * (v - y) + rightward * (x - u)
+    vertices = np.column_stack([vertex_x, vertex_y])
+    # The ends are exact, so that adjacent pieces meet.
+    vertices[0] = x, y
+    vertices[-1] = u, v
+    return vertices
 
 
 def _count_chords(length: float, half_angle: float, max_deviation: float) -> int:
@@ -156,7 +163,7 @@ def _count_chords(length: float, half_angle: float, max_deviation: float) -> int
 
 
 def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
-    """Link pieces into closed rings.
+    """Link pieces into closed rings, in which chords replace the arcs.
 
     Parameters
     ----------

@@ -22,7 +22,16 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET
-from robocov.voronoi.arcs import BEYOND, CELL, END_X, END_Y, HALF_ANGLE, START_X, START_Y
+from robocov.voronoi.arcs import (
+    BEYOND,
+    CELL,
+    END_X,
+    END_Y,
+    HALF_ANGLE,
+    PIECE_COLUMNS,
+    START_X,
+    START_Y,
+)
 
 _NORMAL_X = 0
 _NORMAL_Y = 1
@@ -47,6 +56,10 @@ PAIR_OWN_SPEED = 4
 PAIR_OTHER_SPEED = 5
 """Column of a pair: speed of the neighbor, m/s."""
 
+_ENTER = 0
+_LEAVE = 1
+"""Columns of a crossing: values of t at which a curve enters and leaves the cell's side of another one."""
+
 _EDGE_START_X = 0
 _EDGE_START_Y = 1
 _EDGE_END_X = 2
@@ -56,10 +69,14 @@ _EDGE_BEYOND = 5  # the robot on the other side; negative for a side of the regi
 
 _FIRST_IS_OUTSIDE = 1
 _SECOND_IS_OUTSIDE = 2
+"""Flags: the first, or the second, of two curves is nowhere on the cell's side of the other one."""
+
+_MIN_SPARE_PIECES = 64
+"""Room for pieces at first, beyond one for each edge."""
 
 _MIN_SQUARED_SINE = 1e-29
 """sin² of the angle at which two curves meet, below which rounding alone decides whether and where they do.
-One of them then counts as within the other, which moves no boundary by more than rounding does."""
+One of them is then treated as within the other, which moves no boundary by more than rounding does."""
 
 
 @kernel
@@ -87,87 +104,92 @@ def trace_boundaries(
     (p, 7) array
         For the columns see `robocov.voronoi.arcs`.
     """
-    pieces = np.empty((len(edges) + 64, 7))
-    used = 0
-    pair = 0
-    edge = 0
+    pieces = np.empty((len(edges) + _MIN_SPARE_PIECES, PIECE_COLUMNS))
+    piece_count = 0
+    end_pair = 0
+    end_edge = 0
     for i in range(len(points)):
-        first_pair = pair
-        first_edge = edge
-        while pair < len(pairs) and pairs[pair, PAIR_ROBOT] == i:
-            pair += 1
-        while edge < len(edges) and edges[edge, _EDGE_CELL] == i:
-            edge += 1
-        own_pairs = pairs[first_pair:pair]
-        own_edges = edges[first_edge:edge]
-        line_count = edge - first_edge
-        curves = np.empty((line_count + pair - first_pair, _CURVE_COLUMNS))
-        count = _write_circles(curves, own_pairs, own_edges)
+        first_pair = end_pair
+        first_edge = end_edge
+        while end_pair < len(pairs) and pairs[end_pair, PAIR_ROBOT] == i:
+            end_pair += 1
+        while end_edge < len(edges) and edges[end_edge, _EDGE_CELL] == i:
+            end_edge += 1
+        own_pairs = pairs[first_pair:end_pair]
+        own_edges = edges[first_edge:end_edge]
+        line_count = len(own_edges)
+        curves = np.empty((line_count + len(own_pairs), _CURVE_COLUMNS))
+        curve_count = _write_circles(curves, own_pairs, own_edges)
         # Without circles, the cell is the one among robots of equal speeds.
-        is_straight[i] = count == line_count
+        is_straight[i] = curve_count == line_count
         if is_straight[i]:
-            pieces = _make_room(pieces, used, line_count)
-            used = _add_edges(own_edges, pieces, used)
-        elif count > 0:
+            pieces = _make_room(pieces, piece_count, line_count)
+            piece_count = _add_edges(own_edges, pieces, piece_count)
+        elif curve_count > 0:
             _write_lines(curves, own_pairs, own_edges, sides, points[i])
-            crossings = np.empty((count, count, 2))
-            _find_crossings(curves[:count], line_count, crossings)
-            for c in range(count):
-                pieces = _make_room(pieces, used, 2 * count + 2)
-                used = _add_parts(curves[c], crossings[c], pieces, used)
-    return pieces[:used]
+            crossings = np.empty((curve_count, curve_count, 2))
+            _find_crossings(curves[:curve_count], line_count, crossings)
+            for c in range(curve_count):
+                pieces = _make_room(pieces, piece_count, 2 * curve_count + 2)
+                piece_count = _add_parts(curves[c], crossings[c], pieces, piece_count)
+    return pieces[:piece_count]
 
 
 @kernel
-def _make_room(pieces: Array, used: int, room: int) -> Array:
-    """Return an array with the used pieces and room for more."""
-    if used + room <= len(pieces):
+def _make_room(pieces: Array, piece_count: int, room: int) -> Array:
+    """Return an array with the pieces so far and room for more; the same array if it has room."""
+    if piece_count + room <= len(pieces):
         return pieces
-    larger = np.empty((2 * (used + room), pieces.shape[1]))
-    larger[:used] = pieces[:used]
+    larger = np.empty((2 * (piece_count + room), PIECE_COLUMNS))
+    larger[:piece_count] = pieces[:piece_count]
     return larger
 
 
 @kernel
-def _add_edges(edges: Array, pieces: Array, used: int) -> int:
-    """Add straight edges to the pieces; return the updated `used`."""
+def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
+    """Add straight edges to the pieces; return the new number of pieces."""
     for e in range(len(edges)):
-        for column in range(HALF_ANGLE):
-            pieces[used, column] = edges[e, column]
-        pieces[used, HALF_ANGLE] = 0.0
-        pieces[used, CELL] = edges[e, _EDGE_CELL]
-        pieces[used, BEYOND] = edges[e, _EDGE_BEYOND]
-        used += 1
-    return used
+        pieces[piece_count, START_X] = edges[e, _EDGE_START_X]
+        pieces[piece_count, START_Y] = edges[e, _EDGE_START_Y]
+        pieces[piece_count, END_X] = edges[e, _EDGE_END_X]
+        pieces[piece_count, END_Y] = edges[e, _EDGE_END_Y]
+        pieces[piece_count, HALF_ANGLE] = 0.0
+        pieces[piece_count, CELL] = edges[e, _EDGE_CELL]
+        pieces[piece_count, BEYOND] = edges[e, _EDGE_BEYOND]
+        piece_count += 1
+    return piece_count
 
 
 @kernel
 def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
-    """Write the circles that may bound a cell to the rows after those of its lines.
+    """Write the circles that may bound a cell to `curves`, after the rows of its lines.
 
-    Return the number of curves, or -1 if the cell is empty because a faster robot is at the same position.
+    Return the number of lines and circles, or -1 if the cell is empty because a faster robot is at the same
+    position.
     """
     reach = _compute_reach(pairs, edges)
     if reach < 0.0:
         return -1
-    count = len(edges)
+    curve_count = len(edges)
     for k in range(len(pairs)):
         own_speed = pairs[k, PAIR_OWN_SPEED]
         other_speed = pairs[k, PAIR_OTHER_SPEED]
         distance = np.sqrt(pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2)
         nearest = distance * (own_speed / (own_speed + other_speed))
         if own_speed != other_speed and distance > 0.0 and nearest < reach:
-            curves[count, _NORMAL_X] = pairs[k, PAIR_DX] / distance
-            curves[count, _NORMAL_Y] = pairs[k, PAIR_DY] / distance
-            curves[count, _DISTANCE] = nearest
+            curves[curve_count, _NORMAL_X] = pairs[k, PAIR_DX] / distance
+            curves[curve_count, _NORMAL_Y] = pairs[k, PAIR_DY] / distance
+            curves[curve_count, _DISTANCE] = nearest
             difference_of_squares = (other_speed - own_speed) * (own_speed + other_speed)
-            curves[count, _COEFFICIENT] = 0.5 * (difference_of_squares / (own_speed * other_speed)) / distance
-            curves[count, _BEGIN] = -np.inf
-            curves[count, _END] = np.inf
-            curves[count, _CURVE_CELL] = pairs[k, PAIR_ROBOT]
-            curves[count, _CURVE_BEYOND] = pairs[k, PAIR_NEIGHBOR]
-            count += 1
-    return count
+            curves[curve_count, _COEFFICIENT] = (
+                0.5 * (difference_of_squares / (own_speed * other_speed)) / distance
+            )
+            curves[curve_count, _BEGIN] = -np.inf
+            curves[curve_count, _END] = np.inf
+            curves[curve_count, _CURVE_CELL] = pairs[k, PAIR_ROBOT]
+            curves[curve_count, _CURVE_BEYOND] = pairs[k, PAIR_NEIGHBOR]
+            curve_count += 1
+    return curve_count
 
 
 @kernel
@@ -248,53 +270,44 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
     """
     count = len(curves)
     for one in range(count):
-        crossings[one, one, 0] = np.nan
-        crossings[one, one, 1] = np.nan
+        crossings[one, one, _ENTER] = np.nan
+        crossings[one, one, _LEAVE] = np.nan
         for other in range(one + 1, count):
             enter = np.nan
             leave = np.nan
-            outside = 0
+            flags = 0
             if other >= line_count:
-                enter, leave, outside = _intersect(curves[one], curves[other])
-            if outside & _FIRST_IS_OUTSIDE:
+                enter, leave, flags = _intersect(curves[one], curves[other])
+            if flags & _FIRST_IS_OUTSIDE:
                 curves[one, _END] = -np.inf
-            if outside & _SECOND_IS_OUTSIDE:
+            if flags & _SECOND_IS_OUTSIDE:
                 curves[other, _END] = -np.inf
-            crossings[one, other, 0] = enter
-            crossings[one, other, 1] = leave
+            crossings[one, other, _ENTER] = enter
+            crossings[one, other, _LEAVE] = leave
             # Where a curve leaves the side of another one, that one enters its side, at the same point.
             x, y = _evaluate(curves[one], leave)
-            crossings[other, one, 0] = _find_parameter(curves[other], x, y)
+            crossings[other, one, _ENTER] = _find_parameter(curves[other], x, y)
             x, y = _evaluate(curves[one], enter)
-            crossings[other, one, 1] = _find_parameter(curves[other], x, y)
+            crossings[other, one, _LEAVE] = _find_parameter(curves[other], x, y)
 
 
 @kernel
 def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
     """Find where a curve enters and leaves the cell's side of another one.
 
-    Return both values of t, nan if the curves do not intersect, and flags that say which of them is nowhere
-    on the cell's side of the other one.
+    Return both values of t, nan if the curves do not intersect, and the flags `_FIRST_IS_OUTSIDE` and
+    `_SECOND_IS_OUTSIDE`.
     """
-    n1x = one[_NORMAL_X]
-    n1y = one[_NORMAL_Y]
-    r1 = one[_DISTANCE]
     a1 = one[_COEFFICIENT]
-    n2x = other[_NORMAL_X]
-    n2y = other[_NORMAL_Y]
-    r2 = other[_DISTANCE]
+    b1x, b1y, c1 = _compute_b_and_c(one)
     a2 = other[_COEFFICIENT]
-    # From b² + 4 a c = 1, and a r² + |b| r = c at the nearest point.
-    b1 = 1.0 - 2.0 * a1 * r1
-    b1x = n1x * b1
-    b1y = n1y * b1
-    c1 = r1 * (1.0 - a1 * r1)
-    b2 = 1.0 - 2.0 * a2 * r2
-    b2x = n2x * b2
-    b2y = n2y * b2
-    c2 = r2 * (1.0 - a2 * r2)
-    outward = b2x * n1x + b2y * n1y
-    leftward = b2y * n1x - b2x * n1y + 0.0  # The sum turns a negative zero into a positive one.
+    b2x, b2y, c2 = _compute_b_and_c(other)
+    # The components of the second b along the normal of the first curve, and to the left of it.
+    normal_x = one[_NORMAL_X]
+    normal_y = one[_NORMAL_Y]
+    outward = b2x * normal_x + b2y * normal_y
+    leftward = b2y * normal_x - b2x * normal_y + 0.0  # The sum turns a negative zero into a positive one.
+    r1 = one[_DISTANCE]
     k = 2.0 * a1
     bend = 2.0 - r1 * k
     # On the first curve the condition of the other one is quadratic t² + 2 leftward t + constant <= 0.
@@ -308,65 +321,89 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
         (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
     )
     if squared_sine > _MIN_SQUARED_SINE:
+        # The two roots of the quadratic function, in the form in which nothing cancels.
         large = -leftward - np.copysign(np.sqrt(squared_sine), leftward)
         if leftward >= 0.0:
             return large / quadratic, constant / large, 0
         return constant / large, large / quadratic, 0
-    # One curve is within the other (g >= 1), or none is, or each is outside the other.
-    is_outside = quadratic + constant > 0.0
+    # The curves do not intersect: the function has the same sign on the whole first curve. For g >= 1, one of
+    # the curves is on the cell's side of the other one; for g <= -1, both are, or neither is.
+    flags = 0
+    is_first_outside = quadratic + constant > 0.0
+    if is_first_outside:
+        flags |= _FIRST_IS_OUTSIDE
     g = b1x * b2x + b1y * b2y + 2.0 * (a1 * c2 + a2 * c1)
-    outside = _FIRST_IS_OUTSIDE if is_outside else 0
-    if is_outside == (g < 0.0):
-        outside += _SECOND_IS_OUTSIDE
-    return np.nan, np.nan, outside
+    is_second_outside = is_first_outside if g < 0.0 else not is_first_outside
+    if is_second_outside:
+        flags |= _SECOND_IS_OUTSIDE
+    return np.nan, np.nan, flags
 
 
 @kernel
-def _add_parts(curve: Array, crossings: Array, pieces: Array, used: int) -> int:
-    """Add the parts of a curve that are on the cell's side of all others; return the updated `used`.
+def _compute_b_and_c(curve: Array) -> tuple[float, float, float]:
+    """Return the components of b, and c, from b² + 4 a c = 1 and a r² + |b| r = c at the nearest point."""
+    a = curve[_COEFFICIENT]
+    r = curve[_DISTANCE]
+    length = 1.0 - 2.0 * a * r
+    return curve[_NORMAL_X] * length, curve[_NORMAL_Y] * length, r * (1.0 - a * r)
+
+
+@kernel
+def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) -> int:
+    """Add the parts of a curve that are on the cell's side of all others; return the new number of pieces.
 
     The crossings with the other curves, (k, 2), are overwritten.
     """
     start = curve[_BEGIN]
     end = curve[_END]
     for other in range(len(crossings)):
-        if crossings[other, 0] <= crossings[other, 1]:
-            start = max(start, crossings[other, 0])
-            end = min(end, crossings[other, 1])
-    # A curve that is left before it is entered cuts a gap out of this one. Sort the gaps by their start.
-    gaps = 0
+        if crossings[other, _ENTER] <= crossings[other, _LEAVE]:
+            start = max(start, crossings[other, _ENTER])
+            end = min(end, crossings[other, _LEAVE])
+    # If the cell's side of another curve is left before it is entered, there is a gap between the two. The
+    # gaps within the interval replace the first crossings, sorted by their start.
+    gap_count = 0
     for other in range(len(crossings)):
-        enter = crossings[other, 0]
-        leave = crossings[other, 1]
+        enter = crossings[other, _ENTER]
+        leave = crossings[other, _LEAVE]
         if leave < enter and leave < end and enter > start:
-            k = gaps
-            while k > 0 and crossings[k - 1, 1] > leave:
-                crossings[k, 0] = crossings[k - 1, 0]
-                crossings[k, 1] = crossings[k - 1, 1]
-                k -= 1
-            crossings[k, 0] = enter
-            crossings[k, 1] = leave
-            gaps += 1
-    for k in range(gaps):
-        used = _add_pieces(curve, start, min(crossings[k, 1], end), pieces, used)
-        start = max(start, crossings[k, 0])
-    return _add_pieces(curve, start, end, pieces, used)
+            _insert_gap(crossings, gap_count, enter, leave)
+            gap_count += 1
+    for k in range(gap_count):
+        piece_count = _add_pieces(curve, start, min(crossings[k, _LEAVE], end), pieces, piece_count)
+        start = max(start, crossings[k, _ENTER])
+    return _add_pieces(curve, start, end, pieces, piece_count)
 
 
 @kernel
-def _add_pieces(curve: Array, start: float, end: float, pieces: Array, used: int) -> int:
-    """Add a part of a curve, cut at t = 0 so that no piece exceeds half a circle; return the new `used`."""
+def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None:
+    """Insert a gap, from `leave` to `enter`, among the first rows of `gaps`, sorted by where they start."""
+    k = gap_count
+    while k > 0 and gaps[k - 1, _LEAVE] > leave:
+        gaps[k, _ENTER] = gaps[k - 1, _ENTER]
+        gaps[k, _LEAVE] = gaps[k - 1, _LEAVE]
+        k -= 1
+    gaps[k, _ENTER] = enter
+    gaps[k, _LEAVE] = leave
+
+
+@kernel
+def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_count: int) -> int:
+    """Add a part of a curve, cut at t = 0 so that no piece exceeds half a circle.
+
+    Return the new number of pieces.
+    """
     k = 2.0 * curve[_COEFFICIENT]
     while start < end:
         stop = 0.0 if start < 0.0 < end and k != 0.0 else end
-        pieces[used, START_X], pieces[used, START_Y] = _evaluate(curve, start)
-        pieces[used, END_X], pieces[used, END_Y] = _evaluate(curve, stop)
-        pieces[used, HALF_ANGLE] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * start)
-        pieces[used, CELL] = curve[_CURVE_CELL]
-        pieces[used, BEYOND] = curve[_CURVE_BEYOND]
+        pieces[piece_count, START_X], pieces[piece_count, START_Y] = _evaluate(curve, start)
+        pieces[piece_count, END_X], pieces[piece_count, END_Y] = _evaluate(curve, stop)
+        pieces[piece_count, HALF_ANGLE] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * start)
+        pieces[piece_count, CELL] = curve[_CURVE_CELL]
+        pieces[piece_count, BEYOND] = curve[_CURVE_BEYOND]
         start = stop
-        used += 1
-    return used
+        piece_count += 1
+    return piece_count
 
 
 @kernel

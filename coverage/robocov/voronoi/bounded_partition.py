@@ -16,14 +16,16 @@ from robocov.observation import Cells
 from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi.clipped_cells import compute_clipped_cells
-from robocov.voronoi.clipping import EDGE_BEYOND, EDGE_CELL, CellArrays
-from robocov.voronoi.delaunay import CORNER, Mesh
+from robocov.voronoi.clipping import EDGE_BEYOND, EDGE_CELL, EDGE_COLUMNS, EDGE_END_X, CellArrays
+from robocov.voronoi.delaunay import CORNER, ENTRIES_PER_TRIANGLE, Mesh
 from robocov.voronoi.triangulated_cells import compute_triangulated_cells
 
 _MIN_TRIANGULATED_ROBOTS = 16
 """Team size from which a triangulation is faster than clipping each cell by all other robots."""
 
-_NO_EDGES = np.empty((0, 6))
+_NO_EDGES = np.empty((0, EDGE_COLUMNS))
+_NO_MESH = np.empty((2, 0), dtype=np.int32)
+"""Stands for a triangulation if cells are clipped."""
 
 _AnyCells = TypeVar("_AnyCells", bound=Cells)
 
@@ -32,12 +34,12 @@ _AnyCells = TypeVar("_AnyCells", bound=Cells)
 class VoronoiPartition(Cells):
     """The cells V_i of equation (1) within a convex region."""
 
-    _find_edges: Callable[[], CellEdges]
+    _compute_edges: Callable[[], CellEdges]
 
     @cached_property
     def edges(self) -> CellEdges:
         """The edges of all cells, computed when they are first used."""
-        return self._find_edges()
+        return self._compute_edges()
 
     @cached_property
     def polygons(self) -> list[Array]:
@@ -46,7 +48,7 @@ class VoronoiPartition(Cells):
 
     @property
     def outlines(self) -> tuple[list[Array], IntArray]:
-        """The polygons of the cells, and the number of the cell of each."""
+        """The polygons of the cells, and the index of the cell of each."""
         return self.polygons, np.arange(len(self.generators))
 
 
@@ -104,19 +106,20 @@ def partition(
     known = NeighborPositions.from_graph(neighbors, reported_positions)
     mesh = _create_mesh(len(points), triangulation, is_complete=neighbors.is_complete)
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
-    count = _compute_cells(points, region.sides, known, mesh, cells)
-    if count < 0:
-        robot = -1 - count
+    edge_count = _compute_cells(points, region.sides, known, mesh, cells)
+    if edge_count < 0:
+        robot = -1 - edge_count
         raise InputError(f"generators[{robot}]: expected finite numbers, got {quote(points[robot].tolist())}")
-    if mesh.shape[1] > 0 and mesh[CORNER, 0] < 0:
-        mesh = _create_mesh(0, None, is_complete=False)  # The triangulation failed.
+    has_triangulation_failed = mesh.shape[1] > 0 and mesh[CORNER, 0] < 0
+    if has_triangulation_failed:
+        mesh = _NO_MESH.copy()
     mesh.setflags(write=False)
     voronoi_cells = VoronoiPartition(
         generators=points,
         mass=cells.mass,
         centroid=cells.centroid,
-        triangulation=mesh if mesh.shape[1] else None,
-        _find_edges=partial(_find_edges, points, region.sides, known, mesh, count),
+        triangulation=mesh if mesh.shape[1] > 0 else None,
+        _compute_edges=partial(_compute_edges, points, region.sides, known, mesh, edge_count),
     )
     return apply_density(voronoi_cells, density)
 
@@ -201,24 +204,27 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
 
 
 def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
-    """Create the mesh from which the triangulation starts; it has no columns if cells must be clipped."""
+    """Create the mesh from which the triangulation starts; it has no columns if cells are to be clipped."""
     if not is_complete or robot_count < _MIN_TRIANGULATED_ROBOTS:
-        return np.empty((2, 0), dtype=np.int32)
-    size = 8 * robot_count + 4
-    if previous is not None and previous.shape[1] == size:
+        return _NO_MESH.copy()
+    triangle_count = 2 * robot_count + 1
+    shape = (2, ENTRIES_PER_TRIANGLE * triangle_count)
+    if previous is not None and previous.shape == shape:
         return previous.copy()
-    return np.full((2, size), -1, dtype=np.int32)
+    return np.full(shape, -1, dtype=np.int32)
 
 
-def _find_edges(points: Array, sides: Array, known: NeighborPositions, mesh: Mesh, count: int) -> CellEdges:
-    """Compute the edges of all cells, by computing the cells again with room for `count` edges."""
-    edges = np.empty((count, 6))
+def _compute_edges(
+    points: Array, sides: Array, known: NeighborPositions, mesh: Mesh, edge_count: int
+) -> CellEdges:
+    """Compute the edges of all cells, by computing the cells again with room for their edges."""
+    edges = np.empty((edge_count, EDGE_COLUMNS))
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
     # Copies, because read-only arrays are a different type to the compiler.
     _compute_cells(points.copy(), sides, known, mesh.copy(), cells)
     return CellEdges(
-        start=edges[:, :2].copy(),
-        end=edges[:, 2:4].copy(),
+        start=edges[:, :EDGE_END_X].copy(),
+        end=edges[:, EDGE_END_X:EDGE_CELL].copy(),
         cell=edges[:, EDGE_CELL].astype(np.intp),
         beyond=edges[:, EDGE_BEYOND].astype(np.intp),
     )
@@ -236,8 +242,8 @@ def _compute_cells(
         if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):
             return -1 - i
     if mesh.shape[1]:
-        total = compute_triangulated_cells(points, sides, mesh, cells)
-        if total >= 0:
-            return total
+        edge_count = compute_triangulated_cells(points, sides, mesh, cells)
+        if edge_count >= 0:
+            return edge_count
         mesh[CORNER, 0] = -1
     return compute_clipped_cells(points, sides, neighbors, cells)

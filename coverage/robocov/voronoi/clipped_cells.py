@@ -35,29 +35,28 @@ def compute_clipped_cells(
         Number of edges.
     """
     workspace = create_workspace(len(points), len(sides))
-    total = 0
+    edge_count = 0
     for i in range(len(points)):
-        if len(neighbors.indptr):
-            count = _add_listed_neighbors(workspace, points, neighbors, i)
+        if len(neighbors.indptr) > 0:
+            neighbor_count = _add_listed_neighbors(workspace, points, neighbors, i)
         else:
-            count = _add_all_robots(workspace, points, i)
-        polygon = clip_cell(workspace, count, points, sides, i)
-        total = write_cell(workspace, polygon, points, i, cells, total)
-    return total
+            neighbor_count = _add_all_robots(workspace, points, i)
+        polygon = clip_cell(workspace, neighbor_count, points, sides, i)
+        edge_count = write_cell(workspace, polygon, points, i, cells, edge_count)
+    return edge_count
 
 
 @inlined_kernel
 def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: NeighborPositions, i: int) -> int:
     """Add the neighbors of robot i at their known positions; return their number."""
     neighbor_rows = workspace.neighbors
-    indices = neighbors.indices
-    positions = neighbors.positions
+    reported_positions = neighbors.positions
     count = 0
     for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
-        j = indices[k]
-        if len(positions):
-            dx = positions[k, 0] - points[i, 0]
-            dy = positions[k, 1] - points[i, 1]
+        j = neighbors.indices[k]
+        if len(reported_positions) > 0:
+            dx = reported_positions[k, 0] - points[i, 0]
+            dy = reported_positions[k, 1] - points[i, 1]
         else:
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]

@@ -22,6 +22,7 @@ BEYOND = 2
 _EXCESS = 3
 """Column of a vertex: its excess q · d - |d|²/2 over the current bisector, with d the offset of the
 neighbor, m²; positive beyond the bisector."""
+_VERTEX_COLUMNS = 4
 
 DX = 0
 """Column of a neighbor: its offset from the generator in x, m."""
@@ -33,15 +34,16 @@ ROBOT = 3
 """Column of a neighbor: its number."""
 _NEIGHBOR_COLUMNS = 4
 
-_EDGE_START_X = 0
-_EDGE_START_Y = 1
-_EDGE_END_X = 2
-_EDGE_END_Y = 3
+EDGE_START_X = 0
+EDGE_START_Y = 1
+EDGE_END_X = 2
+EDGE_END_Y = 3
 """Columns of an edge: its ends relative to the generator, m."""
 EDGE_CELL = 4
 """Column of an edge: the robot to whose cell it belongs."""
 EDGE_BEYOND = 5
 """Column of an edge: the robot on the other side, or `REGION`."""
+EDGE_COLUMNS = 6
 
 _SORTED_NEIGHBORS = 6
 """Number of neighbors that cut a cell in order of distance; few others can then still cut it."""
@@ -74,7 +76,7 @@ class CellArrays(NamedTuple):
     centroid: Array
     """(n, 2) m"""
     edges: Array
-    """(e, 6) The edges: x, y, u, v of the ends relative to the generator (m), cell and `BEYOND`."""
+    """(e, 6) The edges; for the columns, see the constants `EDGE_...`."""
 
 
 @kernel
@@ -91,8 +93,11 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
     -------
     Workspace
     """
+    # A cut adds at most one vertex. There is room for two more.
+    max_vertices = side_count + robot_count + 2
     return Workspace(
-        np.empty((2, side_count + robot_count + 2, 4)), np.empty((robot_count, _NEIGHBOR_COLUMNS))
+        rings=np.empty((2, max_vertices, _VERTEX_COLUMNS)),
+        neighbors=np.empty((robot_count, _NEIGHBOR_COLUMNS)),
     )
 
 
@@ -147,36 +152,41 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     """
     rings = workspace.rings
     neighbor_rows = workspace.neighbors
+    # At first the polygon is the region.
     ring = 0
     count = len(sides)
     for k in range(count):
         rings[ring, k, X] = sides[k, SIDE_X] - points[i, 0]
         rings[ring, k, Y] = sides[k, SIDE_Y] - points[i, 1]
         rings[ring, k, BEYOND] = REGION
-    # A neighbor can only cut the cell if it is at most twice as far away as the farthest vertex.
     squared_range = _compute_squared_range(rings, ring, count)
     for row in range(neighbor_count):
-        if row < _SORTED_NEIGHBORS:
+        is_sorted = row < _SORTED_NEIGHBORS
+        if is_sorted:
             _move_nearest(neighbor_rows, row, neighbor_count)
         if neighbor_rows[row, SQUARED_DISTANCE] <= squared_range:
-            new_count = _cut(rings, ring, count, neighbor_rows, row)
+            new_count = _cut_polygon(rings, ring, count, neighbor_rows, row)
             if new_count >= 0:
                 ring = 1 - ring
                 count = new_count
                 squared_range = _compute_squared_range(rings, ring, count)
-        elif row < _SORTED_NEIGHBORS:
+        elif is_sorted:
+            # This is the nearest of the remaining neighbors, so that none of them can cut the cell.
             break
-    return CellPolygon(ring, count, 0)
+    return CellPolygon(ring=ring, vertex_count=count, start=0)
 
 
 @inlined_kernel
 def _compute_squared_range(rings: Array, ring: int, count: int) -> float:
-    """Return the square of the largest distance at which a neighbor can cut the polygon, m²."""
+    """Return the square of the largest distance at which a neighbor can cut the polygon, m².
+
+    The neighbor can be twice as far away as the farthest vertex.
+    """
     squared_range = 0.0
     for k in range(count):
         x = rings[ring, k, X]
         y = rings[ring, k, Y]
-        squared_range = max(squared_range, 4.0 * (x * x + y * y))
+        squared_range = max(squared_range, 2.0**2 * (x * x + y * y))
     return squared_range
 
 
@@ -195,46 +205,61 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 
 @inlined_kernel
-def _cut(rings: Array, old: int, count: int, neighbor_rows: Array, row: int) -> int:
-    """Write the part of a polygon on the generator's side of a bisector to the other ring.
+def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
+    """Cut the polygon in a ring by the bisector to a neighbor; write the generator's side to the other ring.
 
     Return its number of vertices, or -1, without writing anything, if the bisector does not cut the polygon.
     """
-    farthest = _compute_excess(rings, old, count, neighbor_rows, row)
+    farthest = _compute_excess(rings, ring, count, neighbor_rows, row)
     if farthest < 0:
         return -1
-    # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex.
-    last = farthest
+    # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex. They
+    # are those from `first_cut` to `last_cut`; `after` is the vertex after them, and `before` the one before.
+    last_cut = farthest
     after = farthest
     for _ in range(count):
-        after = last + 1 if last + 1 < count else 0
-        if rings[old, after, _EXCESS] <= 0.0:
+        after = _get_next_vertex(last_cut, count)
+        if rings[ring, after, _EXCESS] <= 0.0:
             break
-        last = after
+        last_cut = after
     else:
         return 0
-    first = farthest
-    while rings[old, first - 1 if first else count - 1, _EXCESS] > 0.0:
-        first = first - 1 if first else count - 1
-    size = 0
-    last_kept = after
+    first_cut = farthest
+    before = _get_previous_vertex(first_cut, count)
+    while rings[ring, before, _EXCESS] > 0.0:
+        first_cut = before
+        before = _get_previous_vertex(first_cut, count)
+    other_ring = 1 - ring
+    new_count = 0
     k = after
-    while k != first:
+    while k != first_cut:
         for column in (X, Y, BEYOND):
-            rings[1 - old, size, column] = rings[old, k, column]
-        last_kept = k
-        size += 1
-        k = k + 1 if k + 1 < count else 0
+            rings[other_ring, new_count, column] = rings[ring, k, column]
+        new_count += 1
+        k = _get_next_vertex(k, count)
     robot = neighbor_rows[row, ROBOT]
-    if rings[old, last_kept, _EXCESS] == 0.0:
-        rings[1 - old, size - 1, BEYOND] = robot
+    if rings[ring, before, _EXCESS] == 0.0:
+        # The bisector passes through this vertex, where the new edge begins.
+        rings[other_ring, new_count - 1, BEYOND] = robot
     else:
-        _add_crossing(rings, old, size, last_kept, first, robot)
-        size += 1
-    if rings[old, after, _EXCESS] < 0.0:
-        _add_crossing(rings, old, size, after, last, rings[old, last, BEYOND])
-        size += 1
-    return size
+        _add_crossing(rings, ring, new_count, before, first_cut, robot)
+        new_count += 1
+    if rings[ring, after, _EXCESS] < 0.0:
+        _add_crossing(rings, ring, new_count, after, last_cut, rings[ring, last_cut, BEYOND])
+        new_count += 1
+    return new_count
+
+
+@inlined_kernel
+def _get_next_vertex(k: int, count: int) -> int:
+    """Return the vertex after vertex k of a polygon with `count` vertices."""
+    return k + 1 if k + 1 < count else 0
+
+
+@inlined_kernel
+def _get_previous_vertex(k: int, count: int) -> int:
+    """Return the vertex before vertex k of a polygon with `count` vertices."""
+    return k - 1 if k > 0 else count - 1
 
 
 @inlined_kernel
@@ -255,19 +280,23 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
 
 
 @inlined_kernel
-def _add_crossing(rings: Array, old: int, size: int, inner: int, outer: int, beyond: float) -> None:
-    """Write the intersection of an edge with the bisector as vertex `size` of the other ring."""
-    inner_excess = rings[old, inner, _EXCESS]
-    fraction = inner_excess / (inner_excess - rings[old, outer, _EXCESS])
+def _add_crossing(rings: Array, ring: int, new_vertex: int, inner: int, outer: int, beyond: float) -> None:
+    """Write the intersection of an edge with the bisector to the other ring.
+
+    The edge connects the vertices `inner` and `outer`, which lie on this side of the bisector and beyond it.
+    """
+    other_ring = 1 - ring
+    inner_excess = rings[ring, inner, _EXCESS]
+    fraction = inner_excess / (inner_excess - rings[ring, outer, _EXCESS])
     for column in (X, Y):
-        step = rings[old, outer, column] - rings[old, inner, column]
-        rings[1 - old, size, column] = rings[old, inner, column] + fraction * step
-    rings[1 - old, size, BEYOND] = beyond
+        step = rings[ring, outer, column] - rings[ring, inner, column]
+        rings[other_ring, new_vertex, column] = rings[ring, inner, column] + fraction * step
+    rings[other_ring, new_vertex, BEYOND] = beyond
 
 
 @inlined_kernel
 def write_cell(
-    workspace: Workspace, polygon: CellPolygon, points: Array, i: int, cells: CellArrays, total: int
+    workspace: Workspace, polygon: CellPolygon, points: Array, i: int, cells: CellArrays, edge_count: int
 ) -> int:
     """Write mass, centroid and edges of the cell of robot i.
 
@@ -281,7 +310,7 @@ def write_cell(
         Number of the robot.
     cells : CellArrays
         Changed in place. Edges beyond the last row of its array are not written.
-    total : int
+    edge_count : int
         Number of edges of the previous cells.
 
     Returns
@@ -295,8 +324,8 @@ def write_cell(
     moment_x = 0.0
     moment_y = 0.0
     k = polygon.start
-    for edge in range(total, total + polygon.vertex_count):
-        after = k + 1 if k + 1 < polygon.vertex_count else 0
+    for edge in range(edge_count, edge_count + polygon.vertex_count):
+        after = _get_next_vertex(k, polygon.vertex_count)
         x = rings[polygon.ring, k, X]
         y = rings[polygon.ring, k, Y]
         u = rings[polygon.ring, after, X]
@@ -306,10 +335,10 @@ def write_cell(
         moment_x += cross * (x + u)
         moment_y += cross * (y + v)
         if edge < len(edges):
-            edges[edge, _EDGE_START_X] = x
-            edges[edge, _EDGE_START_Y] = y
-            edges[edge, _EDGE_END_X] = u
-            edges[edge, _EDGE_END_Y] = v
+            edges[edge, EDGE_START_X] = x
+            edges[edge, EDGE_START_Y] = y
+            edges[edge, EDGE_END_X] = u
+            edges[edge, EDGE_END_Y] = v
             edges[edge, EDGE_CELL] = i
             edges[edge, EDGE_BEYOND] = rings[polygon.ring, k, BEYOND]
         k = after
@@ -317,4 +346,4 @@ def write_cell(
     cells.mass[i] = max(0.5 * doubled_area, 0.0)
     cells.centroid[i, 0] = points[i, 0] + moment_x * factor
     cells.centroid[i, 1] = points[i, 1] + moment_y * factor
-    return total + polygon.vertex_count
+    return edge_count + polygon.vertex_count

@@ -3,8 +3,8 @@
 A mesh stores three half-edges for each triangle, counter-clockwise. Half-edge h begins at the point
 ``mesh[CORNER, h]``, and ``mesh[TWIN, h]`` is the half-edge of the neighboring triangle along the same
 edge, or -1. One entry after each triangle is unused, so that ``h & 3`` is the position of h within its
-triangle and ``h & -4`` the first half-edge of that triangle. Three distant sentinels enclose all points; they
-are the last three.
+triangle and ``h & -4`` the first half-edge of that triangle. Three distant sentinels enclose the n points,
+and follow them in arrays of points. There are therefore 2 n + 1 triangles, and 8 n + 4 entries.
 
 An edge is Delaunay if the two angles opposite to it add up to at most half a turn, that is, if their
 cotangents add up to at least 0. The cotangents also give the positions of the Voronoi vertices on the edge's
@@ -26,13 +26,15 @@ CORNER = 0
 """Row of a mesh: the point at which each half-edge begins."""
 TWIN = 1
 """Row of a mesh: the half-edge of the neighboring triangle along the same edge; -1 where there is none."""
+ENTRIES_PER_TRIANGLE = 4
+"""Number of entries of a mesh per triangle: three half-edges, and an unused one."""
 
 _TOLERANCE = 1e-14
-"""Sum of two cotangents, relative to their size, that counts as rounding; such an edge is not flipped."""
+"""Size of a negative sum of two cotangents, relative to theirs, up to which it may be a rounding error."""
 _MAX_FLIPS_PER_POINT = 16
 """Number of flips, on average, after which triangulating has failed: rounding may cause endless flips."""
 _MIN_CROSS = 1e-300
-"""Smallest cross product by which a cotangent is divided."""
+"""Cross product that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
 
 
 @kernel
@@ -61,6 +63,21 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
 
 
 @inlined_kernel
+def is_half_edge(h: int) -> bool:
+    """Return whether an entry of a mesh is a half-edge: every fourth one is unused.
+
+    Parameters
+    ----------
+    h : int
+
+    Returns
+    -------
+    bool
+    """
+    return (h & 3) < 3
+
+
+@inlined_kernel
 def get_next(h: int) -> int:
     """Return the half-edge that follows another one in its triangle.
 
@@ -72,7 +89,7 @@ def get_next(h: int) -> int:
     -------
     int
     """
-    return h + 1 if h & 3 < 2 else h - 2
+    return h + 1 if (h & 3) < 2 else h - 2
 
 
 @inlined_kernel
@@ -102,19 +119,20 @@ def get_previous(h: int) -> int:
     -------
     int
     """
-    return h - 1 if h & 3 else h + 2
+    return h - 1 if (h & 3) > 0 else h + 2
 
 
 @kernel
 def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
     """Flip all edges that are no longer Delaunay; return whether the result is a triangulation."""
-    flips = 0
+    flip_count = 0
     is_ccw = _compute_all_cotangents(mesh, points, cotangents)
     for h in range(mesh.shape[1]):
-        if h & 3 < 3 and h < mesh[TWIN, h] and _must_flip(mesh, cotangents, h):
-            flips, are_new_ccw = _flip_from(mesh, points, cotangents, stack, h, flips)
+        # Of the two half-edges of an edge, only the first one is tested.
+        if is_half_edge(h) and h < mesh[TWIN, h] and _must_flip(mesh, cotangents, h):
+            flip_count, are_new_ccw = _flip_from(mesh, points, cotangents, stack, h, flip_count)
             is_ccw &= are_new_ccw
-            if flips < 0:
+            if flip_count < 0:
                 return False
     # Flips may have removed triangles that were clockwise before.
     return is_ccw or _compute_all_cotangents(mesh, points, cotangents)
@@ -127,42 +145,56 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
     for k in range(3):
         mesh[CORNER, k] = n + k
         mesh[TWIN, k] = -1
-    flips = 0
+    flip_count = 0
     triangle = 0
     for i in range(n):
         triangle = _find_triangle(mesh, points, points[i, 0], points[i, 1], triangle, 2 * i + 1)
         if triangle < 0:
             return False
-        new = 8 * i + 4
-        _split_triangle(mesh, triangle, new, i)
-        for h in (triangle, new, new + 4):
+        # Each point adds two triangles to those before.
+        second = ENTRIES_PER_TRIANGLE * (2 * i + 1)
+        third = second + ENTRIES_PER_TRIANGLE
+        _split_triangle(mesh, triangle, second, third, i)
+        for h in (triangle, second, third):
             _compute_cotangents(mesh, points, cotangents, h)
-        for h in (triangle, new, new + 4):
-            flips, _ = _flip_from(mesh, points, cotangents, stack, h, flips)
-        if flips < 0:
-            return False
+        for h in (triangle, second, third):
+            flip_count, _ = _flip_from(mesh, points, cotangents, stack, h, flip_count)
+            if flip_count < 0:
+                return False
     return _compute_all_cotangents(mesh, points, cotangents)
 
 
 @kernel
-def _split_triangle(mesh: Mesh, triangle: int, new: int, i: int) -> None:
-    """Split a triangle a b c by a point i: a b i takes its place, and b c i and c a i begin at `new`."""
-    for k in range(2):
-        edge = triangle + 1 + k
-        h = new + 4 * k
-        mesh[CORNER, h] = mesh[CORNER, edge]
-        mesh[CORNER, h + 1] = mesh[CORNER, triangle + (2 + k) % 3]
-        mesh[CORNER, h + 2] = i
-        _link(mesh, h, mesh[TWIN, edge])
-    mesh[CORNER, triangle + 2] = i
-    _link(mesh, triangle + 1, new + 2)
-    _link(mesh, new + 1, new + 6)
-    _link(mesh, new + 5, triangle + 2)
+def _split_triangle(mesh: Mesh, first: int, second: int, third: int, i: int) -> None:
+    """Split a triangle by a point i into three triangles, given by their first half-edges.
+
+    The corners a, b and c of the triangle become a b i, which takes its place, b c i and c a i.
+    """
+    a = mesh[CORNER, first]
+    b = mesh[CORNER, first + 1]
+    c = mesh[CORNER, first + 2]
+    _write_triangle(mesh, second, b, c, i)
+    _write_triangle(mesh, third, c, a, i)
+    # The outer edges keep their neighbors, and the inner edges are new.
+    _link(mesh, second, mesh[TWIN, first + 1])
+    _link(mesh, third, mesh[TWIN, first + 2])
+    mesh[CORNER, first + 2] = i
+    _link(mesh, first + 1, second + 2)
+    _link(mesh, second + 1, third + 2)
+    _link(mesh, third + 1, first + 2)
+
+
+@inlined_kernel
+def _write_triangle(mesh: Mesh, first: int, a: int, b: int, c: int) -> None:
+    """Write the corners of a triangle."""
+    mesh[CORNER, first] = a
+    mesh[CORNER, first + 1] = b
+    mesh[CORNER, first + 2] = c
 
 
 @inlined_kernel
 def _link(mesh: Mesh, h: int, twin: int) -> None:
-    """Make two half-edges each other's twins; a twin of -1 is none."""
+    """Make two half-edges each other's twins. If `twin` is -1, the first one has none."""
     mesh[TWIN, h] = twin
     if twin >= 0:
         mesh[TWIN, twin] = h
@@ -172,7 +204,7 @@ def _link(mesh: Mesh, h: int, twin: int) -> None:
 def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> bool:
     """Compute the cotangents in all triangles; return whether all triangles are counter-clockwise."""
     is_ccw = True
-    for h in range(0, mesh.shape[1], 4):
+    for h in range(0, mesh.shape[1], ENTRIES_PER_TRIANGLE):
         is_ccw &= _compute_cotangents(mesh, points, cotangents, h)
     return is_ccw
 
@@ -211,39 +243,51 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
     """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 on failure."""
     triangle = start
-    for _ in range(3 * triangle_count + 3):
-        for h in range(triangle, triangle + 3):
-            a = mesh[CORNER, h]
-            b = mesh[CORNER, get_next(h)]
-            ax = points[a, 0]
-            ay = points[a, 1]
-            if (points[b, 0] - ax) * (y - ay) - (points[b, 1] - ay) * (x - ax) < 0.0:
-                break
-        else:
+    # Rounding may lead the walk in a circle.
+    max_steps = 3 * triangle_count + 3
+    for _ in range(max_steps):
+        h = _find_edge_to_cross(mesh, points, triangle, x, y)
+        if h < 0:
             return triangle
-        if mesh[TWIN, h] < 0:
-            break
-        triangle = get_first(mesh[TWIN, h])
+        twin = mesh[TWIN, h]
+        if twin < 0:
+            return -1
+        triangle = get_first(twin)
+    return -1
+
+
+@inlined_kernel
+def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: float) -> int:
+    """Return a half-edge of a triangle that has (x, y) on its right; -1 if the triangle contains (x, y)."""
+    for h in range(triangle, triangle + 3):
+        a = mesh[CORNER, h]
+        b = mesh[CORNER, get_next(h)]
+        ax = points[a, 0]
+        ay = points[a, 1]
+        if (points[b, 0] - ax) * (y - ay) - (points[b, 1] - ay) * (x - ax) < 0.0:
+            return h
     return -1
 
 
 @inlined_kernel
 def _flip_from(
-    mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flips: int
+    mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flip_count: int
 ) -> tuple[int, bool]:
     """Flip the edge of h if it is not Delaunay, then the edges around it, until all of them are.
 
-    Return the number of flips so far, -1 on failure, and whether all new triangles are counter-clockwise.
+    Return the number of all flips so far, -1 on failure, and whether all new triangles are counter-clockwise.
     """
     stack[0] = h
-    size = 1
+    stack_size = 1
     is_ccw = True
-    while size and flips >= 0:
-        size -= 1
-        a = stack[size]
+    while stack_size > 0:
+        stack_size -= 1
+        a = stack[stack_size]
         b = mesh[TWIN, a]
         if b < 0 or not _must_flip(mesh, cotangents, a):
             continue
+        # The new edge connects the two corners opposite to the old one. `before_a` and `before_b` become its
+        # half-edges, and b and a take over their former edges.
         before_a = get_previous(a)
         before_b = get_previous(b)
         mesh[CORNER, a] = mesh[CORNER, before_b]
@@ -253,12 +297,12 @@ def _flip_from(
         _link(mesh, before_a, before_b)
         is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first(a))
         is_ccw &= _compute_cotangents(mesh, points, cotangents, get_first(b))
-        flips += 1
-        if flips > _MAX_FLIPS_PER_POINT * len(points) or size + 4 > len(stack):
+        flip_count += 1
+        if flip_count > _MAX_FLIPS_PER_POINT * len(points) or stack_size + 4 > len(stack):
             return -1, False
-        stack[size] = a
-        stack[size + 1] = get_next(a)
-        stack[size + 2] = b
-        stack[size + 3] = get_next(b)
-        size += 4
-    return flips, is_ccw
+        stack[stack_size] = a
+        stack[stack_size + 1] = get_next(a)
+        stack[stack_size + 2] = b
+        stack[stack_size + 3] = get_next(b)
+        stack_size += 4
+    return flip_count, is_ccw

@@ -13,6 +13,9 @@ _CHORDS_PER_ARC = 64
 _MIN_AREA = 1e-14
 """Area, relative to the square of the radius, below which a part is empty up to rounding."""
 
+_MIN_SQUARED_LENGTH = 1e-300
+"""Squared length that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
+
 
 class _Arcs(NamedTuple):
     """One arc of the disc for each edge; its length may be zero."""
@@ -55,12 +58,13 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     edge contributes the triangle that it spans with the generator, clipped to the disc: a smaller triangle
     for the part of the edge inside the disc, and circular sectors for the rest.
     """
-    cells = len(radii)
-    # A disc that contains the whole cell cuts nothing, however large it is.
-    size = np.zeros(cells)
-    np.maximum.at(size, edges.cell, compute_lengths(edges.start))
-    radius = np.minimum(radii, 2.0 * size + 1.0)[edges.cell]
+    cell_count = len(radii)
+    # A disc that contains the whole cell cuts nothing. Very large and infinite radii are replaced.
+    reach = np.zeros(cell_count)
+    np.maximum.at(reach, edges.cell, compute_lengths(edges.start))
+    radius = np.minimum(radii, 2.0 * reach + 1.0)[edges.cell]
     cut = _cut_by_discs(edges, radius)
+    # The triangles that the parts of the edges in the discs span with the generators, and then the sectors.
     cross = cut.first[:, 0] * cut.last[:, 1] - cut.first[:, 1] * cut.last[:, 0]
     doubled_area = cross.copy()
     doubled_moment = cross[:, None] * (cut.first + cut.last) / 3.0
@@ -69,11 +73,11 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
         factor = 2.0 / 3.0 * radius**3
         doubled_moment[:, 0] += factor * (np.sin(angle + turn) - np.sin(angle))
         doubled_moment[:, 1] += factor * (np.cos(angle) - np.cos(angle + turn))
-    area = 0.5 * np.bincount(edges.cell, doubled_area, minlength=cells)
-    moment_x = np.bincount(edges.cell, doubled_moment[:, 0], minlength=cells)
-    moment_y = np.bincount(edges.cell, doubled_moment[:, 1], minlength=cells)
+    area = 0.5 * np.bincount(edges.cell, doubled_area, minlength=cell_count)
+    moment_x = np.bincount(edges.cell, doubled_moment[:, 0], minlength=cell_count)
+    moment_y = np.bincount(edges.cell, doubled_moment[:, 1], minlength=cell_count)
     moment = np.column_stack([moment_x, moment_y])
-    is_filled = area > _MIN_AREA * np.minimum(radii, size) ** 2
+    is_filled = area > _MIN_AREA * np.minimum(radii, reach) ** 2
     centroid = 0.5 * moment / np.where(is_filled, area, 1.0)[:, None]
     return np.where(is_filled, area, 0.0), np.where(is_filled[:, None], centroid, 0.0)
 
@@ -95,6 +99,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     CellEdges
         Some edges have length zero.
     """
+    # A disc that contains all cells cuts nothing. Very large and infinite radii are replaced.
     max_coordinate = float(np.abs(edges.start).max(initial=0.0))
     radius = np.minimum(radii[edges.cell], 4.0 * max_coordinate + 1.0)
     cut = _cut_by_discs(edges, radius)
@@ -105,10 +110,10 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     for start_angle, turn in (cut.arc_before, cut.arc_after):
         angle = start_angle[:, None] + turn[:, None] * fraction
         points = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        curved = np.flatnonzero(turn != 0.0)
-        starts.append(points[curved, :-1].reshape(-1, 2))
-        ends.append(points[curved, 1:].reshape(-1, 2))
-        cells.append(np.repeat(edges.cell[curved], _CHORDS_PER_ARC))
+        has_arc = turn != 0.0
+        starts.append(points[has_arc, :-1].reshape(-1, 2))
+        ends.append(points[has_arc, 1:].reshape(-1, 2))
+        cells.append(np.repeat(edges.cell[has_arc], _CHORDS_PER_ARC))
     cell = np.concatenate(cells)
     order = np.argsort(cell, kind="stable")
     return CellEdges(
@@ -122,7 +127,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
 def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
     """Cut edges by discs around their generators, of radius (e,) m for each edge."""
     step = edges.end - edges.start
-    squared_length = np.maximum((step * step).sum(axis=1), 1e-300)
+    squared_length = np.maximum((step * step).sum(axis=1), _MIN_SQUARED_LENGTH)
     # The edge is start + t step with t from 0 to 1; the disc contains it from middle - half to middle + half.
     middle = -(edges.start * step).sum(axis=1) / squared_length
     nearest = edges.start + middle[:, None] * step

@@ -33,11 +33,9 @@ def find_own_samples(
             if is_own[i, k]:
                 x = samples[k, 0]
                 y = samples[k, 1]
-                squared_distance = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
-                is_own[i, k] = (
-                    squared_distance
-                    <= (x - neighbor_positions[m, 0]) ** 2 + (y - neighbor_positions[m, 1]) ** 2
-                )
+                own_square = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
+                other_square = (x - neighbor_positions[m, 0]) ** 2 + (y - neighbor_positions[m, 1]) ** 2
+                is_own[i, k] = own_square <= other_square
     return is_own
 
 

@@ -22,11 +22,19 @@ from robocov.voronoi.clipping import (
     create_workspace,
     write_cell,
 )
-from robocov.voronoi.delaunay import CORNER, TWIN, Mesh, get_next, get_previous, update_triangulation
+from robocov.voronoi.delaunay import (
+    CORNER,
+    TWIN,
+    Mesh,
+    get_next,
+    get_previous,
+    is_half_edge,
+    update_triangulation,
+)
 
-_MASS_TOLERANCE = 1e-12
-"""Difference between the total area of the cells and the area of the region, relative to the latter, that
-counts as rounding."""
+_AREA_TOLERANCE = 1e-12
+"""Difference between the total area of the cells and the area of the region, relative to the latter, up to
+which it may be a rounding error."""
 
 
 class Triangulation(NamedTuple):
@@ -43,7 +51,7 @@ class Triangulation(NamedTuple):
 class _Fan(NamedTuple):
     """The triangles around a robot, counter-clockwise."""
 
-    neighbors: int
+    neighbor_count: int
     """Number of neighbors, and of Voronoi vertices."""
     half_edge_to_lowest: int
     """Half-edge to the neighbor with the lowest number."""
@@ -67,7 +75,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     sides : (k, 5) array
         The region, as `Region.sides`.
     mesh : (2, 8 n + 4) int32 array
-        Triangulation of a previous partition, or -1 in ``mesh[0, 0]``. Changed in place.
+        Triangulation of a previous partition; ``mesh[CORNER, 0]`` is -1 if there is none. Changed in place.
     cells : CellArrays
         Changed in place.
 
@@ -81,14 +89,15 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     if not _triangulate(triangulation, points, sides):
         return -1
     workspace = create_workspace(len(points), len(sides))
-    total = 0
-    mass = 0.0
+    edge_count = 0
+    total_area = 0.0
     for i in range(len(points)):
         polygon = _find_cell(workspace, triangulation, points, sides, i)
-        total = write_cell(workspace, polygon, points, i, cells, total)
-        mass += cells.mass[i]
-    area = _compute_region_area(sides)
-    return total if abs(mass - area) <= _MASS_TOLERANCE * area else -1
+        edge_count = write_cell(workspace, polygon, points, i, cells, edge_count)
+        total_area += cells.mass[i]
+    region_area = _compute_region_area(sides)
+    is_complete = abs(total_area - region_area) <= _AREA_TOLERANCE * region_area
+    return edge_count if is_complete else -1
 
 
 @kernel
@@ -96,29 +105,35 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     """Triangulate the robots and three sentinels; return whether it succeeded."""
     n = len(points)
     x, y, size = _compute_center_and_size(sides)
-    corners = np.empty((n + 3, 2))
+    vertices = np.empty((n + 3, 2))
     for i in range(n):
-        corners[i, 0] = points[i, 0]
-        corners[i, 1] = points[i, 1]
+        vertices[i, 0] = points[i, 0]
+        vertices[i, 1] = points[i, 1]
         # Within this distance, robots lie in the triangle of the sentinels, and no sentinel cuts a cell.
         if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
             return False
-    # The sentinels are the corners of a large triangle around the region.
-    corners[n, 0] = x - 8.0 * size
-    corners[n, 1] = y - 5.0 * size
-    corners[n + 1, 0] = x + 8.0 * size
-    corners[n + 1, 1] = y - 5.0 * size
-    corners[n + 2, 0] = x
-    corners[n + 2, 1] = y + 9.0 * size
+    _place_sentinels(vertices[n:], x, y, size)
     mesh = triangulation.mesh
-    # The array first serves as working memory; its actual content is written below.
     half_edges = triangulation.half_edges
-    if not update_triangulation(mesh, corners, triangulation.cotangents, half_edges):
+    # The triangulation needs a stack. The array of half-edges is still free, and is filled afterwards.
+    stack = half_edges
+    if not update_triangulation(mesh, vertices, triangulation.cotangents, stack):
         return False
     for h in range(mesh.shape[1]):
-        if h & 3 < 3:  # The fourth entry of each triangle is unused.
+        if is_half_edge(h):
             half_edges[mesh[CORNER, h]] = h
     return True
+
+
+@inlined_kernel
+def _place_sentinels(sentinels: Array, x: float, y: float, size: float) -> None:
+    """Write the three sentinels, which are the corners of a large triangle around (x, y)."""
+    sentinels[0, 0] = x - 8.0 * size
+    sentinels[0, 1] = y - 5.0 * size
+    sentinels[1, 0] = x + 8.0 * size
+    sentinels[1, 1] = y - 5.0 * size
+    sentinels[2, 0] = x
+    sentinels[2, 1] = y + 9.0 * size
 
 
 @kernel
@@ -167,11 +182,11 @@ def _find_cell(
             - (sides[k, SIDE_NORMAL_X] * points[i, 0] + sides[k, SIDE_NORMAL_Y] * points[i, 1]),
         )
     if clearance > 0.0 and fan.squared_reach < clearance * clearance:
-        return CellPolygon(0, fan.neighbors, fan.lowest)
+        return CellPolygon(ring=0, vertex_count=fan.neighbor_count, start=fan.lowest)
     # Start at the neighbor with the lowest number, so that the result does not depend on the order of the
     # triangles.
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
-    return clip_cell(workspace, fan.neighbors, points, sides, i)
+    return clip_cell(workspace, fan.neighbor_count, points, sides, i)
 
 
 @inlined_kernel

@@ -19,7 +19,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.density.base import Density
-from robocov.density.cell_edges import CellEdges
+from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbors import Neighbors
@@ -63,12 +63,12 @@ class WeightedCells(Cells):
         The edges of a cell are not in order. They include holes, clockwise.
         """
         lines = split_into_chords(self.pieces, _EDGE_DEVIATION * self.region.diameter)
-        chords = [len(line) - 1 for line in lines]
+        chord_counts = [len(line) - 1 for line in lines]
         return CellEdges(
             start=np.concatenate([np.empty((0, 2)), *(line[:-1] for line in lines)]),
             end=np.concatenate([np.empty((0, 2)), *(line[1:] for line in lines)]),
-            cell=self.pieces[:, CELL].astype(np.intp).repeat(chords),
-            beyond=self.pieces[:, BEYOND].astype(np.intp).repeat(chords),
+            cell=self.pieces[:, CELL].astype(np.intp).repeat(chord_counts),
+            beyond=self.pieces[:, BEYOND].astype(np.intp).repeat(chord_counts),
         )
 
     @cached_property
@@ -95,7 +95,7 @@ class WeightedCells(Cells):
             return super().polar_moment
         weight = 1.0 if self.density is None else self.density.max_value
         moments = compute_moments(self.pieces, cell_count=len(self.generators))
-        return np.where(self.mass > 0.0, weight * moments[:, 3], 0.0)
+        return np.where(self.mass > 0.0, weight * moments[:, POLAR_MOMENT], 0.0)
 
 
 def partition_by_travel_time(
@@ -167,6 +167,7 @@ def _compute_weighted_cells(
     """Compute cells of robots whose speeds are not all equal, for a density of 1."""
     robot, other = neighbors.list_pairs()
     other_positions = points[other] if reported_positions is None else np.asarray(reported_positions)
+    # The cells among equally fast robots are bounded by straight edges, from which circles cut parts off.
     is_equal = speeds[robot] == speeds[other]
     equal_cells = partition(
         points,
@@ -187,30 +188,33 @@ def _compute_weighted_cells(
             is_straight=is_straight,
         )
     moments = compute_moments(pieces, cell_count=len(points))
-    areas = moments[:, 0]
-    first_moments = moments[:, 1:3]
+    areas = moments[:, MASS]
+    first_moments = moments[:, [MOMENT_X, MOMENT_Y]]
     mass = np.where(areas < _MIN_AREA * region.area, 0.0, areas)
     centroid = points + first_moments / np.where(mass > 0.0, mass, np.inf)[:, None]
+    # A cell without arcs is that among equally fast robots, with the same mass and centroid to the last bit.
+    mass = np.where(is_straight, equal_cells.mass, mass)
+    centroid = np.where(is_straight[:, None], equal_cells.centroid, centroid)
     speeds.setflags(write=False)
     return WeightedCells(
         generators=points,
-        mass=np.where(is_straight, equal_cells.mass, mass),
-        centroid=np.where(is_straight[:, None], equal_cells.centroid, centroid),
+        mass=mass,
+        centroid=centroid,
         speeds=speeds,
         pieces=pieces,
         region=region,
     )
 
 
-def _convert_speeds(values: object, robots: int) -> Array:
+def _convert_speeds(values: object, robot_count: int) -> Array:
     """Convert speeds to a new array of shape (n,); raise InputError if they are not positive numbers."""
     try:
         speeds = np.array(values, dtype=np.float64)
-        is_valid = speeds.shape == (robots,) and bool(((speeds > 0.0) & (speeds < np.inf)).all())
+        is_valid = speeds.shape == (robot_count,) and bool(((speeds > 0.0) & (speeds < np.inf)).all())
     except (TypeError, ValueError):
         is_valid = False
     if not is_valid:
-        raise InputError(f"speeds: expected {robots} positive numbers, got {quote(_to_list(values))}")
+        raise InputError(f"speeds: expected {robot_count} positive numbers, got {quote(_to_list(values))}")
     return speeds
 
 

@@ -258,7 +258,7 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
             )
             row = slice(i, i + 1)
             one = VoronoiPartition(
-                cells.generators[row], cells.mass[row], cells.centroid[row], _find_edges=lambda e=alone: e
+                cells.generators[row], cells.mass[row], cells.centroid[row], _compute_edges=lambda e=alone: e
             )
             assert find_best_points(one, f)[0].tobytes() == together[i].tobytes()
 
