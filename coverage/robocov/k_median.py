@@ -21,7 +21,7 @@ Heartbeat: TypeAlias = Callable[[], None]
 """Called once per iteration. It may raise, to cancel the computation."""
 
 _MIN_SAVING = 1e-9
-"""Fraction of the cost that an iteration must save: far more than rounding, so that none undoes another."""
+"""Fraction of the cost that an iteration must save: far more than rounding, so that iterations end."""
 _MAX_ROUNDS = 60
 """Maximum number of rounds of `improve_sources`; usually a few are enough."""
 _MIN_SAVING_OF_ROUND = 1e-4
@@ -118,15 +118,15 @@ def run_lloyd(
     """
     if fixed is None:
         fixed = np.zeros(len(sources), dtype=bool)
-    previous = sources
-    previous_cost = np.inf
+    best = sources
+    best_cost = np.inf
     while True:
         heartbeat()
         cost, next_sources = _apply_lloyd_step(table, sources, fixed)
-        if not cost < previous_cost * (1.0 - _MIN_SAVING):
-            return previous
-        previous = sources
-        previous_cost = cost
+        if not cost < best_cost * (1.0 - _MIN_SAVING):
+            return best
+        best = sources
+        best_cost = cost
         sources = next_sources
 
 
@@ -274,17 +274,18 @@ def rebuild_sources(table: Array, sources: IntArray, fixed: BoolArray, threshold
 
 
 def _compute_cost(table: Array, sources: IntArray) -> float:
+    """Return the cost of sources."""
     return float(table[:, sources].min(axis=1).sum())
 
 
 @kernel
 def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
     """Return the nearest source of each target, and the distances of the nearest two."""
-    targets = len(table)
-    owner = np.zeros(targets, dtype=np.intp)
-    nearest = np.full(targets, np.inf)
-    second = np.full(targets, np.inf)
-    for t in range(targets):
+    target_count = len(table)
+    owner = np.zeros(target_count, dtype=np.intp)
+    nearest = np.full(target_count, np.inf)
+    second = np.full(target_count, np.inf)
+    for t in range(target_count):
         for k in range(len(sources)):
             distance = table[t, sources[k]]
             if distance < nearest[t]:
@@ -373,18 +374,19 @@ def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[
 
 @kernel
 def _replace_sources(
-    table: Array, sources: IntArray, order: IntArray, unchanged: int
+    table: Array, sources: IntArray, order: IntArray, unchanged_count: int
 ) -> tuple[float, IntArray]:
-    """Keep the first `unchanged` sources of an order, and replace the others greedily one by one.
+    """Replace all but the first sources of an order greedily, one after another.
 
-    Return the cost and the sources.
+    `order` lists the indices of all sources; the first `unchanged_count` of them keep their columns. Return
+    the cost and the sources.
     """
     replaced = sources.copy()
     distance = np.full(len(table), np.inf)
     is_taken = np.zeros(table.shape[1], dtype=np.bool_)
     for position in range(len(order)):
         k = order[position]
-        if position >= unchanged:
+        if position >= unchanged_count:
             sums = np.zeros(table.shape[1])
             for t in range(len(table)):
                 for column in range(table.shape[1]):

@@ -26,6 +26,8 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 _MIN_DISTANCE = 1e-12
 """Distance that is assumed between robots at the same position, m."""
+_MIN_GOAL_DISTANCE = 1e-300
+"""Distance to the goal that replaces smaller ones in divisions, so that nothing is divided by zero, m."""
 
 
 class PotentialGains(NamedTuple):
@@ -36,11 +38,11 @@ class PotentialGains(NamedTuple):
     k_rep : float, N m³
         Strength of the repulsion (24).
     rho_0 : float, m
-        Its range.
+        Range of the repulsion.
     k_att : float, N/m³
         Strength of the attraction (27).
     max_attraction : float, N
-        Limit of its magnitude; may be infinite.
+        Limit of the magnitude of the attraction; may be infinite.
     """
 
     k_rep: float
@@ -102,16 +104,16 @@ def compute_potential_forces(
         y = positions[i, 1]
         dx = x - obstacle_points[i, 0]
         dy = y - obstacle_points[i, 1]
-        slope = _compute_repulsion(np.sqrt(dx * dx + dy * dy), gains.k_rep, gains.rho_0)
-        # The slope is nan if there is no obstacle point.
-        if slope > 0.0:
-            obstacle[i, 0] = slope * dx
-            obstacle[i, 1] = slope * dy
+        factor = _compute_repulsion_factor(np.sqrt(dx * dx + dy * dy), gains.k_rep, gains.rho_0)
+        # The factor is nan if there is no obstacle point.
+        if factor > 0.0:
+            obstacle[i, 0] = factor * dx
+            obstacle[i, 1] = factor * dy
         dx = goals[i, 0] - x
         dy = goals[i, 1] - y
-        slope = _compute_attraction(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
-        attraction[i, 0] = slope * dx
-        attraction[i, 1] = slope * dy
+        factor = _compute_attraction_factor(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
+        attraction[i, 0] = factor * dx
+        attraction[i, 1] = factor * dy
     if len(neighbors.indptr) > 0:
         robots = _sum_repulsion_of_neighbors(positions, neighbors, gains)
     else:
@@ -159,17 +161,17 @@ def compute_spread_directions(numbers: IntArray) -> Array:
 
 
 @kernel
-def _compute_repulsion(distance: float, k_rep: float, rho_0: float) -> float:
-    """Return the magnitude of (24) divided by the distance, N/m; zero at distance zero."""
+def _compute_repulsion_factor(distance: float, k_rep: float, rho_0: float) -> float:
+    """Return the magnitude of the repulsion (24) divided by the distance, N/m; zero at distance zero."""
     inverse = 1.0 / max(distance, CONTACT_DISTANCE)
     magnitude = k_rep * max(inverse - 1.0 / rho_0, 0.0) * inverse * inverse
     return magnitude / distance if distance > 0.0 else 0.0
 
 
 @kernel
-def _compute_attraction(squared_distance: float, k_att: float, max_attraction: float) -> float:
-    """Return the magnitude of (27) divided by the distance, N/m."""
-    distance = max(np.sqrt(squared_distance), 1e-300)
+def _compute_attraction_factor(squared_distance: float, k_att: float, max_attraction: float) -> float:
+    """Return the magnitude of the attraction (27) divided by the distance, N/m."""
+    distance = max(np.sqrt(squared_distance), _MIN_GOAL_DISTANCE)
     return float(min(k_att * squared_distance, max_attraction / distance))
 
 
@@ -230,9 +232,9 @@ def _add_repulsion(sums: Array, i: int, j: int, dx: float, dy: float, gains: Pot
         dx = _MIN_DISTANCE * x
         dy = _MIN_DISTANCE * y
         distance = _MIN_DISTANCE
-    slope = _compute_repulsion(distance, gains.k_rep, gains.rho_0)
-    sums[i, 0] += slope * dx
-    sums[i, 1] += slope * dy
+    factor = _compute_repulsion_factor(distance, gains.k_rep, gains.rho_0)
+    sums[i, 0] += factor * dx
+    sums[i, 1] += factor * dy
 
 
 @kernel

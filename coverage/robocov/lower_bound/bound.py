@@ -21,6 +21,8 @@ from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.geodesics import SOURCE_BINS
 from robocov.lower_bound.price_table import PriceTable, add_paid_shares
 from robocov.lower_bound.profit_bounds import (
+    CENTER_PROFIT,
+    PROFIT_BOUND,
     SiteData,
     TriangleScratch,
     bound_profits,
@@ -41,6 +43,10 @@ _FINAL_SMOOTHING = 0.125
 
 _SLACK = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
+
+_MIN_SCALE = 1e-9
+"""Smallest cost by which the dual is divided in a search, as a fraction of the cost if all sites were as far
+away as the map is large: the cost of a placement may be zero."""
 
 _MAX_ITERATIONS = 100
 """Maximum number of iterations of each search for prices."""
@@ -68,6 +74,9 @@ Before GEOS offsets walls, it simplifies them by up to 1 % of the offset.
 
 _ROUNDING = 1e-10
 """Allowance per robot and site, as a fraction of the map's size, far larger than all rounding errors."""
+
+_PROGRESS_BEFORE_TABLE = 0.1
+"""Fraction of the work that is done when the table of distances is built."""
 
 _PROGRESS_BEFORE_SEARCH = 0.2
 """Fraction of the work that is done when the search for prices starts."""
@@ -159,7 +168,7 @@ def compute_lower_bound(
     require_number("precision", precision, MIN_PRECISION, 1.0)
     report = progress or (lambda fraction: None)
     cost = CoverageCost(
-        environment, lattice, progress=lambda fraction: report(_PROGRESS_BEFORE_SEARCH / 2.0 * fraction)
+        environment, lattice, progress=lambda fraction: report(_PROGRESS_BEFORE_TABLE * fraction)
     )
     dual = _Dual(cost, np.asarray(positions, dtype=float), radius)
     best = _search_best_prices(dual, precision, report)
@@ -233,7 +242,8 @@ class _Dual:
         self._unit = geodesics.grid.unit
         self._robot_count = len(positions)
         result = cost(positions)
-        robots, is_inside = geodesics.snap_to_free_space(positions)  # (n, 2) grid steps; (n, c) bool
+        # The robots at (n, 2) grid steps, and whether each component of the free space contains them, (n, c).
+        robots, is_inside = geodesics.snap_to_free_space(positions)
         self.is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
         self.site_numbers: IntArray = np.flatnonzero(result.owner >= 0)
         weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
@@ -247,25 +257,35 @@ class _Dual:
         self.placement_cost = float(self._weights @ result.distances[self.site_numbers])
 
         site_positions = cost.points[self.site_numbers]
-        sites, _ = geodesics.snap_to_free_space(site_positions)  # (m, 2) grid steps
+        self._site_data = self._build_site_data(site_positions)
+        configuration_space = self._build_configuration_space(cost.environment, radius)
+        self._triangles = self._triangulate(configuration_space)
+        self._max_prices, self.first_prices = self._compute_first_prices(robots)
+
+        # The table starts with the robots and some of the sites where a robot can be.
+        self._table = PriceTable.build_empty()
+        self._candidate_spacing = self._choose_candidate_spacing(cost.spacing)
+        is_candidate = shapely.intersects_xy(configuration_space, site_positions[:, 0], site_positions[:, 1])
+        candidates = self._thin_out(self._site_data.sites[is_candidate])
+        self.add_candidates(np.concatenate([robots, candidates]))
+
+    def _build_site_data(self, positions: Array) -> SiteData:
+        """Return the data of the sites at (m, 2) m."""
+        geodesics = self._geodesics
+        sites, _ = geodesics.snap_to_free_space(positions)
         from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
-        self._site_data = SiteData(
+        return SiteData(
             walls=geodesics.walls,
             sites=sites,
             weights=self._weights,
             from_corners=np.ascontiguousarray(from_corners.T),
         )
-        configuration_space = self._build_configuration_space(cost.environment, radius)
-        self._triangles = self._triangulate(configuration_space)
-        self._max_prices, self.first_prices = self._compute_first_prices(robots)
 
-        # The table starts with the robots and one site in each square block of cells.
-        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * len(robots))
-        side = max(1, int(math.sqrt(len(sites) / count)))
-        self._candidate_spacing = side * cost.spacing / self._unit
-        inside = sites[shapely.intersects_xy(configuration_space, site_positions[:, 0], site_positions[:, 1])]
-        self._table = PriceTable.build_empty()
-        self.add_candidates(np.concatenate([robots, self._thin_out(inside)]))
+    def _choose_candidate_spacing(self, site_spacing: float) -> float:
+        """Return the side, grid steps, of square blocks of sites that leaves enough blocks for candidates."""
+        min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self._robot_count)
+        sites_per_side = max(1, int(math.sqrt(len(self.site_numbers) / min_candidates)))
+        return sites_per_side * site_spacing / self._unit
 
     def _build_configuration_space(self, environment: Environment, radius: float) -> shapely.Geometry:
         """Return the area for the centers of robots, m; it may be a little too large, but never too small."""
@@ -300,7 +320,7 @@ class _Dual:
         return distances[_MAX_PRICE_RANK - 1], first_prices
 
     def _thin_out(self, candidates: Array) -> Array:
-        """Return the first of (p, 2) positions in each square of a grid."""
+        """Return the first of (p, 2) positions in each square of a grid of half the spacing of candidates."""
         squares = np.floor(candidates * 2.0 / self._candidate_spacing)
         _, first = np.unique(squares, axis=0, return_index=True)
         return candidates[np.sort(first)]
@@ -316,22 +336,27 @@ class _Dual:
         """Search for prices, (m,) m, that raise the dual over the positions in the table.
 
         In place of the maximum profit, the search uses the smooth function ``s log sum exp(profit / s)``.
-        `smoothing` is s as a fraction of the cost per robot.
+        `smoothing` is s as a fraction of the cost per robot. The gradient of that function is the mean of the
+        gradients of the profits, weighted by the shares exp(profit / s).
         """
         weights = self._weights
-        scale = max(self.placement_cost, 1e-9 * self.total_weight * self._geodesics.size)
+        scale = max(self.placement_cost, _MIN_SCALE * self.total_weight * self._geodesics.size)
         s = smoothing * scale / self._robot_count
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
+            """Return minus the dual and its gradient, both divided by `scale`."""
             heartbeat()
             profits = self._table.compute_profits(prices, weights)
             max_profit = profits.max()
             shares = np.exp((profits - max_profit) / s)
             smooth_max = max_profit + s * math.log(shares.sum())
-            paid = np.zeros(len(prices))
-            add_paid_shares(self._table, prices, shares * (self._robot_count / shares.sum()), paid)
             dual = float(weights @ prices) - self._robot_count * smooth_max
-            return -dual / scale, weights * (paid - 1.0) / scale
+            # The robots are divided among the positions. A higher price of a site increases the dual if the
+            # site pays for less than one robot in total.
+            robot_shares = shares * (self._robot_count / shares.sum())
+            paid_shares = np.zeros(len(prices))
+            add_paid_shares(self._table, prices, robot_shares, paid_shares)
+            return -dual / scale, weights * (paid_shares - 1.0) / scale
 
         solution = minimize(
             compute_negative_dual,
@@ -363,37 +388,43 @@ class _Dual:
         middles = self._geodesics.grid.to_meters(triangles.mean(axis=1))
         centers, _ = self._geodesics.snap_to_free_space(middles)
         scratch = TriangleScratch.allocate(len(self._geodesics.corners))
-        profits = np.empty((2, len(triangles)))
         grid_prices = prices / self._unit
 
-        def fill(index: AngularWallIndex) -> Array | None:
-            used = bound_profits(self._site_data, index, grid_prices, triangles, centers, scratch, profits)
-            return None if used < 0 else profits
+        def compute(wall_index: AngularWallIndex) -> Array | None:
+            profits = np.empty((2, len(triangles)))
+            has_space = bound_profits(
+                self._site_data, wall_index, grid_prices, triangles, centers, scratch, profits
+            )
+            return profits if has_space else None
 
-        self._geodesics.run_with_index(1, SOURCE_BINS, fill)
-        profits *= self._unit
-        return centers, profits[0], profits[1]
+        profits = self._geodesics.run_with_index(1, SOURCE_BINS, compute) * self._unit
+        return centers, profits[CENTER_PROFIT], profits[PROFIT_BOUND]
 
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
-        """Prove a lower bound on the cost.
+        """Prove a lower bound on the cost by branch and bound over triangles.
 
-        The bound is at most `tolerance` times the placement's cost below the best one for these prices.
+        The bound is at most `tolerance` times the placement's cost below the best one for these prices. A
+        triangle is a leaf if its points cannot earn much more than the best position found so far. All other
+        triangles are halved.
         """
         slack = tolerance * self.placement_cost / self._robot_count
-        table_profit = self._table.compute_profits(prices, self._weights).max()
+        best_table_profit = self._table.compute_profits(prices, self._weights).max()
         profit_bound = 0.0
         best_profit = 0.0
-        count = 0
+        triangle_count = 0
         triangles = self._triangles
         leaves = []
-        better_candidates = [np.empty((0, 3))]
+        better_candidates = [np.empty((0, 2))]
+        better_profits = [np.empty(0)]
         while len(triangles):
             heartbeat()
             centers, profits, bounds = self.bound_profits(prices, triangles)
             best_profit = max(best_profit, float(profits.max()))
-            count += len(triangles)
-            better_candidates.append(np.column_stack([profits, centers])[profits > table_profit])
-            is_leaf = (bounds <= best_profit + slack) | (count >= _MAX_TRIANGLES)
+            triangle_count += len(triangles)
+            is_better = profits > best_table_profit
+            better_candidates.append(centers[is_better])
+            better_profits.append(profits[is_better])
+            is_leaf = (bounds <= best_profit + slack) | (triangle_count >= _MAX_TRIANGLES)
             profit_bound = max(profit_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
             triangles = halve_triangles(triangles[~is_leaf])
@@ -401,10 +432,9 @@ class _Dual:
         self._triangles = np.concatenate(leaves)
         rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robot_count
         bound = float(self._weights @ prices) - self._robot_count * profit_bound - rounding
-        candidates = np.concatenate(better_candidates)
-        by_profit = np.argsort(-candidates[:, 0], kind="stable")
+        by_profit = np.argsort(-np.concatenate(better_profits), kind="stable")
         return _Proof(
             bound=bound,
             prices=prices,
-            better_candidates=self._thin_out(candidates[by_profit, 1:]),
+            better_candidates=self._thin_out(np.concatenate(better_candidates)[by_profit]),
         )

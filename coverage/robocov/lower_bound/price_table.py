@@ -11,7 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 _MIN_SHARE = 1e-9
-"""Smaller shares of a robot at a position are ignored."""
+"""Smaller shares of a robot are ignored, which saves most of the work."""
 
 
 class PriceTable(NamedTuple):
@@ -57,7 +57,7 @@ class PriceTable(NamedTuple):
         )
 
     def compute_profits(self, prices: Array, weights: Array) -> Array:
-        """Compute the profits of the positions.
+        """Compute the profits of a robot at each position.
 
         Parameters
         ----------
@@ -68,7 +68,7 @@ class PriceTable(NamedTuple):
 
         Returns
         -------
-        (p,) array
+        (p,) array, m
         """
         profits = np.empty(len(self.first_entry) - 1)
         _compute_profits(self, prices, weights, profits)
@@ -87,8 +87,10 @@ def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: 
 
 
 @kernel
-def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid: Array) -> None:
+def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid_shares: Array) -> None:
     """Add up the shares of robots that each site pays for.
+
+    A site pays for a robot if its price is above the distance to the robot.
 
     Parameters
     ----------
@@ -96,12 +98,12 @@ def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid: Array
     prices : (m,) array, m
     shares : (p,) array
         The share of a robot that is at each position of the table.
-    paid : (m,) array
-        Result: the sums are added to its values.
+    paid_shares : (m,) array
+        Result: the sum for each site is added to its value.
     """
     for position in range(len(shares)):
         if shares[position] > _MIN_SHARE:
             for entry in range(table.first_entry[position], table.first_entry[position + 1]):
                 site = table.site[entry]
                 if prices[site] > table.distance[entry]:
-                    paid[site] += shares[position]
+                    paid_shares[site] += shares[position]

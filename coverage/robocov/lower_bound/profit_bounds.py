@@ -12,6 +12,16 @@ from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visib
 from robocov.geodesic.corner_graph import find_visible_corners
 from robocov.geodesic.walls import Walls
 
+CENTER_PROFIT = 0
+"""Row of the result of `bound_profits`: the profits of the centers."""
+PROFIT_BOUND = 1
+"""Row of the result of `bound_profits`: the upper bounds on the profits of all points."""
+
+_SOURCE = 0
+"""The only source of the index, which is the center of the current triangle."""
+_MIN_SEGMENT_LENGTH = 1.0
+"""Length of the shortest segment, grid steps: all points have whole coordinates."""
+
 
 class SiteData(NamedTuple):
     """The walls of a map, and the sites with their weights and distances, in grid steps."""
@@ -40,36 +50,47 @@ class TriangleScratch(NamedTuple):
     """(3,) An upper bound on the profit of each vertex."""
 
     @classmethod
-    def allocate(cls, corners: int) -> TriangleScratch:
+    def allocate(cls, corner_count: int) -> TriangleScratch:
         """Allocate space for a given number of corners.
 
         Parameters
         ----------
-        corners : int
+        corner_count : int
 
         Returns
         -------
         TriangleScratch
         """
         return cls(
-            corners=np.empty(corners, np.int64),
-            corner_distances=np.empty(corners),
+            corners=np.empty(corner_count, np.int64),
+            corner_distances=np.empty(corner_count),
             vertices=np.empty((3, 2)),
             min_distances=np.empty(3),
             max_profits=np.empty(3),
         )
 
 
+class _Center(NamedTuple):
+    """The center of a triangle, in grid steps."""
+
+    x: float
+    y: float
+    radius: float
+    """Distance to the farthest vertex."""
+    corner_count: int
+    """Number of corners that are visible from the center."""
+
+
 @kernel
 def bound_profits(
     site_data: SiteData,
-    index: AngularWallIndex,
+    wall_index: AngularWallIndex,
     prices: Array,
     triangles: Array,
     centers: Array,
     scratch: TriangleScratch,
     profits: Array,
-) -> int:
+) -> bool:
     """Compute the profit of the center of each triangle, and an upper bound on the profit of all its points.
 
     The profit of a point is the sum over the sites of weight * max(price - distance, 0).
@@ -77,7 +98,7 @@ def bound_profits(
     Parameters
     ----------
     site_data : SiteData
-    index : AngularWallIndex
+    wall_index : AngularWallIndex
         Scratch space for one source.
     prices : (m,) array, grid steps
     triangles : (t, 3, 2) array, grid steps
@@ -85,78 +106,97 @@ def bound_profits(
         A point in each triangle.
     scratch : TriangleScratch
     profits : (2, t) array, grid steps
-        Result: the profits of the centers in the first row, the bounds in the second.
+        Result: the profits of the centers in row `CENTER_PROFIT`, the bounds in row `PROFIT_BOUND`.
 
     Returns
     -------
-    int
-        0, or -1 if the index has too few entries.
+    bool
+        Whether the index had enough entries.
     """
-    corners = site_data.walls.corners
-    min_distances = scratch.min_distances
     for t in range(len(triangles)):
-        x = centers[t, 0]
-        y = centers[t, 1]
-        if add_walls(site_data.walls, index, 0, x, y, np.inf, 0) < 0:
-            return -1
-        radius = _set_triangle(scratch, triangles[t], x, y)
-        count = find_visible_corners(site_data.walls, index, 0, 0, scratch.corners)
-        for k in range(count):
-            corner = scratch.corners[k]
-            scratch.corner_distances[k] = np.hypot(x - corners[corner, 0], y - corners[corner, 1])
+        if add_walls(site_data.walls, wall_index, _SOURCE, centers[t, 0], centers[t, 1], np.inf, 0) < 0:
+            return False
+        center = _set_triangle(site_data, wall_index, scratch, triangles[t], centers[t])
         profit = 0.0
         for site in range(len(prices)):
-            price = prices[site]
-            dx = x - site_data.sites[site, 0]
-            dy = y - site_data.sites[site, 1]
-            straight = np.sqrt(dx * dx + dy * dy)
-            if straight - radius >= price:
-                continue
-            for vertex in range(3):
-                min_distances[vertex] = price
-            distance = np.inf
-            if is_visible(site_data.walls, index, 0, site_data.sites[site, 0], site_data.sites[site, 1]):
-                distance = straight
-                _lower_to_tangent(scratch, straight, dx, dy, straight)
-            distance = min(distance, _lower_by_corners(site_data, scratch, count, site, x, y, radius))
-            profit += site_data.weights[site] * max(price - distance, 0.0)
-            for vertex in range(3):
-                scratch.max_profits[vertex] += site_data.weights[site] * (price - min_distances[vertex])
-        profits[0, t] = profit
-        profits[1, t] = max(scratch.max_profits[0], scratch.max_profits[1], scratch.max_profits[2])
-    return 0
+            profit += _add_site(site_data, wall_index, scratch, center, site, prices[site])
+        profits[CENTER_PROFIT, t] = profit
+        profits[PROFIT_BOUND, t] = max(scratch.max_profits[0], scratch.max_profits[1], scratch.max_profits[2])
+    return True
 
 
 @kernel
-def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float) -> float:
-    """Set the triangle and its center (x, y); return the distance from there to the farthest vertex."""
+def _set_triangle(
+    site_data: SiteData,
+    wall_index: AngularWallIndex,
+    scratch: TriangleScratch,
+    triangle: Array,
+    center: Array,
+) -> _Center:
+    """Write a triangle, and the corners that are visible from its center, to the scratch space."""
+    x = center[0]
+    y = center[1]
     radius = 0.0
     for vertex in range(3):
         scratch.vertices[vertex, 0] = triangle[vertex, 0] - x
         scratch.vertices[vertex, 1] = triangle[vertex, 1] - y
         radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
         scratch.max_profits[vertex] = 0.0
-    return radius
+    corners = site_data.walls.corners
+    corner_count = find_visible_corners(site_data.walls, wall_index, _SOURCE, 0, scratch.corners)
+    for k in range(corner_count):
+        corner = scratch.corners[k]
+        scratch.corner_distances[k] = np.hypot(x - corners[corner, 0], y - corners[corner, 1])
+    return _Center(x, y, radius, corner_count)
 
 
 @kernel
-def _lower_by_corners(
-    site_data: SiteData, scratch: TriangleScratch, count: int, site: int, x: float, y: float, radius: float
+def _add_site(
+    site_data: SiteData,
+    wall_index: AngularWallIndex,
+    scratch: TriangleScratch,
+    center: _Center,
+    site: int,
+    price: float,
 ) -> float:
-    """Lower the distance bounds of a site by the tangents of its paths via the first `count` visible corners.
+    """Add what a site pays to the bounds on the vertices' profits; return what it pays at the center."""
+    site_x = site_data.sites[site, 0]
+    site_y = site_data.sites[site, 1]
+    dx = center.x - site_x
+    dy = center.y - site_y
+    straight = np.sqrt(dx * dx + dy * dy)
+    if straight - center.radius >= price:
+        return 0.0
+    # A distance above the price is as good as the price.
+    for vertex in range(3):
+        scratch.min_distances[vertex] = price
+    distance = np.inf
+    if is_visible(site_data.walls, wall_index, _SOURCE, site_x, site_y):
+        distance = straight
+        _lower_to_tangent(scratch, straight, dx, dy, straight)
+    distance = min(distance, _lower_by_corners(site_data, scratch, center, site))
+    weight = site_data.weights[site]
+    for vertex in range(3):
+        scratch.max_profits[vertex] += weight * (price - scratch.min_distances[vertex])
+    return weight * max(price - distance, 0.0)
 
-    Return the length of the shortest of these paths from the center (x, y).
+
+@kernel
+def _lower_by_corners(site_data: SiteData, scratch: TriangleScratch, center: _Center, site: int) -> float:
+    """Lower the distance bounds of a site by the tangents of its paths via corners visible from the center.
+
+    Return the length of the shortest of these paths from the center.
     """
     corners = site_data.walls.corners
     min_distances = scratch.min_distances
     shortest = np.inf
-    for k in range(count):
+    for k in range(center.corner_count):
         corner = scratch.corners[k]
         length = scratch.corner_distances[k] + site_data.from_corners[site, corner]
         shortest = min(shortest, length)
-        if length - radius < max(min_distances[0], min_distances[1], min_distances[2]):
-            dx = x - corners[corner, 0]
-            dy = y - corners[corner, 1]
+        if length - center.radius < max(min_distances[0], min_distances[1], min_distances[2]):
+            dx = center.x - corners[corner, 0]
+            dy = center.y - corners[corner, 1]
             _lower_to_tangent(scratch, length, dx, dy, scratch.corner_distances[k])
     return shortest
 
@@ -167,12 +207,14 @@ def _lower_to_tangent(
 ) -> None:
     """Lower the distance bounds of the vertices where the tangent of a path length is below them.
 
-    The path starts at the center, in the direction -(dx, dy). `length` is the length of the whole path, and
-    `first_length` that of its first segment.
+    The path starts at the center. `length` is the length of the whole path, and `first_length` that of its
+    first segment, whose end is at -(dx, dy) from the center.
     """
+    # If the segment is empty, its direction (dx, dy) is zero, and it does not matter by what it is divided.
+    divisor = max(first_length, _MIN_SEGMENT_LENGTH)
     for vertex in range(3):
         rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]
-        tangent = length + rise / max(first_length, 1.0)
+        tangent = length + rise / divisor
         scratch.min_distances[vertex] = min(scratch.min_distances[vertex], tangent)
 
 
