@@ -16,7 +16,7 @@ from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
 _TILTS_RAD = (0.0, 0.05, 0.1)
-"""Standard deviations of the directions of streets, one of which is drawn for each town."""
+"""Possible standard deviations of the tilts of the streets of a town."""
 _MAX_TILT_DEVIATIONS = 1.5
 """Largest tilt of a street, in standard deviations."""
 _MAX_WIDENING_GAPS = 1.2
@@ -24,7 +24,10 @@ _MAX_WIDENING_GAPS = 1.2
 _MIN_WIDENING_SHARE = 0.4
 """Widening of the last streets, and of those along the boundary, relative to that of the first."""
 _CHAMFER_PROBABILITY = 0.25
-_YARD_PROBABILITY = 0.2
+_CHAMFER_FRACTIONS = (0.2, 0.45)
+_NOTCH_PROBABILITY = 0.2
+_NOTCH_FRACTIONS = (0.35, 0.6)
+"""Smallest and largest fraction of an edge that is cut off, see `Trim`."""
 _MAX_CORNERS = 12
 """The index of the corner to trim is drawn below this, and taken modulo the number of corners."""
 _MAX_UNEVENNESS = 0.25
@@ -104,12 +107,7 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     feasible_widening = _find_feasible_widening(cells, request, corner_disc)
     if feasible_widening is None:
         return None
-    trims: list[Trim | None] = [_draw_trim(rng) for _ in cells]
-    for k, cell in enumerate(cells):
-        narrow_block = _build_block(cell, 0.0, corner_disc, trims[k])
-        wide_block = _build_block(cell, feasible_widening, corner_disc, trims[k])
-        if not _is_thick(narrow_block) or not _is_thick(wide_block):
-            trims[k] = None
+    trims = _draw_trims(cells, feasible_widening, corner_disc, rng)
 
     def build_blocks(widening: float) -> list[Polygon]:
         return [
@@ -118,6 +116,7 @@ def build_town(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
     if _sum_areas(build_blocks(0.0)) < request.blocked_area:
         return None
+    # Widen the streets until the blocks take the requested area.
     low = 0.0
     high = feasible_widening
     for _ in range(_WIDENING_STEPS):
@@ -147,15 +146,15 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
     list of Cell or None
         None if cells would be too small.
     """
-    tilt = float(rng.choice(_TILTS_RAD))
-    # Corners are rounded later, which may bring them nearer to each other.
-    street = request.gap + 3.0 * request.step
+    tilt_deviation = float(rng.choice(_TILTS_RAD))
+    street_width = request.gap_before_rounding
     # The streets along the boundary lie half outside. Otherwise, the blocks next to them would be smaller.
-    low = street / 2.0
-    x = request.width - street / 2.0
-    y = request.height - street / 2.0
+    low = street_width / 2.0
+    x = request.width - street_width / 2.0
+    y = request.height - street_width / 2.0
     outline = [(low, low), (x, low), (x, y), (low, y)]
-    whole = [Edge(*point, street / 2.0, _MIN_WIDENING_SHARE / 2.0) for point in outline]
+    whole = [Edge(*point, street_width / 2.0, _MIN_WIDENING_SHARE / 2.0) for point in outline]
+    # Cells to divide, and the number of blocks in each.
     waiting = [(whole, int(request.obstacles))]
     cells = []
     while waiting:
@@ -166,32 +165,61 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
         first_count = count // 2 if rng.random() < 0.5 else count - count // 2
         fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
         width, height = np.ptp([(edge.x, edge.y) for edge in cell], axis=0).tolist()
-        if max(width, height) < 2.0 * street:
+        if max(width, height) < 2.0 * street_width:
             return None
-        tilt_angle = tilt * float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
-        angle = tilt_angle + math.pi / 2.0 if height > width else tilt_angle
-        normal = (math.cos(angle), math.sin(angle))
-        # Streets that separate more blocks are wider. Half of the street lies on either side of the cut.
-        hierarchy = math.log(count) / math.log(request.obstacles)
-        share = (_MIN_WIDENING_SHARE + (1.0 - _MIN_WIDENING_SHARE) * hierarchy) / 2.0
-        first, second = _divide_cell(cell, fraction, normal, street, share)
+        # The normal of a street is along the longer side of the cell, apart from its tilt.
+        deviations = float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
+        tilt = tilt_deviation * deviations
+        angle = tilt + math.pi / 2.0 if height > width else tilt
+        street = _Street(
+            normal=(math.cos(angle), math.sin(angle)),
+            width=street_width,
+            widening_share=_compute_widening_share(count, request.obstacles),
+        )
+        first, second = _divide_cell(cell, fraction, street)
         waiting.append((first, first_count))
         waiting.append((second, count - first_count))
     return cells
 
 
-def _divide_cell(
-    cell: Cell, fraction: float, normal: Point, street: float, share: float
-) -> tuple[Cell, Cell]:
+class _Street(NamedTuple):
+    """A street that divides a cell.
+
+    Attributes
+    ----------
+    normal : (x, y)
+        Unit vector across the street.
+    width : float, m
+        Smallest width.
+    widening_share : float
+        Widening share of the edges on either side; see `Edge`.
+    """
+
+    normal: Point
+    width: float
+    widening_share: float
+
+
+def _compute_widening_share(count: int, total_count: int) -> float:
+    """Return the widening share of the edges along a street that divides a cell of `count` blocks.
+
+    Streets that separate more blocks are wider. Half of a street lies on either side of its middle line.
+    """
+    rank = math.log(count) / math.log(total_count)
+    return (_MIN_WIDENING_SHARE + (1.0 - _MIN_WIDENING_SHARE) * rank) / 2.0
+
+
+def _divide_cell(cell: Cell, fraction: float, street: _Street) -> tuple[Cell, Cell]:
     """Return the parts of a cell on both sides of a street, the first with a fraction of the extent."""
-    distances = [edge.x * normal[0] + edge.y * normal[1] for edge in cell]
+    normal_x, normal_y = street.normal
+    distances = [edge.x * normal_x + edge.y * normal_y for edge in cell]
     # Only the part of the cell that streets leave free is divided.
-    free_extent = max(distances) - min(distances) - 2.0 * street
-    distance = min(distances) + street + fraction * free_extent
-    origin = (normal[0] * distance, normal[1] * distance)
-    opposite = (-normal[0], -normal[1])
-    first = cut_cell(cell, origin, normal, street / 2.0, share)
-    second = cut_cell(cell, origin, opposite, street / 2.0, share)
+    free_extent = max(distances) - min(distances) - 2.0 * street.width
+    distance = min(distances) + street.width + fraction * free_extent
+    origin = (normal_x * distance, normal_y * distance)
+    setback = street.width / 2.0
+    first = cut_cell(cell, origin, (normal_x, normal_y), setback, street.widening_share)
+    second = cut_cell(cell, origin, (-normal_x, -normal_y), setback, street.widening_share)
     return first, second
 
 
@@ -273,7 +301,7 @@ def _find_feasible_widening(cells: list[Cell], request: Request, corner_disc: Di
 
 
 def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim | None) -> Polygon:
-    """Return the block of a cell outside the square around the start; empty if nothing remains."""
+    """Return the block of a cell, outside the square around the start; empty if nothing remains."""
     block = remove_streets(cell, widening)
     if not block:
         return Polygon()
@@ -310,14 +338,29 @@ def _trim_block(block: Cell, trim: Trim) -> Polygon:
     return trimmed if trimmed.is_valid else _to_polygon(block)
 
 
+def _draw_trims(
+    cells: list[Cell], feasible_widening: float, corner_disc: DiscStart, rng: np.random.Generator
+) -> list[Trim | None]:
+    """Draw a trim for each block; None for a block that has none, or that it would make too thin."""
+    trims: list[Trim | None] = []
+    drawn_trims = [_draw_trim(rng) for _ in cells]
+    for cell, trim in zip(cells, drawn_trims, strict=True):
+        largest_block = _build_block(cell, 0.0, corner_disc, trim)
+        smallest_block = _build_block(cell, feasible_widening, corner_disc, trim)
+        is_feasible = _is_thick(largest_block) and _is_thick(smallest_block)
+        trims.append(trim if is_feasible else None)
+    return trims
+
+
 def _draw_trim(rng: np.random.Generator) -> Trim | None:
+    """Draw a chamfer or a notch; None if a block has neither."""
     kind = rng.random()
     corner = int(rng.integers(0, _MAX_CORNERS))
     if kind < _CHAMFER_PROBABILITY:
-        fraction = rng.uniform(0.2, 0.45)
+        fraction = rng.uniform(*_CHAMFER_FRACTIONS)
         return Trim(corner, before=fraction, after=fraction, is_notch=False)
-    if kind < _CHAMFER_PROBABILITY + _YARD_PROBABILITY:
-        before, after = rng.uniform(0.35, 0.6, 2).tolist()
+    if kind < _CHAMFER_PROBABILITY + _NOTCH_PROBABILITY:
+        before, after = rng.uniform(*_NOTCH_FRACTIONS, 2).tolist()
         return Trim(corner, before=before, after=after, is_notch=True)
     return None
 

@@ -23,10 +23,10 @@ from robocov.generator.request import AREA_TOLERANCE, Request
 _WAVES = 48
 _MIN_WAVELENGTH_UNITS = 0.7
 _MAX_WAVELENGTH_UNITS = 1.7
-_MESH_STEPS_PER_UNIT = 12
+_MAX_MESH_STEPS_PER_UNIT = 12
 _MIN_MESH_STEPS_PER_UNIT = 6
 _MAX_MESH_STEPS_PER_SIDE = 160
-"""Maximum number of steps along the longer side; large maps get a coarser mesh."""
+"""Number of steps along the longer side from which the mesh becomes coarser."""
 _RIM_SIDES = 0.012
 """Smallest thickness of the rock along the boundary."""
 _SHORE_UNITS = 0.35
@@ -44,6 +44,8 @@ _SPIKE_UNITS = 0.05
 """Spikes of rock up to twice as thick are removed."""
 _MAX_BEND = 0.25
 """Largest offset of a tunnel's middle, relative to its length."""
+_WINDOW_REACH = 1.5
+"""Distance from a window within which the parts that it connects are sought, relative to the dilation."""
 _LEVEL_RADIUS = 1.2
 _MAX_RADIUS = 2.0
 """Dilation with which the level is chosen, and the largest dilation, relative to the smallest one."""
@@ -51,9 +53,9 @@ _LEVEL_STEPS = 8
 _RADIUS_STEPS = 12
 """Steps of the bisections."""
 _MAX_ROUNDS = 12
-"""Rounds of widening windows after which a layout is given up."""
+"""Maximum number of rounds in which windows are widened before a layout is abandoned."""
 _WINDOWS_PER_CHAMBER = 0.005
-"""Number of windows that are widened in one round, the narrowest first, for each chamber."""
+"""Number of windows that are widened in one round, the narrowest first, per chamber."""
 _USED_AREA_TOLERANCE = 0.5 * AREA_TOLERANCE
 """The rest of the tolerance is left for rounding errors."""
 
@@ -73,35 +75,46 @@ def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     list of Obstacle or None
         None if the map is too small, too much or too little is blocked, or narrow windows remain.
     """
-    site = _survey_site(request, corner_disc)
-    if _build_inner_rectangle(request, 2.0 * site.min_radius).is_empty:
+    builder = _create_builder(request, corner_disc)
+    if _build_inner_rectangle(request, 2.0 * builder.min_radius).is_empty:
         return None
     points, values = draw_random_field(request, rng)
-    boundary_distances = np.minimum(points, points[-1, -1] - points).min(axis=-1)
-    values += _SHORE_RISE * np.exp(-((boundary_distances / (_SHORE_UNITS * request.unit)) ** 2))
-    start_distances = compute_lengths(points - np.array(corner_disc.center))
-    values -= _HALL_DEPTH * np.exp(-((start_distances / (_HALL_UNITS * request.unit)) ** 2))
-    seed = int(rng.integers(2**32))
-    core = _choose_core(site, points, values, seed)
+    values += _compute_shore_rise(request, points)
+    values -= _compute_hall_depth(request, corner_disc, points)
+    # Whatever the level of the field is, tunnels are drawn from the same random numbers.
+    tunnel_seed = int(rng.integers(2**32))
+    core = _choose_core(builder, points, values, tunnel_seed)
     for _ in range(_MAX_ROUNDS):
-        radius = _choose_radius(site, core)
-        outline, pillars = _round_rings(request, site.dilate(core, radius))
+        radius = _choose_radius(builder, core)
+        outline, pillars = _round_rings(request, builder.dilate(core, radius))
         space = Polygon(outline, pillars)
-        if abs(site.compute_blocked_fraction(space) - request.area) > _USED_AREA_TOLERANCE:
+        if abs(builder.compute_blocked_fraction(space) - request.area) > _USED_AREA_TOLERANCE:
             return None
         gaps = find_narrow_gaps(MultiPolygon([space]), request.gap)
         narrow_gaps = [gap for gap in gaps if gap.width < request.gap]
         if not narrow_gaps:
             return _build_obstacles(request, outline, pillars)
         count = math.ceil(_WINDOWS_PER_CHAMBER * request.obstacles)
-        windows = [pass_through_window(gap, core, radius) for gap in narrow_gaps[:count]]
-        core = shapely.union_all([core, *windows])
+        tunnels = [build_window_tunnel(gap, core, radius) for gap in narrow_gaps[:count]]
+        core = shapely.union_all([core, *tunnels])
     return None
 
 
+def _compute_shore_rise(request: Request, points: Array) -> Array:
+    """Return by how much the field is raised along the boundary."""
+    distances = np.minimum(points, points[-1, -1] - points).min(axis=-1)
+    return np.asarray(_SHORE_RISE * np.exp(-((distances / (_SHORE_UNITS * request.unit)) ** 2)))
+
+
+def _compute_hall_depth(request: Request, corner_disc: DiscStart, points: Array) -> Array:
+    """Return by how much the field is lowered around the start."""
+    distances = compute_lengths(points - np.array(corner_disc.center))
+    return np.asarray(_HALL_DEPTH * np.exp(-((distances / (_HALL_UNITS * request.unit)) ** 2)))
+
+
 @dataclass(frozen=True)
-class _Site:
-    """The quantities that the request determines before anything is drawn.
+class _CaveBuilder:
+    """Builds the core and the free space of a cave. Nothing in it is random.
 
     Attributes
     ----------
@@ -138,11 +151,10 @@ class _Site:
         """Return the area within a radius of a core, with smooth walls and without small pillars."""
         unit = self.request.unit
         spike = _SPIKE_UNITS * unit
-        wide = (
-            core.buffer(radius + spike).buffer(-spike).intersection(_build_inner_rectangle(self.request, 0.0))
-            | self.start
-        )
-        largest = max(shapely.get_parts(wide), key=lambda part: float(part.area))
+        inner_rectangle = _build_inner_rectangle(self.request, 0.0)
+        # Dilating by more, and eroding by the rest, removes spikes of rock.
+        space = core.buffer(radius + spike).buffer(-spike).intersection(inner_rectangle) | self.start
+        largest = max(shapely.get_parts(space), key=lambda part: float(part.area))
         pillars = [
             ring for ring in largest.interiors if Polygon(ring).area >= _MIN_PILLAR_AREA_UNITS2 * unit**2
         ]
@@ -153,12 +165,13 @@ class _Site:
         return 1.0 - float(space.area) / (float(self.request.width) * float(self.request.height))
 
 
-def _survey_site(request: Request, corner_disc: DiscStart) -> _Site:
+def _create_builder(request: Request, corner_disc: DiscStart) -> _CaveBuilder:
+    """Return the builder for a request and the start in a corner."""
     side = min(float(request.width), float(request.height))
     tolerance = min(_MAX_TOLERANCE_UNITS * request.unit, _MAX_TOLERANCE_SIDES * side)
     max_error = tolerance + 2.0 * request.step
     disc = Point(corner_disc.center).buffer(corner_disc.radius + 2.0 * max_error)
-    return _Site(
+    return _CaveBuilder(
         request=request,
         tolerance=tolerance,
         min_radius=request.gap / 2.0 + max_error,
@@ -174,27 +187,29 @@ def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
     return shapely.box(offset, offset, width - offset, height - offset)
 
 
-def _choose_core(site: _Site, points: Array, values: Array, seed: int) -> BaseGeometry:
+def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int) -> BaseGeometry:
     """Return the core at the level that leaves about the requested area blocked after dilation."""
     low = float(values.min())
     high = float(values.max())
     for _ in range(_LEVEL_STEPS):
         level = (low + high) / 2.0
-        space = site.dilate(site.build_core(points, values - level, seed), _LEVEL_RADIUS * site.min_radius)
-        if site.compute_blocked_fraction(space) > site.request.area:
+        core = builder.build_core(points, values - level, seed)
+        space = builder.dilate(core, _LEVEL_RADIUS * builder.min_radius)
+        if builder.compute_blocked_fraction(space) > builder.request.area:
             low = level
         else:
             high = level
-    return site.build_core(points, values - (low + high) / 2.0, seed)
+    return builder.build_core(points, values - (low + high) / 2.0, seed)
 
 
-def _choose_radius(site: _Site, core: BaseGeometry) -> float:
+def _choose_radius(builder: _CaveBuilder, core: BaseGeometry) -> float:
     """Return the dilation of a core that leaves about the requested area blocked, m."""
-    low = site.min_radius
-    high = _MAX_RADIUS * site.min_radius
+    low = builder.min_radius
+    high = _MAX_RADIUS * builder.min_radius
     for _ in range(_RADIUS_STEPS):
         radius = (low + high) / 2.0
-        if site.compute_blocked_fraction(site.dilate(core, radius)) > site.request.area:
+        space = builder.dilate(core, radius)
+        if builder.compute_blocked_fraction(space) > builder.request.area:
             low = radius
         else:
             high = radius
@@ -209,6 +224,7 @@ def _round_rings(request: Request, space: Polygon) -> tuple[Ring, list[Ring]]:
 
 
 def _build_obstacles(request: Request, outline: Ring, pillars: list[Ring]) -> list[Obstacle]:
+    """Return the rock between the boundary and an outline, and the pillars."""
     width = float(request.width)
     height = float(request.height)
     boundary = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
@@ -236,11 +252,10 @@ def draw_random_field(request: Request, rng: np.random.Generator) -> tuple[Array
     The field is a sum of waves of random direction, length and phase (M. Shinozuka and G. Deodatis,
     *Simulation of stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991).
     """
-    step = min(
-        max(request.width, request.height) / _MAX_MESH_STEPS_PER_SIDE,
-        request.unit / _MIN_MESH_STEPS_PER_UNIT,
-    )
-    step = max(step, request.unit / _MESH_STEPS_PER_UNIT)
+    min_step = request.unit / _MAX_MESH_STEPS_PER_UNIT
+    max_step = request.unit / _MIN_MESH_STEPS_PER_UNIT
+    step = max(request.width, request.height) / _MAX_MESH_STEPS_PER_SIDE
+    step = max(min(step, max_step), min_step)
     x = np.linspace(0.0, request.width, math.ceil(request.width / step) + 1)
     y = np.linspace(0.0, request.height, math.ceil(request.height / step) + 1)
     points = np.stack(np.meshgrid(x, y), axis=-1)
@@ -310,28 +325,35 @@ def build_tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
         One fewer than the number of parts.
     """
     tunnels: list[LineString] = []
-    tree = shapely.STRtree(parts)
+    index = shapely.STRtree(parts)
     joined = DisjointSet(range(len(parts)))
-    # Kruskal's algorithm for the pairs within a distance, which is doubled until everything is joined.
+    # Kruskal's algorithm for the pairs within a distance, which is doubled until all parts are joined.
     extent = np.ptp(shapely.total_bounds(parts).reshape(2, 2), axis=0)
     distance = float(extent.max()) / len(parts)
     while joined.n_subsets > 1:
-        i, j = tree.query(parts, "dwithin", distance)
+        i, j = index.query(parts, "dwithin", distance)
         is_ordered = i < j
         i = i[is_ordered]
         j = j[is_ordered]
         lines = shapely.shortest_line(parts[i], parts[j])
-        order = np.lexsort((j, i, shapely.length(lines))).tolist()
-        tree_lines = lines[[k for k in order if joined.merge(i[k], j[k])]]
-        for start, end in shapely.get_coordinates(tree_lines).reshape(-1, 2, 2):
-            along = end - start
-            offset = rng.uniform(-_MAX_BEND, _MAX_BEND) * np.array([-along[1], along[0]])
-            tunnels.append(LineString([start, (start + end) / 2.0 + offset, end]))
+        by_length = np.lexsort((j, i, shapely.length(lines)))
+        for k in by_length.tolist():
+            are_joined_by_line = joined.merge(i[k], j[k])
+            if are_joined_by_line:
+                tunnels.append(_bend_line(lines[k], rng))
         distance *= 2.0
     return tunnels
 
 
-def pass_through_window(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
+def _bend_line(line: LineString, rng: np.random.Generator) -> LineString:
+    """Return a line of two points with its middle moved sideways at random."""
+    start, end = shapely.get_coordinates(line)
+    along = end - start
+    offset = rng.uniform(-_MAX_BEND, _MAX_BEND) * np.array([-along[1], along[0]])
+    return LineString([start, (start + end) / 2.0 + offset, end])
+
+
+def build_window_tunnel(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
     """Build a tunnel through a window between two dilated parts of a core.
 
     Parameters
@@ -345,17 +367,17 @@ def pass_through_window(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeom
     Returns
     -------
     geometry
-        A line from part to part; the middle of the window if no part is near on one side.
+        A line from part to part; the middle of the window if no part is near on one of its sides.
     """
     first_wall = np.array(gap.between[0])
     second_wall = np.array(gap.between[1])
     middle = (first_wall + second_wall) / 2.0
     across = second_wall - first_wall
-    across = across / np.hypot(across[0], across[1]) * (1.5 * radius)
+    across = across / np.hypot(across[0], across[1]) * (_WINDOW_REACH * radius)
     along = np.array([-across[1], across[0]])
     left = middle + across
     right = middle - across
-    # The parts of the core in the halves of a square on either side of the window.
+    # The parts of the core in two rectangles, one on either side of the window.
     front = core.intersection(Polygon([left, right, right + along, left + along]))
     back = core.intersection(Polygon([left, right, right - along, left - along]))
     if front.is_empty or back.is_empty:

@@ -69,12 +69,12 @@ class MapKind:
     Attributes
     ----------
     layout : callable
-        Builds the obstacles.
+        Builds the obstacles; see `Layout`.
     description : str
     counted : str
-        Plural name of the objects that `obstacles` counts.
+        What `obstacles` counts, in the plural, such as "rooms".
     obstacles : int
-        Default number of them.
+        Default number of obstacles.
     area : float
         Default blocked fraction of the area.
     is_approximate : bool
@@ -89,7 +89,6 @@ class MapKind:
     is_approximate: bool = False
 
 
-#: Kinds of generated maps by name, with their default numbers of obstacles and blocked areas.
 GENERATORS: dict[str, MapKind] = {
     "polygons": MapKind(
         layout=scatter_polygons,
@@ -129,7 +128,7 @@ GENERATORS: dict[str, MapKind] = {
         is_approximate=True,
     ),
 }
-"""The kinds of maps by name."""
+"""Kinds of generated maps by name, with their default numbers of obstacles and blocked areas."""
 
 
 def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
@@ -196,10 +195,10 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     for attempt in range(_MAX_ATTEMPTS):
         rng = np.random.default_rng([int(seed), attempt])
         corner_disc = _choose_corner_disc(request, rng)
-        layout = map_kind.layout(request, corner_disc, rng)
-        if layout is None:
+        layout_obstacles = map_kind.layout(request, corner_disc, rng)
+        if layout_obstacles is None:
             continue
-        environment = _build_environment(int(seed), kind, request, layout, corner_disc)
+        environment = _build_environment(int(seed), kind, request, layout_obstacles, corner_disc)
         if environment is not None:
             return environment
     raise ParameterError(
@@ -222,7 +221,7 @@ def _choose_corner_disc(request: Request, rng: np.random.Generator) -> DiscStart
 
 
 def _build_environment(
-    seed: int, kind: str, request: Request, layout: list[Obstacle], corner_disc: DiscStart
+    seed: int, kind: str, request: Request, obstacles: list[Obstacle], corner_disc: DiscStart
 ) -> Environment | None:
     """Return the map with its starts; None if it is not valid, or does not fulfill the request."""
     width = float(request.width)
@@ -231,7 +230,7 @@ def _build_environment(
     environment = Environment(
         name=f"{kind} {seed}",
         boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
-        obstacles=tuple(layout),
+        obstacles=tuple(obstacles),
         description=(
             f"Generated with seed {seed}: {about}{request.obstacles} {GENERATORS[kind].counted}, "
             f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide."
@@ -251,20 +250,25 @@ def _build_environment(
     try:
         if not _fulfills_request(environment, request):
             return None
-        start_disc = _shrink_corner_disc(environment, request, corner_disc)
-        center_disc = _choose_center_disc(environment, request, corner_disc)
-        if start_disc is None or center_disc is None:
+        starts = _choose_starts(environment, request, corner_disc)
+        if starts is None:
             return None
-        starts: dict[str, DiscStart | UniformStart] = {
-            "corner": start_disc,
-            "centre": center_disc,
-            "uniform": UniformStart(),
-        }
         environment = replace(environment, starts=starts)
         check_rules(environment, environment.name)
     except (MapError, shapely.GEOSException):
         return None
     return environment
+
+
+def _choose_starts(
+    environment: Environment, request: Request, corner_disc: DiscStart
+) -> dict[str, DiscStart | UniformStart] | None:
+    """Return the starts of a map by name; None if there is not enough room for the discs."""
+    start_disc = _shrink_corner_disc(environment, request, corner_disc)
+    center_disc = _choose_center_disc(environment, request, corner_disc)
+    if start_disc is None or center_disc is None:
+        return None
+    return {"corner": start_disc, "centre": center_disc, "uniform": UniformStart()}
 
 
 def _shrink_corner_disc(

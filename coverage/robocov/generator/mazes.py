@@ -6,7 +6,7 @@ depth-first search; growing from a random cell makes many short ones. After that
 preferably those at dead ends ("braiding").
 
 A post is a point where two lines of the grid cross. Walls are a boolean array (columns + 1, rows + 1, 2):
-whether a wall leads from each post upwards (0) and to the right (1).
+whether a vertical wall leads from each post upwards, and whether a horizontal wall leads to the right.
 """
 
 import itertools
@@ -28,6 +28,10 @@ Post: TypeAlias = tuple[int, int]
 """Numbers of the vertical and of the horizontal line that cross at a post."""
 GridShape: TypeAlias = tuple[int, int]
 """Number of columns and of rows."""
+
+_VERTICAL = 0
+_HORIZONTAL = 1
+"""Last index of an array of walls."""
 
 _ELONGATION_WEIGHT = 0.5
 """Weight of the elongation of cells, relative to the deviation from the requested number of cells."""
@@ -126,12 +130,14 @@ def _choose_thickness(request: Request, shape: GridShape, trails: list[list[Post
 def _build_walls(
     request: Request, shape: GridShape, trails: list[list[Post]], thickness: float
 ) -> list[WallObstacle]:
+    """Return a wall along each polyline of posts."""
     x = _compute_lines(request, request.width, shape[0], thickness)
     y = _compute_lines(request, request.height, shape[1], thickness)
     return [WallObstacle(tuple((x[column], y[row]) for column, row in trail), thickness) for trail in trails]
 
 
 def _compute_union_area(walls: list[WallObstacle]) -> float:
+    """Return the area that walls block, m²; overlaps are counted once."""
     return float(shapely.union_all([wall.polygon for wall in walls]).area)
 
 
@@ -170,9 +176,9 @@ def _clear_disc(
     low = starts - half_widths
     high = ends + half_widths
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-    is_inside = shapely.intersects(boxes, shapely.Point(corner_disc.center).buffer(corner_disc.radius))
-    walls[tuple(indices[is_inside].T)] = False
-    return bool(is_inside.any())
+    is_touched = shapely.intersects(boxes, shapely.Point(corner_disc.center).buffer(corner_disc.radius))
+    walls[tuple(indices[is_touched].T)] = False
+    return bool(is_touched.any())
 
 
 def find_inner_walls(shape: GridShape) -> BoolArray:
@@ -189,8 +195,8 @@ def find_inner_walls(shape: GridShape) -> BoolArray:
     """
     columns, rows = shape
     walls = np.zeros((columns + 1, rows + 1, 2), dtype=bool)
-    walls[1:-1, :-1, 0] = True
-    walls[:-1, 1:-1, 1] = True
+    walls[1:-1, :-1, _VERTICAL] = True
+    walls[:-1, 1:-1, _HORIZONTAL] = True
     return walls
 
 
@@ -227,8 +233,8 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
         neighbor = unreached_neighbors[int(rng.integers(len(unreached_neighbors)))]
         # The wall between two cells starts at the lower left post of the right or upper one.
         post = max((column, row), neighbor)
-        is_horizontal = int(neighbor[0] == column)
-        passages[post[0], post[1], is_horizontal] = True
+        direction = _HORIZONTAL if neighbor[0] == column else _VERTICAL
+        passages[post[0], post[1], direction] = True
         unreached.remove(neighbor)
         growing.append(neighbor)
     return passages
@@ -270,8 +276,8 @@ def _count_openings(walls: BoolArray) -> IntArray:
     """Return the number of passages from each cell, (columns, rows)."""
     passages = find_inner_walls((walls.shape[0] - 1, walls.shape[1] - 1)) & ~walls
     left_and_below = passages[:-1, :-1].sum(axis=2)
-    right = passages[1:, :-1, 0]
-    above = passages[:-1, 1:, 1]
+    right = passages[1:, :-1, _VERTICAL]
+    above = passages[:-1, 1:, _HORIZONTAL]
     return np.asarray(left_and_below + right + above)
 
 
@@ -299,7 +305,8 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
     steps = sorted((post, neighbor) for post in neighbors for neighbor in neighbors[post])
     traced: set[tuple[Post, Post]] = set()
     for start, second in steps:
-        is_end = _find_next_post(neighbors, second, start) is None
+        # Begin only at posts where a polyline from the second post would end.
+        is_end = _find_next_post(neighbors, previous=second, post=start) is None
         if not is_end or (start, second) in traced:
             continue
         trail = [start]
@@ -328,4 +335,5 @@ def _find_next_post(neighbors: Mapping[Post, set[Post]], previous: Post, post: P
 
 
 def _step_straight(previous: Post, post: Post) -> Post:
+    """Return the post that follows if a polyline goes straight on."""
     return 2 * post[0] - previous[0], 2 * post[1] - previous[1]

@@ -16,14 +16,29 @@ _MIN_AREA_RATIO = 0.5
 _MAX_AREA_RATIO = 1.5
 """Smallest and largest area of an obstacle, relative to the mean."""
 _MAX_FILLED_FRACTION = 0.7
-"""Fraction of the map that obstacles fill at most, counting half of the gaps around them."""
+"""Largest fraction of the map that obstacles fill, together with half of the gap around each of them."""
 _MAX_MOVES = 12
-"""Obstacles that are moved so that others find room, before the layout is given up."""
+"""Number of obstacles that are moved to make room for others, before the layout is abandoned."""
 _MAX_OUTLINES = 8
-"""Outlines that are tried for one obstacle."""
+"""Number of outlines that are tried for one obstacle."""
 _POSITIONS_PER_OUTLINE = 128
 _MAX_REDRAWS = 8
-"""Times that a shape is drawn again until it is good."""
+"""Number of times that a shape is drawn until it is suitable."""
+_VERTEX_PROBABILITIES = {3: 0.1, 4: 0.25, 5: 0.3, 6: 0.2, 7: 0.15}
+"""Numbers of vertices of a convex polygon, and their probabilities."""
+_MIN_ANGLE_STEP = 0.4
+"""Smallest step between directions of vertices, where the mean step is 0.5 larger, before all are scaled."""
+_MAX_STRETCH = 1.7
+"""Largest ratio of the axes of the ellipse on which the vertices of a convex polygon lie."""
+_L_WIDTHS = (1.0, 1.5)
+_L_THICKNESSES = (0.3, 0.5)
+"""Smallest and largest width of an L, relative to its height, and thickness of its arms, relative to its
+sides."""
+_U_WIDTHS = (1.0, 1.6)
+_U_ARM_WIDTHS = (0.2, 0.3)
+_U_BASE_HEIGHTS = (0.22, 0.35)
+_U_RIGHT_HEIGHTS = (0.7, 1.0)
+"""Smallest and largest dimensions of a U, relative to the height of its left arm."""
 _MIN_ROUNDNESS = 0.52
 """Smallest area of a convex polygon, relative to the circle of the same perimeter (regular triangle: 0.6)."""
 _TOLERANCE_M = 1e-9
@@ -51,10 +66,11 @@ def scatter_polygons(
     areas *= request.blocked_area / areas.sum()
     if _are_too_large(areas, request):
         return None
-    kept_free = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
-    shapely.prepare(kept_free)
+    start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
+    shapely.prepare(start_disc)
     names = list(SHAPE_PROBABILITIES)
     shapes = rng.choice(names, size=request.obstacles, p=list(SHAPE_PROBABILITIES.values()))
+    # The last one is placed next.
     waiting = list(zip(shapes.tolist(), areas.tolist(), strict=True))[::-1]
     placed: list[tuple[str, float]] = []
     outlines: list[shapely.Polygon] = []
@@ -62,7 +78,7 @@ def scatter_polygons(
     while waiting:
         shape, area = waiting[-1]
         others = np.array(outlines, dtype=object)
-        outline = _place_shape(request, shape, area, others, kept_free, rng)
+        outline = _place_shape(request, shape, area, others, start_disc, rng)
         if outline is not None:
             outlines.append(outline)
             placed.append(waiting.pop())
@@ -90,10 +106,10 @@ def _place_shape(
     shape: str,
     area: float,
     others: Array,
-    kept_free: shapely.Polygon,
+    start_disc: shapely.Polygon,
     rng: np.random.Generator,
 ) -> shapely.Polygon | None:
-    """Place a random outline at a free position. Return None if none is found."""
+    """Return a random outline of a shape at a free position; None if none is found."""
     gap = request.gap
     size = request.size
     tree = shapely.STRtree(others)
@@ -106,14 +122,14 @@ def _place_shape(
         centers = size / 2.0 + offsets * free_size
         candidates = shapely.polygons(request.round_points(centers[:, None] + outline))
         low, high = np.split(shapely.bounds(candidates), 2, axis=1)
-        is_good = shapely.disjoint(candidates, kept_free) & shapely.is_valid(candidates)
-        is_good &= ((low >= gap - _TOLERANCE_M) & (high <= size - gap + _TOLERANCE_M)).all(axis=1)
+        is_free = shapely.disjoint(candidates, start_disc) & shapely.is_valid(candidates)
+        is_free &= ((low >= gap - _TOLERANCE_M) & (high <= size - gap + _TOLERANCE_M)).all(axis=1)
         search_boxes = shapely.box(low[:, 0] - gap, low[:, 1] - gap, high[:, 0] + gap, high[:, 1] + gap)
         candidate_indices, other_indices = tree.query(search_boxes)
         is_too_close = shapely.distance(candidates[candidate_indices], others[other_indices]) < gap
-        is_good[candidate_indices[is_too_close]] = False
-        if is_good.any():
-            return candidates[int(is_good.argmax())]
+        is_free[candidate_indices[is_too_close]] = False
+        if is_free.any():
+            return candidates[int(is_free.argmax())]
     return None
 
 
@@ -122,8 +138,7 @@ def _draw_shape(request: Request, shape: str, area: float, rng: np.random.Genera
     if shape == "convex":
         return draw_convex_polygon(rng, area)
     if shape == "U":
-        # Corners are rounded later, which must not make the opening narrower than the gap.
-        outline = draw_u_shape(rng, area, request.gap + 3.0 * request.step)
+        outline = draw_u_shape(rng, area, request.gap_before_rounding)
         if outline is not None:
             return outline
     return draw_l_shape(rng, area)
@@ -142,10 +157,11 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
     (k, 2) array, m
     """
     for _ in range(_MAX_REDRAWS):
-        count = int(rng.choice([3, 4, 5, 6, 7], p=[0.1, 0.25, 0.3, 0.2, 0.15]))
-        angle_steps = 0.4 + rng.random(count)
+        vertex_counts = list(_VERTEX_PROBABILITIES)
+        count = int(rng.choice(vertex_counts, p=list(_VERTEX_PROBABILITIES.values())))
+        angle_steps = _MIN_ANGLE_STEP + rng.random(count)
         angles = np.cumsum(angle_steps) * (2.0 * np.pi / angle_steps.sum())
-        stretch = rng.uniform(1.0, 1.7)
+        stretch = rng.uniform(1.0, _MAX_STRETCH)
         outline = np.column_stack([stretch * np.cos(angles), np.sin(angles)])
         polygon = shapely.Polygon(outline)
         if 4.0 * math.pi * polygon.area >= _MIN_ROUNDNESS * polygon.length**2:
@@ -165,8 +181,8 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     -------
     (6, 2) array, m
     """
-    width = rng.uniform(1.0, 1.5)
-    relative_thickness, top = rng.uniform(0.3, 0.5, 2)
+    width = rng.uniform(*_L_WIDTHS)
+    relative_thickness, top = rng.uniform(*_L_THICKNESSES, 2)
     right = width * relative_thickness
     outline = [(0.0, 0.0), (width, 0.0), (width, top), (right, top), (right, 1.0), (0.0, 1.0)]
     return _scale_and_rotate(np.array(outline), area, rng)
@@ -188,10 +204,10 @@ def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array
         None if the opening is too wide for the area.
     """
     for _ in range(_MAX_REDRAWS):
-        width = rng.uniform(1.0, 1.6)
-        left, right = rng.uniform(0.2, 0.3, 2)
-        base = rng.uniform(0.22, 0.35)
-        right_height = rng.uniform(0.7, 1.0)
+        width = rng.uniform(*_U_WIDTHS)
+        left, right = rng.uniform(*_U_ARM_WIDTHS, 2)
+        base = rng.uniform(*_U_BASE_HEIGHTS)
+        right_height = rng.uniform(*_U_RIGHT_HEIGHTS)
         outline = np.array(
             [
                 (0.0, 0.0),
@@ -211,7 +227,7 @@ def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array
 
 
 def _scale_and_rotate(outline: Array, area: float, rng: np.random.Generator) -> Array:
-    """Return an outline with some area and a random direction, its bounding box around the origin."""
+    """Return an outline of the given area in a random direction, its bounding box centered at the origin."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     outline = outline @ rotation * math.sqrt(area / shapely.Polygon(outline).area)

@@ -23,6 +23,8 @@ _MAX_AREA = 0.9
 _MIN_GAPS_PER_SIDE = 3.0
 _MIN_CENTIMETER_GAP_M = 0.5
 """Coordinates are rounded to centimeters from this gap on, to millimeters below."""
+_ROUNDING_ALLOWANCE_STEPS = 3.0
+"""Steps by which gaps are drawn wider, because rounding may bring corners nearer to each other."""
 _STEP_TOLERANCE = 1e-9
 """Fraction of a step by which a length may miss a multiple of it because of rounding."""
 
@@ -81,6 +83,11 @@ class Request:
     def step(self) -> float:
         """Rounding step of coordinates, m."""
         return 10.0**-self.digits
+
+    @property
+    def gap_before_rounding(self) -> float:
+        """Width of the gaps between unrounded corners, which leaves at least `gap` after rounding, m."""
+        return self.gap + _ROUNDING_ALLOWANCE_STEPS * self.step
 
     def round_points(self, points: Array) -> Array:
         """Round coordinates.

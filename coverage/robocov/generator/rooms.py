@@ -24,6 +24,9 @@ _MIN_CORRIDOR_ROOMS = 5
 _MIN_CORRIDOR_GAPS = 1.6
 _MAX_CORRIDOR_GAPS = 2.2
 """Smallest and largest width of a corridor."""
+_MIN_CORRIDOR_OFFSET = 0.38
+_MAX_CORRIDOR_OFFSET = 0.62
+"""Smallest and largest part of the space beside a corridor that is on its left or below it."""
 _MIN_ROOM_GAPS = 1.5
 """Smallest side of a room."""
 _MAX_UNEVENNESS = 0.3
@@ -46,10 +49,13 @@ _WALL_LENGTH_UNITS = 1.5
 """Length of the walls of a room without doors; half of each wall counts for each of its rooms."""
 _MAX_THICKNESS_UNITS = 0.06
 _PIECES_PER_ROOM = 2.2
+_MIN_PIECE_AREA_RATIO = 0.5
+_MAX_PIECE_AREA_RATIO = 1.5
+"""Smallest and largest area of a piece of furniture, relative to the mean."""
 _CANDIDATES_PER_PIECE = 32
 """Positions that are compared for one piece of furniture."""
 _MAX_FAILURES = 32
-"""Consecutive pieces without a position after which the layout is given up."""
+"""Number of consecutive pieces without a free position after which the layout is abandoned."""
 _FAILURE_SHRINKAGE = 0.92
 _MIN_SHRINKAGE = 0.2
 """Factor by which a piece shrinks for each consecutive failure before it, and the smallest product."""
@@ -89,6 +95,22 @@ class Box(NamedTuple):
         width, height = self.sides
         return width * height
 
+    def get_range(self, axis: int) -> tuple[float, float]:
+        """Return the lowest and the highest coordinate on an axis.
+
+        Parameters
+        ----------
+        axis : int
+            0 for x, 1 for y.
+
+        Returns
+        -------
+        low, high : float, m
+        """
+        if axis == 0:
+            return self.left, self.right
+        return self.bottom, self.top
+
     def crop(self, axis: int, low: float | None = None, high: float | None = None) -> Box:
         """Return the part of the rectangle between two coordinates on an axis.
 
@@ -103,12 +125,12 @@ class Box(NamedTuple):
         -------
         Box
         """
-        edges = list(self)
-        if low is not None:
-            edges[axis] = low
-        if high is not None:
-            edges[axis + 2] = high
-        return Box(*edges)
+        own_low, own_high = self.get_range(axis)
+        new_low = own_low if low is None else low
+        new_high = own_high if high is None else high
+        if axis == 0:
+            return self._replace(left=new_low, right=new_high)
+        return self._replace(bottom=new_low, top=new_high)
 
 
 class Wall(NamedTuple):
@@ -240,6 +262,7 @@ def _draw_thickness(request: Request, rng: np.random.Generator) -> float:
     smallness = min(max(smallness, 0.0), 1.0)
     max_fraction = _MAX_WALL_FRACTION + (_MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION) * smallness
     fraction = rng.uniform(_MIN_WALL_FRACTION, max_fraction)
+    # The walls of a mean room block their length times their thickness, in square units.
     thickness_units = min(fraction * request.area / _WALL_LENGTH_UNITS, _MAX_THICKNESS_UNITS)
     # Half of the thickness is rounded, so that the faces of walls have rounded coordinates.
     half_thickness = thickness_units * request.unit / 2.0
@@ -266,32 +289,48 @@ def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator
     if request.obstacles >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
         box, count = waiting[0]
         waiting = _divide_by_corridor(request, plan, box, count, rng)
-    min_side = _MIN_ROOM_GAPS * request.gap + thickness
     while waiting:
         box, count = waiting.pop()
         if count == 1:
             plan.rooms.append(box)
             continue
-        width, height = box.sides
-        axis = 1 if height > width else 0
-        first_count = count // 2 if rng.random() < 0.5 else count - count // 2
-        fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
-        low = box[axis] + min_side
-        high = box[axis + 2] - min_side
-        if low > high:
+        parts = _divide_by_wall(request, plan, box, count, rng)
+        if parts is None:
             return None
-        position = min(max(box[axis] + fraction * box.sides[axis], low), high)
-        position = round(position, request.digits)
-        plan.walls.append(Wall(axis, position, box[1 - axis], box[3 - axis]))
-        waiting.append((box.crop(axis, high=position), first_count))
-        waiting.append((box.crop(axis, low=position), count - first_count))
+        waiting += parts
     return plan if _add_doors(request, plan, rng) else None
+
+
+def _divide_by_wall(
+    request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
+) -> list[tuple[Box, int]] | None:
+    """Add a wall to the plan that divides the longer side of a rectangle.
+
+    Return the two parts, each with its number of rooms; None if they would be too small.
+    """
+    width, height = box.sides
+    axis = 1 if height > width else 0
+    first_count = count // 2 if rng.random() < 0.5 else count - count // 2
+    fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
+    low, high = box.get_range(axis)
+    min_side = _MIN_ROOM_GAPS * request.gap + plan.thickness
+    min_position = low + min_side
+    max_position = high - min_side
+    if min_position > max_position:
+        return None
+    position = min(max(low + fraction * (high - low), min_position), max_position)
+    position = round(position, request.digits)
+    plan.walls.append(Wall(axis, position, *box.get_range(1 - axis)))
+    return [
+        (box.crop(axis, high=position), first_count),
+        (box.crop(axis, low=position), count - first_count),
+    ]
 
 
 def _divide_by_corridor(
     request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
 ) -> list[tuple[Box, int]]:
-    """Add a corridor to the plan that divides a rectangle along its longer side.
+    """Add a corridor to the plan along the longer side of a rectangle, between two parts of it.
 
     Return the two parts, each with its number of rooms; the whole rectangle if a corridor does not fit.
     """
@@ -299,13 +338,14 @@ def _divide_by_corridor(
     axis = 1 if width >= height else 0
     extent = box.sides[axis]
     corridor_width = rng.uniform(_MIN_CORRIDOR_GAPS, _MAX_CORRIDOR_GAPS) * request.gap + plan.thickness
-    offset = (extent - corridor_width) * rng.uniform(0.38, 0.62)
+    offset = (extent - corridor_width) * rng.uniform(_MIN_CORRIDOR_OFFSET, _MAX_CORRIDOR_OFFSET)
     start = round(offset, request.digits)
     end = round(offset + corridor_width, request.digits)
     if min(start, extent - end) < 2.0 * _MIN_ROOM_GAPS * request.gap:
         return [(box, count)]
-    plan.walls.append(Wall(axis, start, box[1 - axis], box[3 - axis]))
-    plan.walls.append(Wall(axis, end, box[1 - axis], box[3 - axis]))
+    wall_range = box.get_range(1 - axis)
+    plan.walls.append(Wall(axis, start, *wall_range))
+    plan.walls.append(Wall(axis, end, *wall_range))
     plan.corridor = len(plan.rooms)
     plan.rooms.append(box.crop(axis, low=start, high=end))
     first_share = start / (extent - corridor_width)
@@ -316,6 +356,24 @@ def _divide_by_corridor(
     ]
 
 
+class _DoorPlace(NamedTuple):
+    """A place where a door may be: the part of a wall between two rooms.
+
+    Attributes
+    ----------
+    wall : Wall
+    rooms : pair of int
+        Indices of the rooms on its two sides.
+    low, high : float, m
+        Ends of the part; `high` is below `low` if the wall does not separate these rooms.
+    """
+
+    wall: Wall
+    rooms: tuple[int, int]
+    low: float
+    high: float
+
+
 def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
     """Add doors that connect all rooms, and some more; return whether all rooms are connected."""
     room_groups = DisjointSet(range(len(plan.rooms)))
@@ -324,43 +382,45 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
     order_keys, loop_draws, relative_positions = rng.random((3, len(places)))
     widths = request.gap * rng.uniform(_MIN_DOOR_GAPS, _MAX_DOOR_GAPS, len(places))
 
-    def leads_to_corridor(k: int) -> bool:
-        _, first, second = places[k]
-        return plan.corridor in (first, second)
+    def compute_sort_key(k: int) -> tuple[bool, float]:
+        """Return a key that puts doors to the corridor first, and is random otherwise."""
+        return plan.corridor not in places[k].rooms, float(order_keys[k])
 
-    # Doors to the corridor come first.
-    for k in sorted(range(len(places)), key=lambda k: (not leads_to_corridor(k), order_keys[k])):
-        wall, first, second = places[k]
-        first_room = plan.rooms[first]
-        second_room = plan.rooms[second]
-        along = 1 - wall.axis
-        # If the wall does not lie between the two rooms, `high` is below `low`.
-        low = max(wall.start, first_room[along], second_room[along])
-        high = min(wall.end, first_room[along + 2], second_room[along + 2])
-        width = request.round_down(min(float(widths[k]), high - low - 2.0 * min_piece))
-        is_unneeded = room_groups.connected(first, second) and loop_draws[k] > _LOOP_PROBABILITY
+    for k in sorted(range(len(places)), key=compute_sort_key):
+        place = places[k]
+        max_width = place.high - place.low - 2.0 * min_piece
+        width = request.round_down(min(float(widths[k]), max_width))
+        is_unneeded = room_groups.connected(*place.rooms) and loop_draws[k] > _LOOP_PROBABILITY
         if width < request.gap + request.step or is_unneeded:
             continue
-        play = high - low - 2.0 * min_piece - width
-        start = round(low + min_piece + play * float(relative_positions[k]), request.digits)
+        free_length = max_width - width
+        start = round(place.low + min_piece + free_length * float(relative_positions[k]), request.digits)
         end = round(start + width, request.digits)
-        plan.doors.append(Door(wall, start, end, (first, second)))
-        room_groups.merge(first, second)
+        plan.doors.append(Door(place.wall, start, end, place.rooms))
+        room_groups.merge(*place.rooms)
     return room_groups.n_subsets == 1
 
 
-def _find_door_places(plan: FloorPlan) -> list[tuple[Wall, int, int]]:
-    """Return each wall with each pair of rooms on its two sides."""
-    # Rooms by the number and the coordinate of each of their four edges.
-    rooms_at: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
+def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
+    """Return a place for each wall and each pair of rooms on its two sides."""
+    # The rooms that begin, and those that end, at each coordinate on each axis.
+    rooms_by_low: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
+    rooms_by_high: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     for index, room in enumerate(plan.rooms):
-        for edge, coordinate in enumerate(room):
-            rooms_at[edge, coordinate].append(index)
-    places: list[tuple[Wall, int, int]] = []
+        for axis in (0, 1):
+            low, high = room.get_range(axis)
+            rooms_by_low[axis, low].append(index)
+            rooms_by_high[axis, high].append(index)
+    places = []
     for wall in plan.walls:
-        before = rooms_at[wall.axis + 2, wall.position]
-        behind = rooms_at[wall.axis, wall.position]
-        places += [(wall, first, second) for first, second in itertools.product(before, behind)]
+        before = rooms_by_high[wall.axis, wall.position]
+        behind = rooms_by_low[wall.axis, wall.position]
+        for first, second in itertools.product(before, behind):
+            first_low, first_high = plan.rooms[first].get_range(1 - wall.axis)
+            second_low, second_high = plan.rooms[second].get_range(1 - wall.axis)
+            low = max(wall.start, first_low, second_low)
+            high = min(wall.end, first_high, second_high)
+            places.append(_DoorPlace(wall, (first, second), low, high))
     return places
 
 
@@ -375,30 +435,32 @@ def _place_furniture(
     room_areas = np.array([room.area for room in inner_rooms])
     if area > _MAX_FURNITURE_FRACTION * room_areas.sum():
         return None
-    kept_free = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
-    shapes: list[list[Polygon]] = [[] for _ in inner_rooms]
+    start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
+    # The doors and the furniture of each room, from which further furniture keeps its distance.
+    occupied: list[list[Polygon]] = [[] for _ in inner_rooms]
     for door in plan.doors:
         opening = door.wall.build_piece(door.start, door.end, plan.thickness)
         for room in door.rooms:
-            shapes[room].append(opening.polygon)
+            occupied[room].append(opening.polygon)
+    # A room is drawn with a probability that is proportional to its area.
     cumulative_areas = np.cumsum(room_areas / room_areas.sum())
+    cumulative_probabilities = cumulative_areas / cumulative_areas[-1]
     mean_piece_area = area / (_PIECES_PER_ROOM * len(inner_rooms))
     failures = 0
     furniture: list[Obstacle] = []
     while area > min_area:
-        draw = rng.random()
-        room = int(np.searchsorted(cumulative_areas / cumulative_areas[-1], draw, side="right"))
+        room = int(np.searchsorted(cumulative_probabilities, rng.random(), side="right"))
         shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failures)
-        piece_area = min(area, mean_piece_area * rng.uniform(0.5, 1.5) * shrinkage)
-        piece = _draw_piece(request, piece_area, rng)
-        obstacle = _place_piece(request, piece, inner_rooms[room], shapes[room], kept_free, rng)
+        area_ratio = rng.uniform(_MIN_PIECE_AREA_RATIO, _MAX_PIECE_AREA_RATIO)
+        piece = _draw_piece(request, min(area, mean_piece_area * area_ratio * shrinkage), rng)
+        obstacle = _place_piece(request, piece, inner_rooms[room], occupied[room], start_disc, rng)
         if obstacle is None:
             failures += 1
             if failures == _MAX_FAILURES:
                 return None
         else:
             failures = 0
-            shapes[room].append(obstacle.polygon)
+            occupied[room].append(obstacle.polygon)
             furniture.append(obstacle)
             area -= obstacle.polygon.area
     return furniture
@@ -429,7 +491,8 @@ class _Piece(NamedTuple):
 def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Piece:
     """Return a random piece of furniture of about the given area, m²."""
     kind = str(rng.choice(list(_PIECE_PROBABILITIES), p=list(_PIECE_PROBABILITIES.values())))
-    stretch = rng.uniform(*(_CABINET_STRETCH if kind == "cabinet" else _TABLE_STRETCH))
+    min_stretch, max_stretch = _CABINET_STRETCH if kind == "cabinet" else _TABLE_STRETCH
+    stretch = rng.uniform(min_stretch, max_stretch)
     length = math.sqrt(area * stretch)
     depth = math.sqrt(area / stretch)
     size = np.array([length, depth] if rng.random() < 0.5 else [depth, length])
@@ -448,16 +511,16 @@ def _sample_piece_corners(
     (k, 2) array or None, m
         Lower left corners; None if the piece is larger than the room.
     """
-    room_low = np.array(room[:2])
-    room_high = np.array(room[2:])
-    play = room_high - room_low - piece.size
-    if (play < 0.0).any():
+    room_low = np.array([room.left, room.bottom])
+    room_high = np.array([room.right, room.top])
+    free_size = room_high - room_low - piece.size
+    if (free_size < 0.0).any():
         return None
-    offsets = rng.random((_CANDIDATES_PER_PIECE, 2)) * play
+    offsets = rng.random((_CANDIDATES_PER_PIECE, 2)) * free_size
     if piece.kind == "cabinet":
         # Its longer side stands against one of the two walls.
-        axis = int(piece.size[0] > piece.size[1])
-        offsets[:, axis] = play[axis] * rng.integers(0, 2, _CANDIDATES_PER_PIECE)
+        axis = 1 if piece.size[0] > piece.size[1] else 0
+        offsets[:, axis] = free_size[axis] * rng.integers(0, 2, _CANDIDATES_PER_PIECE)
     corners = request.round_points(offsets + room_low)
     clearances = np.column_stack([corners - room_low, room_high - corners - piece.size])
     # A round table would touch a wall in a single point.
@@ -481,11 +544,13 @@ def _place_piece(
         return None
     high = request.round_points(low + piece.size)
     middle = request.round_points(low + piece.size / 2.0)
-    radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0) if piece.is_round else 0.0
+    # Distances to a circle are measured from its center, and are larger by its radius.
     if piece.is_round:
         shapes = shapely.points(middle)
+        radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0)
     else:
         shapes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+        radius = 0.0
     is_free = shapely.distance(shapes, start_disc) > radius
     if others:
         is_free &= shapely.distance(shapes, shapely.MultiPolygon(others)) >= request.gap + radius

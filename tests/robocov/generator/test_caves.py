@@ -19,7 +19,7 @@ from robocov.generator.caves import (
     build_tunnels,
     draw_random_field,
     extract_area_below_zero,
-    pass_through_window,
+    build_window_tunnel,
 )
 from robocov.generator.request import Request
 
@@ -109,13 +109,13 @@ def test_a_tunnel_leads_through_a_window_from_part_to_part() -> None:
     # Two parallel lines; dilated by 1 they meet in a window.
     core = shapely.union_all([LineString([(0, 0), (0, 4)]), LineString([(1.8, 0), (1.8, 4)])])
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    line = shapely.get_coordinates(pass_through_window(gap, core, 1.0))
+    line = shapely.get_coordinates(build_window_tunnel(gap, core, 1.0))
     np.testing.assert_allclose(line[line[:, 0].argsort()], [[0.0, 1.95], [0.9, 1.95], [1.8, 1.95]])
 
 
 def test_a_window_with_nothing_on_one_side_is_widened_itself() -> None:
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    assert pass_through_window(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
+    assert build_window_tunnel(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
 
 
 REQUEST = Request(9, 0.4, 0.6, 12.0, 9.0)
