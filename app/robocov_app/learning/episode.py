@@ -217,7 +217,7 @@ class Episode:
         self.cost = cost
         self._cost_over_time = TimeVaryingCost(cost)
         self._always_counts_all = scenario.conditions is None and not self.environment.has_moving_obstacles
-        self._counted = self._cost_over_time.find_counted_robots(0.0, self.positions, self.working)
+        self._available = self._cost_over_time.find_available_robots(0.0, self.positions, self.working)
         result = self._cost_over_time(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
             raise ParameterError(
@@ -327,27 +327,27 @@ class Episode:
     def _compute_gains(self, is_rewarded: bool, result: CoverageResult | None) -> Array:
         """Update the cost, and return the share of each robot in its change, (n,) m.
 
-        A failure is not the result of any action. If robots fail or join, only those that have counted all
+        A failure is not the result of any action. If robots fail or join, only those that were available all
         the time share the change of their own cost.
         """
         gains = np.zeros(len(self.team))
         time = self.time
         positions = self.trail[-1]
         previous_positions = self.trail[self._rewarded_cycle]
-        remaining = self._counted
+        remaining = self._available
         has_changed = False
         if not self._always_counts_all:
-            counted = self._cost_over_time.find_counted_robots(time, positions, self.working)
-            has_changed = not np.array_equal(counted, self._counted)
-            remaining = counted & self._counted
-            self._counted = counted
+            available = self._cost_over_time.find_available_robots(time, positions, self.working)
+            has_changed = not np.array_equal(available, self._available)
+            remaining = available & self._available
+            self._available = available
         if not (is_rewarded or has_changed):
             return gains
         cycles = self.cycle - self._rewarded_cycle
         self._rewarded_cycle = self.cycle
         before = self.result
-        if self._counted.any():
-            self.result = result or self._cost_over_time.get_cost(time)(positions[self._counted])
+        if self._available.any():
+            self.result = result or self._cost_over_time.get_cost(time)(positions[self._available])
         after = self.result
         if not remaining.any():
             return gains

@@ -323,11 +323,11 @@ def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]
         varying_cost = TimeVaryingCost(cost)
         time = float(record.time[-1])
         positions = record.positions[-1]
-        is_counted = varying_cost.find_counted_robots(time, positions, record.working[-1])
-        if not is_counted.any():
+        is_available = varying_cost.find_available_robots(time, positions, record.working[-1])
+        if not is_available.any():
             continue
         final_cost = varying_cost.get_cost(time)
-        rows = np.flatnonzero(is_counted)
+        rows = np.flatnonzero(is_available)
         field = Field(FieldLattice(final_cost.sites), final_cost(positions[rows]))
         mean_distance = float(run.history.mean_distance[-1])
         moments.append(Moment.last_of(record, field, mean_distance, rows, run.final_time))

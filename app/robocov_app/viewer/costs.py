@@ -360,8 +360,8 @@ def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -
     if question.point is not None:
         # There is no path from a point that is not free.
         with suppress(RobocovError):
-            counted = cost.find_counted_robots(question.time, positions)
-            path = cost.get_cost(question.time).find_path(positions[counted], question.point)
+            available = cost.find_available_robots(question.time, positions)
+            path = cost.get_cost(question.time).find_path(positions[available], question.point)
     # Integers of 32 bits take half as long to send.
     result = replace(
         result,

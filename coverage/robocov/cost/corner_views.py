@@ -10,7 +10,7 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.cost.lattice import SLOTS, Tiles
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
-from robocov.geodesic.box_tree import LEAF_SIZE, skip_subtree
+from robocov.geodesic.box_tree import LEAF_SIZE, LOW_X, skip_subtree
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 
@@ -21,12 +21,25 @@ class CornerViews(NamedTuple):
     """(t + 1,) The rows of tile k are those from ``first_row[k]`` up to ``first_row[k + 1]``."""
     corner: IntArray
     """(r,) The corner of each row."""
-    mask: IntArray
-    """(r,) Bit s is set if the corner sees the site in slot s, and a shortest path to it can bend there."""
+    visible_slots: IntArray
+    """(r,) Bit mask: bit s is set if the corner sees the site in slot s, and a path to it can bend there."""
     nearest: Array
     """(r,) Distance from the corner to the nearest of these sites, grid steps."""
     farthest: Array
     """(r,) Distance from the corner to the farthest of these sites, grid steps."""
+
+
+_CORNER = 0
+_TILE = 1
+_VISIBLE_SLOTS = 2
+"""Columns of the integers that `find_corner_views` returns; see `CornerViews`."""
+
+_SOURCE = 0
+"""The only source of the index, which is the current corner."""
+
+_NEAREST = 0
+_FARTHEST = 1
+"""Columns of the lengths that `find_corner_views` returns; see `CornerViews`."""
 
 
 def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:
@@ -36,7 +49,7 @@ def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> Co
     ----------
     tile_count : int
     indices : (r, 3) int array
-        Corner, tile, and mask of the sites of the tile that see the corner.
+        Corner, tile and visible slots.
     lengths : (r, 2) array, grid steps
         Distances of the nearest and the farthest site.
 
@@ -44,15 +57,15 @@ def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> Co
     -------
     CornerViews
     """
-    by_tile = np.argsort(indices[:, 1], kind="stable")
-    corner, tile, mask = indices[by_tile].T
-    nearest, farthest = lengths[by_tile].T
+    by_tile = np.argsort(indices[:, _TILE], kind="stable")
+    indices = indices[by_tile]
+    lengths = lengths[by_tile]
     return CornerViews(
-        first_row=np.searchsorted(tile, np.arange(tile_count + 1)),
-        corner=np.ascontiguousarray(corner),
-        mask=np.ascontiguousarray(mask),
-        nearest=np.ascontiguousarray(nearest),
-        farthest=np.ascontiguousarray(farthest),
+        first_row=np.searchsorted(indices[:, _TILE], np.arange(tile_count + 1)),
+        corner=np.ascontiguousarray(indices[:, _CORNER]),
+        visible_slots=np.ascontiguousarray(indices[:, _VISIBLE_SLOTS]),
+        nearest=np.ascontiguousarray(lengths[:, _NEAREST]),
+        farthest=np.ascontiguousarray(lengths[:, _FARTHEST]),
     )
 
 
@@ -62,7 +75,7 @@ def find_corner_views(
     tiles: Tiles,
     first: int,
     end: int,
-    index: AngularWallIndex,
+    wall_index: AngularWallIndex,
     indices: IntArray,
     lengths: Array,
 ) -> int:
@@ -74,57 +87,59 @@ def find_corner_views(
     tiles : Tiles
     first, end : int
         The corners are those from `first` up to `end`.
-    index : AngularWallIndex
+    wall_index : AngularWallIndex
         Scratch space for one source.
     indices : (m, 3) int array
-        Result: corner, tile and mask; see `CornerViews`.
+        Result: corner, tile and visible slots; see `CornerViews`.
     lengths : (m, 2) array, grid steps
         Result: distances of the nearest and the farthest site.
 
     Returns
     -------
     int
-        Number of rows, or -1 if there is not enough space.
+        Number of rows of the result, or -1 if there is not enough space in it or in the index.
     """
     corners = walls.corners
     tree = tiles.tree
-    leaves = len(tree) // 2
-    used = 0
+    first_leaf = len(tree) // 2
+    row_count = 0
     for corner in range(first, end):
-        if add_walls(walls, index, 0, corners[corner, 0], corners[corner, 1], np.inf, 0) < 0:
+        if add_walls(walls, wall_index, _SOURCE, corners[corner, 0], corners[corner, 1], np.inf, 0) < 0:
             return -1
-        node = 1
-        while node:
-            if tree[node, 0] == np.inf or is_box_hidden(tree, node, index, 0):
+        node = 1  # The root of the tree. After the last node, `skip_subtree` returns 0.
+        while node != 0:
+            if tree[node, LOW_X] == np.inf or is_box_hidden(tree, node, wall_index, _SOURCE):
                 node = skip_subtree(node)
                 continue
-            if node < leaves:
+            if node < first_leaf:
                 node *= 2
                 continue
-            leaf = (node - leaves) * LEAF_SIZE
-            for tile in range(leaf, min(leaf + LEAF_SIZE, len(tiles.boxes))):
-                if used == len(indices):
+            first_tile = (node - first_leaf) * LEAF_SIZE
+            for tile in range(first_tile, min(first_tile + LEAF_SIZE, len(tiles.boxes))):
+                if row_count == len(indices):
                     return -1
-                if is_box_hidden(tiles.boxes, tile, index, 0):
+                if is_box_hidden(tiles.boxes, tile, wall_index, _SOURCE):
                     continue
-                mask = _find_visible_sites(walls, index, tiles, corner, tile, lengths[used])
-                if mask != 0:
-                    indices[used, 0] = corner
-                    indices[used, 1] = tile
-                    indices[used, 2] = mask
-                    used += 1
+                visible_slots = _find_visible_sites(
+                    walls, wall_index, tiles, corner, tile, lengths[row_count]
+                )
+                if visible_slots != 0:
+                    indices[row_count, _CORNER] = corner
+                    indices[row_count, _TILE] = tile
+                    indices[row_count, _VISIBLE_SLOTS] = visible_slots
+                    row_count += 1
             node = skip_subtree(node)
-    return used
+    return row_count
 
 
 @kernel
 def _find_visible_sites(
-    walls: Walls, index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, distances: Array
+    walls: Walls, wall_index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, lengths: Array
 ) -> int:
-    """Return the mask of the sites of a tile that a corner sees; write the nearest and farthest distance."""
+    """Return the bit mask of the sites of a tile that a corner sees, and write a row of `lengths`."""
     corner_x = walls.corners[corner, 0]
     corner_y = walls.corners[corner, 1]
-    mask = 0
+    visible_slots = 0
     nearest = np.inf
     farthest = 0.0
     for slot in range(SLOTS):
@@ -133,14 +148,14 @@ def _find_visible_sites(
         if (
             tiles.site[tile, slot] >= 0
             and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
-            and is_visible(walls, index, 0, x, y)
+            and is_visible(walls, wall_index, _SOURCE, x, y)
         ):
-            mask |= 1 << slot
+            visible_slots |= 1 << slot
             dx = x - corner_x
             dy = y - corner_y
             length = np.sqrt(dx * dx + dy * dy)
             nearest = min(nearest, length)
             farthest = max(farthest, length)
-    distances[0] = nearest
-    distances[1] = farthest
-    return mask
+    lengths[_NEAREST] = nearest
+    lengths[_FARTHEST] = farthest
+    return visible_slots

@@ -91,7 +91,6 @@ class CoverageCost:
         self.points = self.sites.points
         self.cells = self.sites.cells
         self.spacing = self.sites.spacing
-        # Each row describes the sites of one tile that are visible from one corner; see `build_corner_views`.
         indices, lengths = geodesics.run_for_corners(
             partial(find_corner_views, geodesics.walls, tiles),
             index_columns=3,
@@ -101,7 +100,7 @@ class CoverageCost:
         views = build_corner_views(len(tiles.boxes), indices, lengths)
         self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)
         self._component_areas = np.array([component.area for component in environment.free.geoms])
-        self._entries_per_robot = 2 * SOURCE_BINS
+        self._index_entries_per_robot = 2 * SOURCE_BINS
         self._set_density(environment)
 
     def with_density(self, environment: Environment) -> CoverageCost:
@@ -137,8 +136,8 @@ class CoverageCost:
         positions : (n, 2) array, m
             Positions of the robots, in the free space.
         speeds : (n,) array, m/s, optional
-            If given, the first robot to arrive counts instead of the nearest one, and the cost is based on
-            travel times.
+            If given, each site belongs to the robot that arrives first instead of the nearest one, and the
+            cost is based on travel times.
 
         Returns
         -------
@@ -194,52 +193,60 @@ class CoverageCost:
             raise InputError(
                 f"positions: expected an array of shape (r, n, 2) with n >= 1, got shape {teams.shape}"
             )
+        team_count, robot_count, _ = teams.shape
         grid_positions, is_inside = self.geodesics.snap_to_free_space(teams.reshape(-1, 2))
-        is_covered = np.asarray(is_inside.reshape(*teams.shape[:2], is_inside.shape[1]).any(axis=1))
+        component_count = is_inside.shape[1]
+        is_covered = np.asarray(is_inside.reshape(team_count, robot_count, component_count).any(axis=1))
         paths = self._find_paths(grid_positions.reshape(teams.shape), is_covered)
-        return [self._build_result(teams[row], is_covered[row], paths, row) for row in range(len(teams))]
+        return [self._build_result(teams[team], is_covered[team], paths, team) for team in range(team_count)]
 
     def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
-        """Find the paths to the sites from teams at (r, n, 2) grid steps.
+        """Find the paths to the sites from the robots of teams, whose positions are (r, n, 2) grid steps.
 
         `is_covered`, (r, c), says which components of the free space contain robots of each team.
         """
-        teams, robots, _ = grid_positions.shape
-        tiles = len(self._map.tiles.boxes)
-        paths = SitePaths.allocate(teams, len(self.points))
+        team_count, robot_count, _ = grid_positions.shape
+        paths = SitePaths.allocate(team_count, len(self.points))
+        # How many entries the index of the walls needs is known only once it is full.
         while True:
-            entries = self._entries_per_robot * robots + 2 * SOURCE_BINS
-            index = AngularWallIndex.allocate(robots, SOURCE_BINS, entries)
-            search = Search.allocate(index, robots, len(self.corners), tiles)
+            entry_count = self._index_entries_per_robot * robot_count + 2 * SOURCE_BINS
+            search = Search.allocate(
+                wall_index=AngularWallIndex.allocate(robot_count, SOURCE_BINS, entry_count),
+                robot_count=robot_count,
+                corner_count=len(self.corners),
+                tile_count=len(self._map.tiles.boxes),
+            )
             if find_site_paths(
                 self._map, search, grid_positions, is_covered, self.geodesics.grid.unit, paths
             ):
                 return paths
-            self._entries_per_robot *= 2
+            self._index_entries_per_robot *= 2
 
     def _find_first_arrivals(self, grid_positions: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
         """Find the path to each site from the robot that arrives first.
 
         Among robots of the same speed, the nearest one arrives first. There is one search for each speed.
         """
-        first = SitePaths(
-            distance=np.full((1, len(self.points)), np.inf),
-            owner=np.full((1, len(self.points)), -1),
-            first_corner=np.full((1, len(self.points)), -1),
-            last_corner=np.full((1, len(self.points)), -1),
+        # There is one team, and so far it reaches no site.
+        shape = (1, len(self.points))
+        arrivals = SitePaths(
+            distance=np.full(shape, np.inf),
+            owner=np.full(shape, -1),
+            first_corner=np.full(shape, -1),
+            last_corner=np.full(shape, -1),
         )
-        times = np.full((1, len(self.points)), np.inf)
+        times = np.full(shape, np.inf)
         for speed in np.unique(speeds)[::-1]:
-            rows = np.flatnonzero(speeds == speed)
-            is_covered = is_inside[None, rows].any(axis=1)
-            paths = self._find_paths(grid_positions[None, rows], np.asarray(is_covered))
+            robots = np.flatnonzero(speeds == speed)
+            is_covered = is_inside[None, robots].any(axis=1)
+            paths = self._find_paths(grid_positions[None, robots], np.asarray(is_covered))
             is_sooner = paths.distance / speed < times
             times[is_sooner] = paths.distance[is_sooner] / speed
-            first.distance[is_sooner] = paths.distance[is_sooner]
-            first.owner[is_sooner] = rows[paths.owner[is_sooner]]
-            first.first_corner[is_sooner] = paths.first_corner[is_sooner]
-            first.last_corner[is_sooner] = paths.last_corner[is_sooner]
-        return first
+            arrivals.distance[is_sooner] = paths.distance[is_sooner]
+            arrivals.owner[is_sooner] = robots[paths.owner[is_sooner]]
+            arrivals.first_corner[is_sooner] = paths.first_corner[is_sooner]
+            arrivals.last_corner[is_sooner] = paths.last_corner[is_sooner]
+        return arrivals
 
     def _build_result(
         self,
@@ -249,7 +256,7 @@ class CoverageCost:
         team: int,
         speeds: Array | None = None,
     ) -> CoverageResult:
-        """Build the result of a team at (n, 2) m from its row of the paths.
+        """Build the result of a team, at positions (n, 2) m, from its row of the paths.
 
         `is_covered`, (c,), says which components of the free space contain robots of the team.
         """

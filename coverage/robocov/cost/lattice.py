@@ -83,7 +83,7 @@ class Tiles(NamedTuple):
     component: IntArray
     """(t, SLOTS) Component of the free space."""
     boxes: Array
-    """(t, 4) Low x, low y, high x and high y of the sites of each tile."""
+    """(t, 4) The bounding box of the sites of each tile; for the columns see `robocov.geodesic.box_tree`."""
     group_boxes: Array
     """(g, 4) The bounding box of each group of `TILES_PER_GROUP` consecutive tiles."""
     tree: Array
@@ -136,21 +136,24 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
 
 def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) -> Array:
     """Return the centers of cells, (m, 2) m."""
-    column_row = np.column_stack([cells % side, cells // side])
-    return (column_row + 0.5) * spacing + origin
+    column = cells % side
+    row = cells // side
+    return (np.column_stack([column, row]) + 0.5) * spacing + origin
 
 
 def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Tiles:
     """Arrange sites at (m, 2) grid steps in tiles."""
     column = sites.cells % sites.lattice
     row = sites.cells // sites.lattice
+    # Sort the sites by tile. The sites of a tile then are a run of consecutive entries of `by_tile`.
     tile = compute_z_order(column // TILE_SIDE, row // TILE_SIDE)
-    order = np.argsort(tile, kind="stable")
-    first = find_run_starts(tile[order])
-    count = np.diff(first, append=len(order))
+    by_tile = np.argsort(tile, kind="stable")
+    first = find_run_starts(tile[by_tile])
+    count = np.diff(first, append=len(by_tile))
     slot = np.arange(SLOTS)
     is_empty = slot >= count[:, None]
-    site = order[np.where(is_empty, 0, slot) + first[:, None]]
+    # Empty slots repeat the first site of their tile.
+    site = by_tile[first[:, None] + np.where(is_empty, 0, slot)]
     x = np.ascontiguousarray(grid_positions[site, 0])
     y = np.ascontiguousarray(grid_positions[site, 1])
     low = np.column_stack([x.min(axis=1), y.min(axis=1)])

@@ -48,7 +48,7 @@ class CoverageResult(Drawable):
     weights : (m,) array or None
         Mean of φ over the cell of each site, or None if all are equal.
     speeds : (n,) array or None, m/s
-        If given, the first robot to arrive counts instead of the nearest one.
+        If given, each site belongs to the robot that arrives first instead of the nearest one.
     mean_time : float or None, s
         With `speeds`, the mean time until the first robot arrives at a site.
     """

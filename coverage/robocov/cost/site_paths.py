@@ -1,7 +1,8 @@
 """The nearest robot of every site, and the path to it: equation (22) without the mean.
 
-Most sites see the robot that is nearest in a straight line. The others are reached via a corner, or from
-another visible robot if that path is shorter. If several robots are equally far, the first one counts.
+Most sites see the robot that is nearest in a straight line. The others are called hidden. They are reached
+via a corner, or from another robot that they see, whichever path is shorter. If several robots are equally
+far away, the one with the lowest index owns the site.
 
 All lengths are in grid steps, except for the result.
 """
@@ -23,7 +24,14 @@ from robocov.geodesic.angular_index import (
     is_certainly_visible,
     is_visible,
 )
-from robocov.geodesic.box_tree import LEAF_SIZE, compute_squared_box_distance
+from robocov.geodesic.box_tree import (
+    HIGH_X,
+    HIGH_Y,
+    LEAF_SIZE,
+    LOW_X,
+    LOW_Y,
+    compute_squared_box_distance,
+)
 from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue, relax_paths
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
@@ -54,15 +62,15 @@ class Search(NamedTuple):
     all_robots: IntArray
     """(n,) Indices of all robots."""
     group_robots: IntArray
-    """(n,) The robots that may be nearest to a site of the current group of tiles."""
+    """(n,) The robots that may own a site of the current group of tiles, or a corner of the current leaf."""
     tile_robots: IntArray
-    """(n,) The robots that may be nearest to a site of the current tile."""
+    """(n,) The robots that may own a site of the current tile."""
     queue: CornerQueue
     """The corners from which paths to other corners may be shortened."""
     corner_paths: CornerPaths
     """The shortest paths from the robots to the corners."""
-    hidden: IntArray
-    """(t,) Bit s is set if the site in slot s does not see the robot that is nearest in a straight line."""
+    hidden_slots: IntArray
+    """(t,) Bit mask of the hidden sites of each tile: bit s is set if the site in slot s is hidden."""
     nearest_robot: IntArray
     """(t, SLOTS) The robot that is nearest to each site in a straight line."""
     site_length: Array
@@ -73,14 +81,15 @@ class Search(NamedTuple):
     """(t, SLOTS) The last corner at which that path bends, or -1 if there is none."""
 
     @classmethod
-    def allocate(cls, wall_index: AngularWallIndex, robots: int, corners: int, tiles: int) -> Search:
+    def allocate(
+        cls, wall_index: AngularWallIndex, robot_count: int, corner_count: int, tile_count: int
+    ) -> Search:
         """Allocate a search.
 
         Parameters
         ----------
         wall_index : AngularWallIndex
-        robots, corners, tiles : int
-            Number of each.
+        robot_count, corner_count, tile_count : int
 
         Returns
         -------
@@ -88,17 +97,17 @@ class Search(NamedTuple):
         """
         return cls(
             wall_index=wall_index,
-            reach=np.empty(robots),
-            all_robots=np.arange(robots),
-            group_robots=np.empty(robots, np.int64),
-            tile_robots=np.empty(robots, np.int64),
-            queue=CornerQueue.allocate(corners),
-            corner_paths=CornerPaths.allocate(corners),
-            hidden=np.empty(tiles, np.int64),
-            nearest_robot=np.empty((tiles, SLOTS), np.int64),
-            site_length=np.empty((tiles, SLOTS)),
-            site_robot=np.empty((tiles, SLOTS), np.int64),
-            site_corner=np.empty((tiles, SLOTS), np.int64),
+            reach=np.empty(robot_count),
+            all_robots=np.arange(robot_count),
+            group_robots=np.empty(robot_count, np.int64),
+            tile_robots=np.empty(robot_count, np.int64),
+            queue=CornerQueue.allocate(corner_count),
+            corner_paths=CornerPaths.allocate(corner_count),
+            hidden_slots=np.empty(tile_count, np.int64),
+            nearest_robot=np.empty((tile_count, SLOTS), np.int64),
+            site_length=np.empty((tile_count, SLOTS)),
+            site_robot=np.empty((tile_count, SLOTS), np.int64),
+            site_corner=np.empty((tile_count, SLOTS), np.int64),
         )
 
 
@@ -115,18 +124,18 @@ class SitePaths(NamedTuple):
     """(r, m) The last corner at which the path bends, or -1 if there is none."""
 
     @classmethod
-    def allocate(cls, teams: int, sites: int) -> SitePaths:
+    def allocate(cls, team_count: int, site_count: int) -> SitePaths:
         """Allocate paths for a given number of teams and sites.
 
         Parameters
         ----------
-        teams, sites : int
+        team_count, site_count : int
 
         Returns
         -------
         SitePaths
         """
-        shape = (teams, sites)
+        shape = (team_count, site_count)
         return cls(
             distance=np.empty(shape),
             owner=np.empty(shape, np.int64),
@@ -182,20 +191,20 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
     """Find the paths from robots at (n, 2) positions; return whether the index had enough entries."""
     tiles = cost_map.tiles
     _find_nearest_robots(tiles, search, robots)
-    used = 0
+    entry_count = 0
     for i in range(len(robots)):
         reach = np.inf
         if len(robots) > _MAX_SMALL_TEAM:
             reach = search.reach[i] * (1.0 + _REACH_PADDING)
-        used = add_walls(
-            cost_map.walls, search.wall_index, i, robots[i, 0], robots[i, 1], reach * reach, used
+        entry_count = add_walls(
+            cost_map.walls, search.wall_index, i, robots[i, 0], robots[i, 1], reach * reach, entry_count
         )
-        if used < 0:
+        if entry_count < 0:
             return False
     is_any_hidden = False
     for tile in range(len(tiles.boxes)):
         _find_hidden_sites(cost_map, search, tile, is_covered)
-        is_any_hidden = is_any_hidden or search.hidden[tile] != 0
+        is_any_hidden = is_any_hidden or search.hidden_slots[tile] != 0
     if is_any_hidden:
         _find_corner_paths(cost_map, search, robots)
         _find_hidden_site_paths(cost_map, search, robots)
@@ -205,34 +214,38 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
 @kernel
 def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
     """Find the robot that is nearest to each site in a straight line."""
-    for i in range(len(robots)):
-        search.reach[i] = 0.0
-    group_count = 0
+    search.reach[:] = 0.0
+    group_robot_count = 0
     for tile in range(len(tiles.boxes)):
         if tile % TILES_PER_GROUP == 0:
             group = tile // TILES_PER_GROUP
-            group_count = _list_nearest_candidates(
+            group_robot_count = _list_nearest_candidates(
                 tiles.group_boxes, group, robots, search.all_robots, len(robots), search.group_robots
             )
-        count = _list_nearest_candidates(
-            tiles.boxes, tile, robots, search.group_robots, group_count, search.tile_robots
+        tile_robot_count = _list_nearest_candidates(
+            tiles.boxes, tile, robots, search.group_robots, group_robot_count, search.tile_robots
         )
-        _find_nearest_robots_of_tile(tiles, search, robots, tile, count)
+        _find_nearest_robots_of_tile(tiles, search, robots, tile, tile_robot_count)
 
 
 @kernel
 def _list_nearest_candidates(
-    boxes: Array, box: int, robots: Array, candidates: IntArray, count: int, result: IntArray
+    boxes: Array, box: int, robots: Array, candidates: IntArray, candidate_count: int, result: IntArray
 ) -> int:
-    """List those of the first `count` candidates that may be nearest to a point of a box; return how many."""
+    """Write the candidates that may be nearest to some point of a box to `result`; return their number.
+
+    The candidates are the robots in the first `candidate_count` entries of `candidates`.
+    """
+    # No point of the box is farther from its nearest robot than from any one robot. For each robot, the point
+    # that is farthest from it is a corner of the box.
     squared_bound = np.inf
-    for k in range(count):
+    for k in range(candidate_count):
         x = robots[candidates[k], 0]
         y = robots[candidates[k], 1]
-        dx = max(x - boxes[box, 0], boxes[box, 2] - x)
-        dy = max(y - boxes[box, 1], boxes[box, 3] - y)
+        dx = max(x - boxes[box, LOW_X], boxes[box, HIGH_X] - x)
+        dy = max(y - boxes[box, LOW_Y], boxes[box, HIGH_Y] - y)
         squared_bound = min(squared_bound, dx * dx + dy * dy)
-    return _list_robots_within(boxes, box, robots, squared_bound, candidates, count, result)
+    return _list_robots_within(boxes, box, robots, squared_bound, candidates, candidate_count, result)
 
 
 @kernel
@@ -242,27 +255,29 @@ def _list_robots_within(
     robots: Array,
     squared_bound: float,
     candidates: IntArray,
-    count: int,
+    candidate_count: int,
     result: IntArray,
 ) -> int:
-    """List those of the first `count` candidates within a squared distance of a box; return how many."""
-    size = 0
-    for k in range(count):
+    """Write the candidates within a squared distance of a box to `result`; return their number."""
+    result_count = 0
+    for k in range(candidate_count):
         i = candidates[k]
         if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= squared_bound:
-            result[size] = i
-            size += 1
-    return size
+            result[result_count] = i
+            result_count += 1
+    return result_count
 
 
 @kernel
-def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, tile: int, count: int) -> None:
-    """Find which of the first `count` robots in `tile_robots` is nearest to each site, the first if tied."""
+def _find_nearest_robots_of_tile(
+    tiles: Tiles, search: Search, robots: Array, tile: int, candidate_count: int
+) -> None:
+    """Find which of the first robots in `search.tile_robots` is nearest to each site of a tile."""
     length = search.site_length
     nearest_robot = search.nearest_robot
     for slot in range(SLOTS):
         length[tile, slot] = np.inf
-    for k in range(count):
+    for k in range(candidate_count):
         i = search.tile_robots[k]
         x = robots[i, 0]
         y = robots[i, 1]
@@ -284,9 +299,9 @@ def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, ti
 
 @kernel
 def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered: BoolArray) -> None:
-    """Find the sites of a tile that do not see the robot that is nearest in a straight line."""
+    """Find the hidden sites of a tile. Sites in components of the free space without robots have no path."""
     tiles = cost_map.tiles
-    mask = 0
+    hidden_slots = 0
     for slot in range(SLOTS):
         if not is_covered[tiles.component[tile, slot]]:
             search.site_length[tile, slot] = np.inf
@@ -295,60 +310,89 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
             robot = search.nearest_robot[tile, slot]
+            # This test is faster, but does not recognize every visible site.
             if is_certainly_visible(search.wall_index, robot, x, y):
                 continue
             if not is_visible(cost_map.walls, search.wall_index, robot, x, y):
                 search.site_length[tile, slot] = np.inf
-                mask |= 1 << slot
-    search.hidden[tile] = mask
+                hidden_slots |= 1 << slot
+    search.hidden_slots[tile] = hidden_slots
 
 
 @kernel
 def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
     """Find the shortest paths from the robots to the corners."""
-    walls = cost_map.walls
+    # Find short paths quickly: at first, try only the robot that is nearest to each corner.
+    waiting_count = _try_nearest_robots(cost_map.walls, search, robots)
+    relax_paths(cost_map.graph, search.corner_paths, search.queue, waiting_count)
+    waiting_count = _try_closer_robots(cost_map.walls, search, robots)
+    relax_paths(cost_map.graph, search.corner_paths, search.queue, waiting_count)
+
+
+@kernel
+def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
+    """Try the straight path to each corner from the robot that is nearest to it.
+
+    Return the number of corners in the queue.
+    """
     boxes = walls.corner_boxes
     first_leaf = len(boxes) // 2
     paths = search.corner_paths
-    waiting = 0
-    count = 0
-    # Find good paths quickly: at first, try only the robot that is nearest to each corner.
+    candidate_count = 0
+    waiting_count = 0
     for corner in range(len(walls.corners)):
         if corner % LEAF_SIZE == 0:
             leaf = first_leaf + corner // LEAF_SIZE
-            count = _list_nearest_candidates(
+            candidate_count = _list_nearest_candidates(
                 boxes, leaf, robots, search.all_robots, len(robots), search.group_robots
             )
+        # No path to the corner is known yet.
         paths.length[corner] = np.inf
         paths.source[corner] = len(robots)
         search.queue.is_waiting[corner] = False
         nearest = _find_nearest_candidate(
-            robots, search.group_robots, count, walls.corners[corner, 0], walls.corners[corner, 1]
+            robots,
+            search.group_robots,
+            candidate_count,
+            walls.corners[corner, 0],
+            walls.corners[corner, 1],
         )
-        waiting = _try_straight_path(walls, search, corner, nearest, waiting)
-    relax_paths(cost_map.graph, paths, search.queue, waiting)
-    # Then try all robots that are closer to a corner than the length of its path: only these can shorten it.
-    waiting = 0
-    for corner in range(len(walls.corners)):
-        if corner % LEAF_SIZE == 0:
-            leaf = first_leaf + corner // LEAF_SIZE
-            bound = 0.0
-            for corner_of_leaf in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
-                bound = max(bound, paths.length[corner_of_leaf])
-            count = _list_robots_within(
-                boxes, leaf, robots, bound * bound, search.all_robots, len(robots), search.group_robots
-            )
-        for k in range(count):
-            waiting = _try_straight_path(walls, search, corner, search.group_robots[k], waiting)
-    relax_paths(cost_map.graph, paths, search.queue, waiting)
+        waiting_count = _try_straight_path(walls, search, corner, nearest, waiting_count)
+    return waiting_count
 
 
 @kernel
-def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: float, y: float) -> int:
-    """Return the candidate, of the first `count`, at the smallest Euclidean distance; -1 if none."""
+def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
+    """Try the straight paths to each corner from all robots that are closer than its path is long.
+
+    No other robot can shorten the path. Return the number of corners in the queue.
+    """
+    boxes = walls.corner_boxes
+    first_leaf = len(boxes) // 2
+    candidate_count = 0
+    waiting_count = 0
+    for corner in range(len(walls.corners)):
+        if corner % LEAF_SIZE == 0:
+            leaf = first_leaf + corner // LEAF_SIZE
+            longest = 0.0
+            for leaf_corner in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
+                longest = max(longest, search.corner_paths.length[leaf_corner])
+            candidate_count = _list_robots_within(
+                boxes, leaf, robots, longest * longest, search.all_robots, len(robots), search.group_robots
+            )
+        for k in range(candidate_count):
+            waiting_count = _try_straight_path(walls, search, corner, search.group_robots[k], waiting_count)
+    return waiting_count
+
+
+@kernel
+def _find_nearest_candidate(
+    robots: Array, candidates: IntArray, candidate_count: int, x: float, y: float
+) -> int:
+    """Return the candidate at the smallest Euclidean distance from (x, y); -1 if there is none."""
     min_squared_distance = np.inf
     nearest = -1
-    for k in range(count):
+    for k in range(candidate_count):
         i = candidates[k]
         dx = x - robots[i, 0]
         dy = y - robots[i, 1]
@@ -359,10 +403,10 @@ def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: 
 
 
 @kernel
-def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting: int) -> int:
+def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting_count: int) -> int:
     """Use the straight path from a robot to a corner if it is the shortest so far.
 
-    Return the number of corners in the queue.
+    Return the number of corners in the queue, which was `waiting_count` before.
     """
     paths = search.corner_paths
     corner_x = walls.corners[corner, 0]
@@ -381,49 +425,57 @@ def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, wa
         paths.previous_corner[corner] = -1
         if not search.queue.is_waiting[corner]:
             search.queue.is_waiting[corner] = True
-            search.queue.corners[waiting] = corner
-            waiting += 1
-    return waiting
+            search.queue.corners[waiting_count] = corner
+            waiting_count += 1
+    return waiting_count
 
 
 @kernel
 def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
-    """Find the paths to the sites that do not see the robot that is nearest in a straight line."""
+    """Find the paths to the hidden sites."""
     tiles = cost_map.tiles
     for group in range(len(tiles.group_boxes)):
-        first = group * TILES_PER_GROUP
-        end = min(first + TILES_PER_GROUP, len(tiles.boxes))
-        bound = -1.0
-        for tile in range(first, end):
-            if search.hidden[tile]:
+        first_tile = group * TILES_PER_GROUP
+        end_tile = min(first_tile + TILES_PER_GROUP, len(tiles.boxes))
+        has_hidden_sites = False
+        longest = 0.0
+        for tile in range(first_tile, end_tile):
+            if search.hidden_slots[tile]:
+                has_hidden_sites = True
                 _try_corner_paths(cost_map, search, tile)
-                bound = max(bound, _find_longest_hidden(search, tile))
-        if bound < 0.0:
-            continue
-        # A site may see another robot, from which the path is shorter than via a corner.
-        group_count = _list_robots_within(
-            tiles.group_boxes,
-            group,
-            robots,
-            bound * bound,
-            search.all_robots,
-            len(robots),
-            search.group_robots,
-        )
-        for tile in range(first, end):
-            if search.hidden[tile]:
-                bound = _find_longest_hidden(search, tile)
-                count = _list_robots_within(
-                    tiles.boxes,
-                    tile,
-                    robots,
-                    bound * bound,
-                    search.group_robots,
-                    group_count,
-                    search.tile_robots,
-                )
-                for k in range(count):
-                    _try_straight_paths(cost_map, search, tile, search.tile_robots[k])
+                longest = max(longest, _find_longest_hidden(search, tile))
+        if has_hidden_sites:
+            _try_other_robots(cost_map, search, robots, group, longest)
+
+
+@kernel
+def _try_other_robots(cost_map: CostMap, search: Search, robots: Array, group: int, longest: float) -> None:
+    """Try the straight paths to the hidden sites of a group of tiles, whose paths are at most `longest`."""
+    tiles = cost_map.tiles
+    group_robot_count = _list_robots_within(
+        tiles.group_boxes,
+        group,
+        robots,
+        longest * longest,
+        search.all_robots,
+        len(robots),
+        search.group_robots,
+    )
+    first_tile = group * TILES_PER_GROUP
+    for tile in range(first_tile, min(first_tile + TILES_PER_GROUP, len(tiles.boxes))):
+        if search.hidden_slots[tile]:
+            longest_of_tile = _find_longest_hidden(search, tile)
+            tile_robot_count = _list_robots_within(
+                tiles.boxes,
+                tile,
+                robots,
+                longest_of_tile * longest_of_tile,
+                search.group_robots,
+                group_robot_count,
+                search.tile_robots,
+            )
+            for k in range(tile_robot_count):
+                _try_straight_paths(cost_map, search, tile, search.tile_robots[k])
 
 
 @kernel
@@ -433,23 +485,23 @@ def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
     views = cost_map.views
     corners = cost_map.walls.corners
     paths = search.corner_paths
-    hidden = search.hidden[tile]
+    hidden_slots = search.hidden_slots[tile]
     first = views.first_row[tile]
     end = views.first_row[tile + 1]
     # If a corner sees all hidden sites, none of their paths needs to be longer than the one via that corner.
     bound = np.inf
     for row in range(first, end):
-        if hidden & ~views.mask[row] == 0:
+        if hidden_slots & ~views.visible_slots[row] == 0:
             bound = min(bound, paths.length[views.corner[row]] + views.farthest[row])
     for row in range(first, end):
         corner = views.corner[row]
-        mask = views.mask[row] & hidden
+        slots = views.visible_slots[row] & hidden_slots
         to_corner = paths.length[corner]
-        if mask == 0 or to_corner + views.nearest[row] > bound or to_corner == np.inf:
+        if slots == 0 or to_corner + views.nearest[row] > bound or to_corner == np.inf:
             continue
         robot = paths.source[corner]
         for slot in range(SLOTS):
-            if (mask >> slot) & 1:
+            if (slots >> slot) & 1:
                 dx = tiles.x[tile, slot] - corners[corner, 0]
                 dy = tiles.y[tile, slot] - corners[corner, 1]
                 length = to_corner + np.sqrt(dx * dx + dy * dy)
@@ -468,10 +520,10 @@ def _is_better(length: float, robot: int, best_length: float, best_robot: int) -
 @kernel
 def _find_longest_hidden(search: Search, tile: int) -> float:
     """Return the length of the longest path to a hidden site of a tile."""
-    hidden = search.hidden[tile]
+    hidden_slots = search.hidden_slots[tile]
     longest = 0.0
     for slot in range(SLOTS):
-        if (hidden >> slot) & 1:
+        if (hidden_slots >> slot) & 1:
             longest = max(longest, search.site_length[tile, slot])
     return longest
 
@@ -480,21 +532,21 @@ def _find_longest_hidden(search: Search, tile: int) -> float:
 def _try_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
     """Use the straight paths from a robot to the hidden sites of a tile where they are the shortest."""
     tiles = cost_map.tiles
-    index = search.wall_index
-    if is_box_hidden(tiles.boxes, tile, index, robot):
+    wall_index = search.wall_index
+    if is_box_hidden(tiles.boxes, tile, wall_index, robot):
         return
-    hidden = search.hidden[tile]
+    hidden_slots = search.hidden_slots[tile]
     for slot in range(SLOTS):
-        if (hidden >> slot) & 1:
+        if (hidden_slots >> slot) & 1:
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
-            dx = x - index.positions[robot, 0]
-            dy = y - index.positions[robot, 1]
+            dx = x - wall_index.positions[robot, 0]
+            dy = y - wall_index.positions[robot, 1]
             length = np.sqrt(dx * dx + dy * dy)
             if (
                 _is_better(length, robot, search.site_length[tile, slot], search.site_robot[tile, slot])
                 and robot != search.nearest_robot[tile, slot]
-                and is_visible(cost_map.walls, index, robot, x, y)
+                and is_visible(cost_map.walls, wall_index, robot, x, y)
             ):
                 search.site_length[tile, slot] = length
                 search.site_robot[tile, slot] = robot

@@ -13,14 +13,14 @@ from robocov.cost.coverage_cost import CoverageCost
 from robocov.cost.result import CoverageResult
 
 _MAX_CACHED_MAPS = 64
-"""Maximum number of maps whose costs are cached: moving obstacles return to the same positions."""
+"""Maximum number of maps whose costs are cached; obstacles that move periodically need them again."""
 
 
 class TimeVaryingCost:
-    """The coverage cost (22) at any time, computed from the robots that can move.
+    """The coverage cost (22) at any time, computed from the available robots.
 
-    Robots that have failed do not count, since they cannot go anywhere. Neither do robots that a moving
-    obstacle has run over, until they are free again.
+    A robot is available if it works and no moving obstacle covers it. Robots that have failed cannot go
+    anywhere, nor can robots that a moving obstacle has run over, until they are free again.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ class TimeVaryingCost:
             self._cost_by_map[key] = CoverageCost(current, self._cost.lattice, progress=self._progress)
         return self._cost_by_map[key]
 
-    def find_counted_robots(
+    def find_available_robots(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> BoolArray:
-        """Find the robots that count: they work, and no moving obstacle covers them.
+        """Find the available robots, which work and are not covered by a moving obstacle.
 
         Parameters
         ----------
@@ -85,11 +85,11 @@ class TimeVaryingCost:
         -------
         (n,) bool array
         """
-        is_counted = np.ones(len(positions), dtype=bool) if working is None else working.copy()
+        is_available = np.ones(len(positions), dtype=bool) if working is None else working.copy()
         if self._cost.environment.has_moving_obstacles:
             free = self.get_cost(time).environment.free
-            is_counted &= shapely.contains_properly(free, shapely.points(positions))
-        return is_counted
+            is_available &= shapely.contains_properly(free, shapely.points(positions))
+        return is_available
 
     def __call__(
         self, time: float, positions: Array, working: BoolArray | None = None, speeds: Array | None = None
@@ -108,18 +108,18 @@ class TimeVaryingCost:
         Returns
         -------
         CoverageResult or None
-            It has a row for each robot that counts. None if no robot counts.
+            The result for the available robots; None if there are none.
         """
-        is_counted = self.find_counted_robots(time, positions, working)
-        if not is_counted.any():
+        is_available = self.find_available_robots(time, positions, working)
+        if not is_available.any():
             return None
-        counted_speeds = None if speeds is None else speeds[is_counted]
-        return self.get_cost(time)(positions[is_counted], counted_speeds)
+        available_speeds = None if speeds is None else speeds[is_available]
+        return self.get_cost(time)(positions[is_available], available_speeds)
 
     def evaluate_all_robots(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> CoverageResult | None:
-        """Compute the coverage cost at a time, with a row for every robot.
+        """Compute the coverage cost at a time, with all robots in the result.
 
         Parameters
         ----------
@@ -131,19 +131,19 @@ class TimeVaryingCost:
         Returns
         -------
         CoverageResult or None
-            A robot that does not count owns no site. None if no robot counts.
+            Robots that are not available own no sites. None if no robot is available.
         """
         result = self(time, positions, working)
         if result is None or len(result.positions) == len(positions):
             return result
-        rows = np.flatnonzero(self.find_counted_robots(time, positions, working))
-        owner = np.where(result.owner >= 0, rows[result.owner], -1)
+        available = np.flatnonzero(self.find_available_robots(time, positions, working))
+        owner = np.where(result.owner >= 0, available[result.owner], -1)
         return replace(result, positions=np.array(positions), owner=owner)
 
     def compute_summary(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> tuple[float, float, float]:
-        """Compute the numbers that summarize the coverage cost at a time.
+        """Compute mean distance, value and uncovered area at a time.
 
         Parameters
         ----------
@@ -155,11 +155,11 @@ class TimeVaryingCost:
         Returns
         -------
         mean_distance : float, m
-            nan if no robot counts.
+            nan if no robot is available.
         value : float, m³
-            nan if no robot counts.
+            nan if no robot is available.
         uncovered_area : float, m²
-            The entire free area if no robot counts.
+            The entire free area if no robot is available.
         """
         result = self(time, positions, working)
         if result is None:

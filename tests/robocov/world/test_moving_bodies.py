@@ -194,8 +194,8 @@ def test_costs_of_recurring_maps_are_computed_once() -> None:
 def test_robots_that_are_run_over_do_not_count() -> None:
     cost = TimeVaryingCost(CoverageCost(HALL, 16))
     positions = np.array([[2.0, 1.0], [8.0, 4.0]])  # The first one is under the cart.
-    assert cost.find_counted_robots(0.0, positions).tolist() == [False, True]
-    assert cost.find_counted_robots(6.0, positions).tolist() == [True, True]
+    assert cost.find_available_robots(0.0, positions).tolist() == [False, True]
+    assert cost.find_available_robots(6.0, positions).tolist() == [True, True]
     result = cost(0.0, positions)
     assert result is not None
     assert result.positions.tolist() == [[8.0, 4.0]]
