@@ -32,14 +32,18 @@ class CornerViews(NamedTuple):
 _CORNER = 0
 _TILE = 1
 _VISIBLE_SLOTS = 2
-"""Columns of the integers that `find_corner_views` returns; see `CornerViews`."""
+"""Columns of the integers that `find_corner_views` writes; see `CornerViews`."""
+INDEX_COLUMNS = 3
+"""Number of these columns."""
 
 _SOURCE = 0
 """The only source of the index, which is the current corner."""
 
 _NEAREST = 0
 _FARTHEST = 1
-"""Columns of the lengths that `find_corner_views` returns; see `CornerViews`."""
+"""Columns of the lengths that `find_corner_views` writes; see `CornerViews`."""
+LENGTH_COLUMNS = 2
+"""Number of these columns."""
 
 
 def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:

@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, compute_weighted_mean, freeze
-from robocov.cost.corner_views import build_corner_views, find_corner_views
+from robocov.cost.corner_views import (
+    INDEX_COLUMNS,
+    LENGTH_COLUMNS,
+    build_corner_views,
+    find_corner_views,
+)
 from robocov.cost.lattice import MAX_LATTICE, build_lattice
 from robocov.cost.result import CoverageResult
 from robocov.cost.site_paths import CostMap, Search, SitePaths, find_site_paths
@@ -93,8 +98,8 @@ class CoverageCost:
         self.spacing = self.sites.spacing
         indices, lengths = geodesics.run_for_corners(
             partial(find_corner_views, geodesics.walls, tiles),
-            index_columns=3,
-            length_columns=2,
+            index_columns=INDEX_COLUMNS,
+            length_columns=LENGTH_COLUMNS,
             progress=progress,
         )
         views = build_corner_views(len(tiles.boxes), indices, lengths)
