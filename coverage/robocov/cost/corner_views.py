@@ -36,14 +36,14 @@ _VISIBLE_SLOTS = 2
 INDEX_COLUMNS = 3
 """Number of these columns."""
 
-_SOURCE = 0
-"""The only source of the index, which is the current corner."""
-
 _NEAREST = 0
 _FARTHEST = 1
 """Columns of the lengths that `find_corner_views` writes; see `CornerViews`."""
 LENGTH_COLUMNS = 2
 """Number of these columns."""
+
+_SOURCE = 0
+"""The only source of the index, which is the current corner."""
 
 
 def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:

@@ -178,7 +178,7 @@ def _add_site(
     weight = site_data.weights[site]
     for vertex in range(3):
         scratch.max_profits[vertex] += weight * (price - scratch.min_distances[vertex])
-    return weight * max(price - distance, 0.0)
+    return float(weight * max(price - distance, 0.0))
 
 
 @kernel
