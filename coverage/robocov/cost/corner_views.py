@@ -104,35 +104,54 @@ def find_corner_views(
         Number of rows of the result, or -1 if there is not enough space in it or in the index.
     """
     corners = walls.corners
-    tree = tiles.tree
-    first_leaf = len(tree) // 2
     row_count = 0
     for corner in range(first, end):
         if add_walls(walls, wall_index, _SOURCE, corners[corner, 0], corners[corner, 1], np.inf, 0) < 0:
             return -1
-        node = 1  # The root of the tree. After the last node, `skip_subtree` returns 0.
-        while node != 0:
-            if tree[node, LOW_X] == np.inf or is_box_hidden(tree, node, wall_index, _SOURCE):
-                node = skip_subtree(node)
-                continue
-            if node < first_leaf:
-                node *= 2
-                continue
-            first_tile = (node - first_leaf) * LEAF_SIZE
-            for tile in range(first_tile, min(first_tile + LEAF_SIZE, len(tiles.boxes))):
-                if row_count == len(indices):
-                    return -1
-                if is_box_hidden(tiles.boxes, tile, wall_index, _SOURCE):
-                    continue
-                visible_slots = _find_visible_sites(
-                    walls, wall_index, tiles, corner, tile, lengths[row_count]
-                )
-                if visible_slots != 0:
-                    indices[row_count, _CORNER] = corner
-                    indices[row_count, _TILE] = tile
-                    indices[row_count, _VISIBLE_SLOTS] = visible_slots
-                    row_count += 1
+        row_count = _add_views(walls, tiles, wall_index, corner, indices, lengths, row_count)
+        if row_count < 0:
+            return -1
+    return row_count
+
+
+@kernel
+def _add_views(
+    walls: Walls,
+    tiles: Tiles,
+    wall_index: AngularWallIndex,
+    corner: int,
+    indices: IntArray,
+    lengths: Array,
+    row_count: int,
+) -> int:
+    """Add a row for each tile in which a corner sees sites.
+
+    Return the new number of rows, or -1 if there is not enough space.
+    """
+    tree = tiles.tree
+    first_leaf = len(tree) // 2
+    node = 1  # The root of the tree. After the last node, `skip_subtree` returns 0.
+    while node != 0:
+        is_empty = tree[node, LOW_X] == np.inf
+        if is_empty or is_box_hidden(tree, node, wall_index, _SOURCE):
             node = skip_subtree(node)
+            continue
+        if node < first_leaf:
+            node *= 2
+            continue
+        first_tile = (node - first_leaf) * LEAF_SIZE
+        for tile in range(first_tile, min(first_tile + LEAF_SIZE, len(tiles.boxes))):
+            if row_count == len(indices):
+                return -1
+            if is_box_hidden(tiles.boxes, tile, wall_index, _SOURCE):
+                continue
+            visible_slots = _find_visible_sites(walls, wall_index, tiles, corner, tile, lengths[row_count])
+            if visible_slots != 0:
+                indices[row_count, _CORNER] = corner
+                indices[row_count, _TILE] = tile
+                indices[row_count, _VISIBLE_SLOTS] = visible_slots
+                row_count += 1
+        node = skip_subtree(node)
     return row_count
 
 

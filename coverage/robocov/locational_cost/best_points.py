@@ -160,14 +160,28 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
     centroid = cells.centroid - cells.generators
     shape = compute_derivatives(cells.edges, centroid, SquaredDistance())
     if density is None or density.is_uniform:
-        is_active = (shape.clearance > 0.0) | (shape.area > _MIN_AREA * np.square(shape.half_perimeter))
-        search = _start_search(centroid, is_active)
-        for _ in range(_MAX_ITERATIONS + 1):
-            if not search.is_active.any():
-                break
-            derivatives = compute_derivatives(cells.edges, search.trials, f)
-            _advance(search, derivatives, f.sign, _LAST_STEP)
-        return cells.generators + search.points
+        points = _search_uniform(cells, f, shape, centroid)
+    else:
+        points = _search_weighted(cells, f, density, shape, centroid)
+    return cells.generators + points
+
+
+def _search_uniform(cells: Cells, f: Performance, shape: CellDerivatives, centroid: Array) -> Array:
+    """Return the best points for density 1, (n, 2) m relative to the generators."""
+    is_active = (shape.clearance > 0.0) | (shape.area > _MIN_AREA * np.square(shape.half_perimeter))
+    search = _start_search(centroid, is_active)
+    for _ in range(_MAX_ITERATIONS + 1):
+        if not search.is_active.any():
+            break
+        derivatives = compute_derivatives(cells.edges, search.trials, f)
+        _advance(search, derivatives, f.sign, _LAST_STEP)
+    return search.points
+
+
+def _search_weighted(
+    cells: Cells, f: Performance, density: Density, shape: CellDerivatives, centroid: Array
+) -> Array:
+    """Return the best points for a density that is not uniform, (n, 2) m relative to the generators."""
     is_convex = shape.clearance > _MIN_WEIGHTED_CLEARANCE * shape.half_perimeter
     has_mass = cells.mass > _MIN_MEAN_DENSITY * density.max_value * shape.area
     search = _start_search(centroid, is_convex & has_mass)
@@ -179,8 +193,9 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
             cells, density, f, shape.half_perimeter, search.trials, search.is_active
         )
         derivatives = derivatives._replace(**weighted._asdict())
+        # The weighted derivatives are already those of a cost to be minimized.
         _advance(search, derivatives, 1.0, _LAST_WEIGHTED_STEP)
-    return cells.generators + search.points
+    return search.points
 
 
 def _start_search(points: Array, is_active: BoolArray) -> _Search:

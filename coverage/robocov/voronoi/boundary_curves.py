@@ -130,6 +130,7 @@ def trace_boundaries(
             crossings = np.empty((curve_count, curve_count, 2))
             _find_crossings(curves[:curve_count], line_count, crossings)
             for c in range(curve_count):
+                # Each curve cuts out at most one gap, and each part is cut at most once.
                 pieces = _make_room(pieces, piece_count, 2 * curve_count + 2)
                 piece_count = _add_parts(curves[c], crossings[c], pieces, piece_count)
     return pieces[:piece_count]

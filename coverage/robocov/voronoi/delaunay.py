@@ -30,7 +30,8 @@ ENTRIES_PER_TRIANGLE = 4
 """Number of entries of a mesh per triangle: three half-edges, and an unused one."""
 
 _TOLERANCE = 1e-14
-"""Size of a negative sum of two cotangents, relative to theirs, up to which it may be a rounding error."""
+"""Magnitude of a negative sum of two cotangents, relative to the sum of their magnitudes, up to which it may
+be a rounding error, so that the edge is not flipped."""
 _MAX_FLIPS_PER_POINT = 16
 """Number of flips, on average, after which triangulating has failed: rounding may cause endless flips."""
 _MIN_CROSS = 1e-300
