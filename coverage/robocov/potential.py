@@ -206,6 +206,8 @@ def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Arr
     order = np.empty(n, np.intp)
     left, low, scale, columns, rows = sort_into_bins(positions, 0, n, gains.rho_0, starts, order)
     for i in range(n):
+        # Robots in range are in the same bin or in one of the eight around it. The bins of a row follow each
+        # other, and so do the robots in them.
         column = find_bin(positions[i, 0] - left, scale)
         row = find_bin(positions[i, 1] - low, scale)
         first_column = max(column - 1, 0)
