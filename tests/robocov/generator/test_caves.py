@@ -17,9 +17,9 @@ from robocov.environment import Gap, PolygonObstacle, find_narrowest_gap
 from robocov.generator import generate_map
 from robocov.generator.caves import (
     build_tunnels,
+    build_window_tunnel,
     draw_random_field,
     extract_area_below_zero,
-    build_window_tunnel,
 )
 from robocov.generator.request import Request
 
