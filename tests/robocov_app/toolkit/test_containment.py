@@ -218,13 +218,13 @@ def test_a_dialog_that_cannot_be_drawn_is_closed(tmp_path: Path, monkeypatch: py
     with opened_editor(tmp_path) as hands:
         hands.window.contains_faults = True
         hands.key("ctrl+k")
-        asked = hands.editor.dialogs.current
-        assert asked is not None
+        palette = hands.editor.dialogs.current
+        assert palette is not None
 
         def fail(ui: object) -> None:
             raise IndexError("page")
 
-        monkeypatch.setattr(asked, "show_content", fail)
+        monkeypatch.setattr(palette, "show_content", fail)
         hands.window.run_frame(0.1)
         hands.window.run_frame(0.1)
         assert hands.editor.dialogs.current is None

@@ -96,9 +96,9 @@ def test_full_screen_can_be_switched_on_and_off(window: Counting, tmp_path: Path
     assert window.windowed_size is None
     assert window.screen.get_size() == (900, 600)
     window.screen.fill("red")
-    words = window.save_screenshot(tmp_path)
+    message = window.save_screenshot(tmp_path)
     (saved,) = tmp_path.iterdir()
-    assert str(saved) in words
+    assert str(saved) in message
     assert Image.open(saved).getpixel((10, 10))[:3] == (255, 0, 0)
 
 

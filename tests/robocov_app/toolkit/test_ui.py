@@ -24,8 +24,8 @@ MODIFIERS = {"ctrl": pygame.KMOD_LCTRL, "shift": pygame.KMOD_LSHIFT}
 
 
 def build_key_event(name: str) -> pygame.event.Event:
-    *held, last = name.split("+")
-    mod = sum(MODIFIERS[each] for each in held)
+    *modifiers, last = name.split("+")
+    mod = sum(MODIFIERS[modifier] for modifier in modifiers)
     return pygame.event.Event(pygame.KEYDOWN, key=KEYS.get(last) or ord(last), mod=mod, unicode="")
 
 

@@ -54,7 +54,7 @@ class StubWorker:
     """A worker that answers when a test calls `answer`."""
 
     def __init__(self) -> None:
-        self.asked = []
+        self.questions = []
         self.busy = False
         self.is_alive = True
         self.progress = None
@@ -63,7 +63,7 @@ class StubWorker:
         self._answer = None
 
     def put(self, question) -> None:
-        self.asked.append(question)
+        self.questions.append(question)
         self.busy = True
         self.progress = None
         self._service.put(question)
@@ -236,11 +236,11 @@ def test_questions_wait_until_the_map_is_prepared(stubbed):
     worker.progress = 0.5, 0.3
     costs.poll()
     assert costs.state == "cost: preparing the map, 50%"
-    assert [each.positions for each in worker.asked] == [None]
+    assert [question.positions for question in worker.questions] == [None]
     worker.answer()
     costs.poll()
     assert costs.state == ""
-    assert [each.time for each in worker.asked[1:]] == [1.0]
+    assert [question.time for question in worker.questions[1:]] == [1.0]
 
 
 def test_panes_take_turns(ready):
@@ -262,7 +262,7 @@ def test_one_question_is_sent_at_a_time(ready):
         costs.ask(pane, 1.0, POSITIONS)
     for _ in range(3):
         assert costs.poll() == []
-    assert len(worker.asked) == 2  # with the map
+    assert len(worker.questions) == 2  # with the map
 
 
 def test_answers_to_forgotten_questions_are_ignored(ready):
@@ -313,14 +313,14 @@ def test_a_process_that_ends_repeatedly_is_reported(ready):
     worker.die()
     costs.poll()
     assert costs.state == "cost: preparing the map"
-    assert worker.asked[-1].positions is None
-    count = len(worker.asked)
+    assert worker.questions[-1].positions is None
+    count = len(worker.questions)
     worker.die()
     for _ in range(3):
         costs.ask(0, 2.0, POSITIONS)
         costs.poll()
     assert costs.state == "no cost: it has ended"
-    assert len(worker.asked) == count
+    assert len(worker.questions) == count
 
 
 # in another process

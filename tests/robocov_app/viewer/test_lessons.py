@@ -201,9 +201,10 @@ def test_closing_the_window_restores_the_session(tmp_path: Path) -> None:
 
 
 def test_answers_use_the_controller_names_of_the_window() -> None:
-    told = {answer for each in LESSON.chapters if each.question for answer in each.question.answers}
-    assert "LA" not in told
-    assert told >= {"RAPF", "RPF", "Lloyd"}
+    questions = [chapter.question for chapter in LESSON.chapters if chapter.question]
+    answers = {answer for question in questions for answer in question.answers}
+    assert "LA" not in answers
+    assert answers >= {"RAPF", "RPF", "Lloyd"}
 
 
 def test_an_unattended_lesson_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -246,7 +247,7 @@ def test_followed_edits_repeat_bit_for_bit() -> None:
     session.release()
     advance_session(session, 10)
     end = session.timeline.step
-    went = session.timeline.panes[0].simulation.positions.copy()
+    end_positions = session.timeline.panes[0].simulation.positions.copy()
     twin = Session(session.timeline.document.nodes[0].scenario)
     twin.timeline.document = session.timeline.document
     twin.timeline.head = session.timeline.document.nodes[0]
@@ -255,4 +256,4 @@ def test_followed_edits_repeat_bit_for_bit() -> None:
     twin.timeline.follow(session.timeline.head)
     while twin.timeline.step < end:
         twin.playback.step()
-    np.testing.assert_array_equal(twin.timeline.panes[0].simulation.positions, went)
+    np.testing.assert_array_equal(twin.timeline.panes[0].simulation.positions, end_positions)

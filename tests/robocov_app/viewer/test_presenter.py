@@ -54,12 +54,12 @@ def test_settling_can_be_switched_off() -> None:
 
 def test_speed_steps_stop_at_both_ends() -> None:
     viewer = build_presenter()
-    seen = [viewer.session.playback.clock.speed]
+    speeds = [viewer.session.playback.clock.speed]
     for _ in SPEEDS:
         run_command(viewer, "faster")
-        seen.append(viewer.session.playback.clock.speed)
-    assert seen[:2] == [1.0, 2.0]
-    assert seen[-2:] == [math.inf, math.inf]
+        speeds.append(viewer.session.playback.clock.speed)
+    assert speeds[:2] == [1.0, 2.0]
+    assert speeds[-2:] == [math.inf, math.inf]
     assert viewer.message == "speed max"
     for _ in SPEEDS:
         run_command(viewer, "slower")
@@ -257,12 +257,12 @@ def test_the_active_pane_exists_after_a_removal() -> None:
 
 def test_next_controller_cycles_through_all_controllers() -> None:
     viewer = build_presenter()
-    seen = []
+    names = []
     for _ in range(len(viewer.controllers)):
-        seen.append(viewer.pane.controller.name)
+        names.append(viewer.pane.controller.name)
         run_command(viewer, "controller:next")
-    assert sorted(seen) == sorted(viewer.controllers)
-    assert viewer.pane.controller.name == seen[0]
+    assert sorted(names) == sorted(viewer.controllers)
+    assert viewer.pane.controller.name == names[0]
 
 
 def test_choosing_the_present_controller_keeps_its_gains() -> None:
@@ -281,11 +281,11 @@ def test_choosing_the_present_controller_keeps_its_gains() -> None:
 def test_next_robot_includes_failed_robots() -> None:
     viewer = build_presenter()
     viewer.session.fail_robot(2)
-    seen = []
+    selected = []
     for _ in range(4):
         run_command(viewer, "robot:next")
-        seen.append(viewer.selected_robot)
-    assert seen == [1, 2, 3, 1]
+        selected.append(viewer.selected_robot)
+    assert selected == [1, 2, 3, 1]
     run_command(viewer, "robot:previous")
     assert viewer.selected_robot == 3
 

@@ -127,10 +127,9 @@ def test_typed_commands_run(tmp_path: Path) -> None:
     assert viewer.message.startswith("session opened: ")
     run_text(viewer, "map square")
     assert viewer.files.map_name == "square"
-    words = "robots seed start controller speed time robot map open save branch"
-    assert set(words.split()) == {
-        each.name for each in build_command_table(viewer).commands if each.argument is not None
-    }
+    commands = build_command_table(viewer).commands
+    names = {command.name for command in commands if command.argument is not None}
+    assert names == set("robots seed start controller speed time robot map open save branch".split())
 
 
 def test_a_typed_user_controller_is_offered_afterwards(tmp_path: Path) -> None:

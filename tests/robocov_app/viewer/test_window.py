@@ -178,7 +178,7 @@ def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
     assert dialogs.is_open
     assert dialogs.current.text == ""
     driver.type("single")
-    assert [each.text for each in dialogs.current.options("single")] == ["Single step"]
+    assert [option.text for option in dialogs.current.options("single")] == ["Single step"]
     driver.key("return")
     assert driver.session.timeline.end_time > 0.0
     assert not dialogs.is_open
@@ -187,15 +187,15 @@ def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
 def test_the_palette_is_navigated_by_keys(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("rob")
-    asked = driver.window.dialogs.current
+    palette = driver.window.dialogs.current
     driver.key("down", 2)
     driver.key("up")
-    assert asked.chosen == 1
+    assert palette.chosen == 1
     driver.key("backspace")
-    assert asked.text == "ro"
-    assert asked.chosen == 0
+    assert palette.text == "ro"
+    assert palette.chosen == 0
     driver.key("down", 30)
-    assert asked.chosen == len(asked.options("ro")) - 1
+    assert palette.chosen == len(palette.options("ro")) - 1
     driver.key("escape")
     assert not driver.window.dialogs.is_open
     assert driver.session.timeline.end_time == 0.0
@@ -213,9 +213,9 @@ def test_values_are_set_in_the_palette(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("robots many")
     driver.key("return")
-    asked = driver.window.dialogs.current
-    assert asked.text == "robots many"
-    assert "whole number" in asked.error
+    palette = driver.window.dialogs.current
+    assert palette.text == "robots many"
+    assert "whole number" in palette.error
 
 
 def test_held_keys_repeat_steps_but_not_screenshots(driver: Driver, tmp_path: Path) -> None:
@@ -329,12 +329,12 @@ def test_settings_are_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.Monke
         driver.turn("show")
         driver.tick("cells")
         first.close()
-    kept = json.loads((tmp_path / "settings/window.json").read_text())
-    assert kept["theme"] == "dark"
-    assert kept["fade"]
-    assert kept["tab"] == "show"
-    assert "cells" not in kept["shown"]
-    assert (kept["width"], kept["height"]) == (1000, 640)
+    settings = json.loads((tmp_path / "settings/window.json").read_text())
+    assert settings["theme"] == "dark"
+    assert settings["fade"]
+    assert settings["tab"] == "show"
+    assert "cells" not in settings["shown"]
+    assert (settings["width"], settings["height"]) == (1000, 640)
     with window() as second:
         assert second.screen.get_size() == (1000, 640)
         assert second.viewer.view.theme == "dark"

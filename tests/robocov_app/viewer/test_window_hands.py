@@ -111,21 +111,21 @@ def test_a_polygon_is_drawn_corner_by_corner_and_closed_by_enter(driver: Driver)
     assert driver.viewer.message.startswith("polygon drawn")
 
 
-@pytest.mark.parametrize("how", ["double click", "first corner", "right click"])
-def test_a_polygon_is_closed_by(how: str, driver: Driver) -> None:
+@pytest.mark.parametrize("gesture", ["double click", "first corner", "right click"])
+def test_a_polygon_is_closed_by(gesture: str, driver: Driver) -> None:
     driver.key("p")
     for corner in ((0.4, 3.0), (1.2, 3.0), (0.8, 3.7)):
         driver.click_at(corner)
         driver.frames(20)
-    if how == "double click":
+    if gesture == "double click":
         driver.click_at((0.5, 3.5))
         driver.click_at((0.5, 3.5))
-    elif how == "first corner":
+    elif gesture == "first corner":
         driver.click_at((0.4, 3.0))
     else:
         driver.click_at((1.8, 3.0), button=3)
     obstacle = driver.session.displayed.environment.obstacles[-1]
-    assert len(obstacle.vertices) == (4 if how == "double click" else 3)
+    assert len(obstacle.vertices) == (4 if gesture == "double click" else 3)
 
 
 def test_a_wall_has_the_chosen_width(driver: Driver) -> None:
@@ -171,19 +171,19 @@ def test_robots_are_added_failed_and_revived_by_clicks(driver: Driver) -> None:
 
 
 @pytest.mark.parametrize(
-    ("corners", "why"),
+    ("corners", "reason"),
     [
         (((0.4, 3.0), (1.2, 3.0)), "three corners"),
         (((0.4, 3.0), (1.2, 3.6), (1.2, 3.0), (0.4, 3.6)), "crosses itself"),
     ],
 )
-def test_an_invalid_obstacle_is_refused_with_the_reason(corners, why: str, driver: Driver) -> None:
+def test_an_invalid_obstacle_is_refused_with_the_reason(corners, reason: str, driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.key("p")
     for corner in corners:
         driver.click_at(corner)
     driver.key("return")
-    assert why in driver.viewer.message
+    assert reason in driver.viewer.message
     assert driver.viewer.has_error_message
     assert driver.session.displayed.environment is before
 

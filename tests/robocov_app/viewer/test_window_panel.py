@@ -259,12 +259,12 @@ def test_up_to_four_panes_are_added_and_closed(driver: Driver) -> None:
     assert driver.find("button", "pane:add") is None
     assert len({box[2:] for box in driver.window.layout.panes}) == 1
     driver.frames(3)
-    laws = [pane.controller.name for pane in driver.session.timeline.panes]
+    names = [pane.controller.name for pane in driver.session.timeline.panes]
     driver.push("close:1")
-    assert [pane.controller.name for pane in driver.session.timeline.panes] == [laws[0], *laws[2:]]
+    assert [pane.controller.name for pane in driver.session.timeline.panes] == [names[0], *names[2:]]
     driver.push("close:0")
     driver.push("close:1")
-    assert [pane.controller.name for pane in driver.session.timeline.panes] == [laws[2]]
+    assert [pane.controller.name for pane in driver.session.timeline.panes] == [names[2]]
     assert driver.find("button", "close:0") is None
 
 
@@ -325,22 +325,22 @@ def test_pages_look_the_same_when_shown_again(tmp_path: Path) -> None:
 
 
 def test_the_panel_does_not_depend_on_earlier_sizes_and_panes(tmp_path: Path) -> None:
-    def panel(driver: Driver) -> np.ndarray:
+    def draw_panel(driver: Driver) -> np.ndarray:
         driver.move(300, 300)
         driver.frames(3, 0.3)
         left = driver.window.layout.panel[0]
         return driver.picture()[:, left:].copy()
 
     with open_viewer(tmp_path, RAPF, RPF, RPF, size=(1100, 700)) as driver:
-        wanted = panel(driver)
+        expected = draw_panel(driver)
     with open_viewer(tmp_path, RAPF, RPF) as driver:
-        panel(driver)
+        draw_panel(driver)
         resize_window(driver, (1280, 760))
-        panel(driver)
+        draw_panel(driver)
         driver.viewer.attempt(lambda: driver.session.add_pane(RPF))
-        panel(driver)
+        draw_panel(driver)
         resize_window(driver, (1100, 700))
-        assert np.array_equal(panel(driver), wanted)
+        assert np.array_equal(draw_panel(driver), expected)
 
 
 # tool tips
@@ -357,6 +357,6 @@ def test_tool_tips_show_the_action_and_its_key(driver: Driver) -> None:
 
 
 def test_tool_tips_of_gains_show_their_units(driver: Driver) -> None:
-    tips = [each.tip for each in driver.window.panel.ui.widgets.values()]
+    tips = [widget.tip for widget in driver.window.panel.ui.widgets.values()]
     assert any(tip and "N m³" in tip for tip in tips)
     assert not any(tip and "<" in tip for tip in tips)
