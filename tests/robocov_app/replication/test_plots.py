@@ -27,9 +27,9 @@ def test_each_disturbance_has_a_panel_and_each_controller_a_curve(theme: str) ->
     figure = draw_degradations(build_degradations(), theme=theme)
     panels = figure.axes
     assert [axes.get_title(loc="left") for axes in panels] == [
-        "Messages lost",
+        "Message loss",
         "Communication range (m)",
-        "Failures of each robot (1/s)",
+        "Failure rate (1/s)",
     ]
     assert [text.get_text() for text in panels[1].get_xticklabels()] == ["no limit", "2"]
     assert {text.get_text() for text in figure.legends[0].get_texts()} == {"RAPF", "LA"}
