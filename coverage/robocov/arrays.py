@@ -11,9 +11,6 @@ Array: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.intp]
 """Indices."""
 
-ComplexArray: TypeAlias = NDArray[np.complex128]
-"""Plane vectors, x + i y."""
-
 BoolArray: TypeAlias = NDArray[np.bool_]
 """Masks."""
 

@@ -33,9 +33,9 @@ class TraveledPath:
     """Path of one robot since its start, or since the last change of the team or the walls."""
 
     start_time: float = 0.0
-    """s"""
+    """Time at which the path begins, s."""
     length: float = 0.0
-    """m"""
+    """Length of the whole path, m."""
     viewpoint_length: float = 0.0
     """Length of the parts of the path that led to viewpoints, m."""
     viewpoints: tuple[Array, ...] = ()
@@ -50,11 +50,11 @@ class PlanBasis:
     planner: GridPlanner
     """Planner of the robot's own goal and its routes."""
     robots: IntArray
-    """(k,) Robots that it knew of, itself first."""
+    """(k,) Numbers of the robots that it knew of, its own first."""
     positions: Array
     """(k, 2) m, positions of these robots."""
     is_quiet: bool
-    """Whether all others were at rest."""
+    """True if all others were at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +63,9 @@ class TeamGoals:
 
     planner: GridPlanner
     robots: IntArray
-    """(p,) Robots that the plan was made for, itself first."""
+    """(p,) Numbers of the robots with goals in the plan, its own first."""
     goals: Array
-    """(p, 2) m"""
+    """(p, 2) m, goals of these robots."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +77,12 @@ class OwnMotion:
     viewpoint: Array | None = None
     """(2,) m, point to which it moves first, to look around."""
     is_idle: bool = False
-    """Whether the next plan may be skipped if nothing has changed."""
+    """True if the next plan may be skipped as long as nothing changes."""
 
 
 @dataclass(frozen=True, eq=False)
 class JamState:
-    """Whether one robot is stuck among others, and moves away from them."""
+    """How long one robot has been stuck among others, and until when it moves away from them."""
 
     stuck_plans: int = 0
     """Number of consecutive plans for which it has been stuck."""
@@ -92,15 +92,15 @@ class JamState:
 
 @dataclass(frozen=True, eq=False)
 class PlannerState:
-    """Memory of one robot."""
+    """Memory of one robot for its plans."""
 
     known_map: DiscoveredMap
     next_plan_time: float
-    """s"""
+    """Time of the next plan, s."""
     knowledge: TeamKnowledge
     path: TraveledPath = TraveledPath()
     basis: PlanBasis | None = None
-    """None before the first plan."""
+    """Knowledge for the last plan; like the goals and the motion, None before the first plan."""
     team_goals: TeamGoals | None = None
     motion: OwnMotion | None = None
     jam: JamState = JamState()

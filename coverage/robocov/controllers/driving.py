@@ -20,10 +20,8 @@ _DEFAULT_APPROACH_RATE = 4.0
 """Rate in 1/s at which the remaining distance may decrease."""
 _DEFAULT_BRAKING_FRACTION = 0.5
 """Fraction of the maximum acceleration that is assumed to be available for braking."""
-
-
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions, which only that of a zero vector is below."""
+"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _MIN_RATE = 1e-9
 """Lower limit in 1/s of the rate of approach in divisions."""
 _RELATIVE_SLACK = 1e-12

@@ -35,7 +35,7 @@ from robocov.voronoi.delaunay import Mesh
 _MIN_DISTANCE_M = 1e-9
 """Lower bound of distances between robots, to avoid division by zero."""
 _MIN_LENGTH = 1e-300
-"""Lower bound of lengths in divisions, which only that of a zero vector is below."""
+"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _MIN_CHARGE_DISTANCE_M = 0.05
 """Distance below which Howard's forces no longer grow; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)

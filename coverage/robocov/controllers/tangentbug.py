@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, ComplexArray, freeze
+from robocov.arrays import Array, freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -39,14 +39,16 @@ _PATIENCE_DECAY = 0.9
 """Factor of the length for which boundaries are followed, with each attempt to reach a goal."""
 _CONTACT_FRACTION = 0.95
 """Fraction of its present distance to which a robot may approach a point that is within the clearance."""
-
-
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions, which only that of a zero vector is below."""
+"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _ROUNDING_M = 1e-9
 """Length by which a free distance may be too small because of rounding."""
 _MAX_RETURN_FACTOR = 3.0
 """A robot gives up its return after the maximum length of its boundary, times this factor."""
+
+
+Squares: TypeAlias = frozenset[tuple[int, int]]
+"""Columns and rows of squares of the plane, of side `_SQUARE_SIDE_M`, counted from the origin."""
 
 
 class Mode(Enum):
@@ -60,32 +62,63 @@ class Mode(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FixedGoal:
+    """The goal of a robot that passes an obstacle: it stays where the centroid was. Immutable."""
+
+    position: Array
+    """(2,) m"""
+    best_point: Array | None = None
+    """(2,) m, the point nearest to the goal of all boundaries that the robot followed or left."""
+    resting_centroid: Array | None = None
+    """(2,) m, the robot's centroid when it came to rest at `best_point`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FollowedBoundary:
+    """The path of a robot along the boundary that it follows. Immutable."""
+
+    entry_point: Array
+    """(2,) m, point at which it began."""
+    last_position: Array
+    """(2,) m, position of the robot at the last scan."""
+    length: float
+    """Length of the path, m."""
+    max_length: float
+    """Length, m, after which the robot gives up."""
+
+    def extend(self, position: Array) -> FollowedBoundary:
+        """Return the path after the robot has moved straight to a position, (2,) m."""
+        length = self.length + math.dist(position, self.last_position)
+        return replace(self, length=length, last_position=position)
+
+    def is_around(self) -> bool:
+        """Return whether the robot has followed the whole boundary, back to its entry point."""
+        if self.length <= 2.0 * math.pi * _RETURN_RADIUS_M:
+            return False
+        return math.dist(self.last_position, self.entry_point) < _RETURN_RADIUS_M
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class BugState:
-    """Navigation state of one robot; points are (2,) arrays in m. Immutable."""
+    """Navigation state of one robot. Immutable."""
 
     mode: Mode
     turn: int
     """Direction in which it passes obstacles: 1 if they are on its right, counter-clockwise; else -1."""
     waypoint: Array
-    """Point that it heads for."""
+    """(2,) m, point that it heads for."""
     is_passing: bool = False
     """Whether it continues from the waypoint, and need not slow down there."""
-    fixed_goal: Array | None = None
-    """Its goal while it passes an obstacle; None while the goal is its centroid."""
-    best_point: Array | None = None
-    """The point nearest to the fixed goal of all boundaries that it followed or left."""
-    entry_point: Array | None = None
-    """Point at which it began to follow the boundary."""
-    last_position: Array | None = None
-    """Its position at the last scan."""
-    followed_length: float = 0.0
-    """Length of its path along the boundary, m."""
-    max_followed_length: float = math.inf
-    """Length, m, after which it gives up following the boundary."""
-    resting_centroid: Array | None = None
-    """Its centroid when it came to rest at `best_point`."""
     attempts: int = 0
     """Number of goals that it has fixed so far."""
+    fixed_goal: FixedGoal | None = None
+    """None while its goal is its centroid."""
+    boundary: FollowedBoundary | None = None
+    """None unless it follows a boundary, or returns along it."""
+
+    def get_goal(self, centroid: Array) -> Array:
+        """Return the fixed goal, or else the centroid, (2,) m."""
+        return centroid if self.fixed_goal is None else self.fixed_goal.position
 
     def release_goal(self, position: Array, centroid: Array, min_move: float) -> BugState:
         """Return the state without the fixed goal if that is reached, or given up and out of date.
@@ -98,14 +131,15 @@ class BugState:
         min_move : float, m
             A robot at rest tries again if its centroid has moved by this, times the number of attempts.
         """
-        if self.fixed_goal is None:
+        goal = self.fixed_goal
+        if goal is None:
             return self
-        is_done = math.dist(position, self.fixed_goal) < _ARRIVAL_RADIUS_M
+        is_done = math.dist(position, goal.position) < _ARRIVAL_RADIUS_M
         if self.mode is Mode.PROJECTED:
-            if self.resting_centroid is None:
+            if goal.resting_centroid is None:
                 if math.dist(position, self.waypoint) < _ARRIVAL_RADIUS_M:
-                    return replace(self, resting_centroid=freeze(centroid))
-            elif math.dist(centroid, self.resting_centroid) > min_move * self.attempts:
+                    return replace(self, fixed_goal=replace(goal, resting_centroid=freeze(centroid)))
+            elif math.dist(centroid, goal.resting_centroid) > min_move * self.attempts:
                 is_done = True
         if not is_done:
             return self
@@ -117,8 +151,8 @@ class TangentBugMemory(Memory):
     """Memory of the robots, with their navigation states."""
 
     bugs: tuple[BugState, ...] = ()
-    obstacle_squares: tuple[ComplexArray, ...] = ()
-    """(w,) Squares in which each robot has detected obstacle points, as complex numbers column + i row."""
+    obstacle_squares: tuple[Squares, ...] = ()
+    """The squares in which each robot has detected obstacle points."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +208,7 @@ class TangentBug(BaseController):
         returns = update_returns(seen, memory.returns)
         obstacle_points = collect_obstacle_points(seen, returns)
         bugs = memory.bugs or tuple(BugState(Mode.GOAL, 1, position) for position in seen.positions)
-        obstacle_squares = memory.obstacle_squares or (np.empty(0, dtype=np.complex128),) * len(team)
+        obstacle_squares = memory.obstacle_squares or (frozenset(),) * len(team)
         # Robots navigate after each scan. Before the first one, they use the closest obstacle points instead.
         if not memory.bugs or seen.scans is not None or returns is None:
             obstacle_squares = tuple(
@@ -186,10 +220,7 @@ class TangentBug(BaseController):
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
-        goals = [
-            centroid if bug.fixed_goal is None else bug.fixed_goal
-            for bug, centroid in zip(bugs, cells.centroid, strict=True)
-        ]
+        goals = [bug.get_goal(centroid) for bug, centroid in zip(bugs, cells.centroid, strict=True)]
         return Decision(
             forces=forces,
             goals=np.array(goals),
@@ -211,7 +242,7 @@ class TangentBug(BaseController):
         bugs: tuple[BugState, ...],
         centroids: Array,
         obstacle_points: Array,
-        obstacle_squares: tuple[ComplexArray, ...],
+        obstacle_squares: tuple[Squares, ...],
     ) -> tuple[BugState, ...]:
         """Return the navigation states of all robots after a scan."""
         directions = compute_ray_directions(self.scanning.rays)
@@ -219,22 +250,22 @@ class TangentBug(BaseController):
         for i, bug in enumerate(bugs):
             position = seen.positions[i]
             bug = bug.release_goal(position, centroids[i], self.moved)
-            goal = centroids[i] if bug.fixed_goal is None else bug.fixed_goal
             points = obstacle_points[i] - position
             clearance = float(team.radius[i]) + self.clearance
             reach = min(float(team.sensing_range[i]), seen.region.diameter)
-            squares = np.column_stack([obstacle_squares[i].real, obstacle_squares[i].imag])
-            navigator = Navigator(
-                jump=self.jump,
-                detour=self.detour,
-                position=position,
-                goal=goal - position,
+            view = ObstacleView(
                 points=points,
-                known_points=(squares + 0.5) * _SQUARE_SIDE_M - position,
                 directions=directions,
                 free_distances=compute_free_distances(points, directions, clearance, reach),
                 clearance=clearance,
                 reach=reach,
+            )
+            navigator = Navigator(
+                controller=self,
+                view=view,
+                position=position,
+                goal=bug.get_goal(centroids[i]) - position,
+                obstacle_squares=obstacle_squares[i],
             )
             updated_bugs.append(navigator.update(bug))
         return tuple(updated_bugs)
@@ -256,10 +287,11 @@ class TangentBug(BaseController):
         return compute_approach_velocities(offsets, math.inf, speed)
 
 
-def _add_squares(squares: ComplexArray, points: Array) -> ComplexArray:
+def _add_squares(squares: Squares, points: Array) -> Squares:
     """Return the squares and those that contain the given obstacle points, (k, 2) m; nan for none."""
-    indices = np.floor(points[~np.isnan(points[:, 0])] / _SQUARE_SIDE_M)
-    return np.unique(np.concatenate([squares, indices[:, 0] + 1j * indices[:, 1]]))
+    detected = points[~np.isnan(points[:, 0])]
+    indices = np.floor(detected / _SQUARE_SIDE_M).astype(np.intp)
+    return squares | {(column, row) for column, row in indices.tolist()}
 
 
 class ContourEnd(NamedTuple):
@@ -272,73 +304,39 @@ class ContourEnd(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Navigator:
-    """Decisions of one robot from its last scan. Points and distances are relative to it, in m."""
+class ObstacleView:
+    """The obstacles that one robot sees. Points and distances are relative to the robot, in m."""
 
-    jump: float
-    """Minimum step of the depth in view at the end of an obstacle."""
-    detour: float | None
-    """Maximum path along a boundary, in distances to the goal."""
-    position: Array
-    """(2,) Position of the robot in the region."""
-    goal: Array
-    """(2,)"""
     points: Array
     """(m, 2) Obstacle points; nan for rays that hit nothing."""
-    known_points: Array
-    """(w, 2) Centers of the squares in which it has detected obstacle points so far."""
     directions: Array
     """(k, 2) Unit vectors of the rays."""
     free_distances: Array
-    """(k,) Distance that the robot can move straight along each ray, m."""
+    """(k,) Distance that the robot can move straight along each ray."""
     clearance: float
     """Distance that its center keeps from obstacles."""
     reach: float
     """Range of its sensor."""
 
-    def update(self, bug: BugState) -> BugState:
-        """Return the navigation state after the scan."""
-        is_goal_in_view = self._is_in_view(self.goal)
-        is_free_ahead = self._compute_free_distance(self.goal) >= self.reach - _ROUNDING_M
-        if is_goal_in_view or (bug.mode is Mode.GOAL and is_free_ahead):
-            return self._head_for(bug, Mode.GOAL, self.position + self.goal)
-        if bug.mode is Mode.PROJECTED:
-            return bug
-        if bug.mode is Mode.LEAVING:
-            offset = bug.waypoint - self.position
-            if math.hypot(*offset) > _RETURN_RADIUS_M and self._is_in_view(offset):
-                return bug
-            # The next point at which it leaves a boundary has to be nearer to the goal.
-            bug = replace(bug, mode=Mode.GOAL, best_point=bug.waypoint)
-        if bug.mode is Mode.GOAL:
-            return self._move_to_goal(bug)
-        return self._follow_boundary(bug)
-
-    def _head_for(self, bug: BugState, mode: Mode, waypoint: Array, *, is_passing: bool = False) -> BugState:
-        """Return the state of a robot that moves through free space."""
-        return replace(
-            bug,
-            mode=mode,
-            waypoint=freeze(waypoint),
-            is_passing=is_passing,
-            entry_point=None,
-            followed_length=0.0,
-        )
-
-    def _is_in_view(self, offset: Array) -> bool:
+    def contains(self, point: Array) -> bool:
         """Return whether the robot can move straight to a point."""
-        distance = math.hypot(*offset)
-        return distance < _ARRIVAL_RADIUS_M or self._compute_free_distance(offset) >= distance - _ROUNDING_M
+        distance = math.hypot(*point)
+        return distance < _ARRIVAL_RADIUS_M or self.compute_free_distance(point) >= distance - _ROUNDING_M
 
-    def _compute_free_distance(self, offset: Array) -> float:
-        """Return the distance that the robot can move straight toward a point, m."""
-        direction = offset / max(math.hypot(*offset), _MIN_LENGTH)
+    def compute_free_distance(self, point: Array) -> float:
+        """Return the distance that the robot can move straight toward a point, which it may pass."""
+        direction = point / max(math.hypot(*point), _MIN_LENGTH)
         return float(compute_free_distances(self.points, direction[None], self.clearance, self.reach)[0])
 
-    def _find_contour_ends(self, direction: Array) -> dict[int, ContourEnd]:
+    def find_nearest_point(self) -> Array | None:
+        """Return the nearest obstacle point, (2,), or None if the robot sees no obstacle."""
+        distances = np.hypot(*self.points.T)
+        return None if np.isnan(distances).all() else self.points[int(np.nanargmin(distances))]
+
+    def find_contour_ends(self, direction: Array, jump: float) -> dict[int, ContourEnd]:
         """Return the ends of the contour that blocks the view in a direction, by the turn toward each."""
         first_ray = int((self.directions * direction).sum(axis=1).argmax())
-        blocked_distance = self._compute_free_distance(direction)
+        blocked_distance = self.compute_free_distance(direction)
         ends = {}
         for turn in (1, -1):
             end = find_contour_end(
@@ -347,16 +345,54 @@ class Navigator:
                 first_ray=first_ray,
                 turn=turn,
                 blocked_distance=blocked_distance,
-                jump=self.jump,
+                jump=jump,
                 reach=self.reach,
             )
             if end is not None:
                 ends[turn] = end
         return ends
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Navigator:
+    """Decisions of one robot after a scan."""
+
+    controller: TangentBug
+    view: ObstacleView
+    position: Array
+    """(2,) m, position of the robot in the region."""
+    goal: Array
+    """(2,) m, its goal relative to its position."""
+    obstacle_squares: Squares
+    """Squares in which it has detected obstacle points."""
+
+    def update(self, bug: BugState) -> BugState:
+        """Return the navigation state after the scan."""
+        is_goal_in_view = self.view.contains(self.goal)
+        is_free_ahead = self.view.compute_free_distance(self.goal) >= self.view.reach - _ROUNDING_M
+        if is_goal_in_view or (bug.mode is Mode.GOAL and is_free_ahead):
+            return self._head_for(bug, Mode.GOAL, self.position + self.goal)
+        if bug.mode is Mode.PROJECTED:
+            return bug
+        if bug.mode is Mode.LEAVING:
+            offset = bug.waypoint - self.position
+            if math.hypot(*offset) > _RETURN_RADIUS_M and self.view.contains(offset):
+                return bug
+            assert bug.fixed_goal is not None
+            # The next point at which it leaves a boundary has to be nearer to the goal.
+            goal = replace(bug.fixed_goal, best_point=bug.waypoint)
+            bug = replace(bug, mode=Mode.GOAL, fixed_goal=goal)
+        if bug.mode is Mode.GOAL:
+            return self._move_to_goal(bug)
+        return self._follow_boundary(bug)
+
+    def _head_for(self, bug: BugState, mode: Mode, waypoint: Array, *, is_passing: bool = False) -> BugState:
+        """Return the state of a robot that moves through free space."""
+        return replace(bug, mode=mode, waypoint=freeze(waypoint), is_passing=is_passing, boundary=None)
+
     def _move_to_goal(self, bug: BugState) -> BugState:
         """Return the state of a robot that moves to the goal, past the obstacle that blocks the path."""
-        ends = self._find_contour_ends(self.goal)
+        ends = self.view.find_contour_ends(self.goal, self.controller.jump)
         remaining = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
         path_lengths = {turn: math.hypot(*end.point) + remaining[turn] for turn, end in ends.items()}
         if bug.turn in ends:
@@ -373,109 +409,114 @@ class Navigator:
     def _enter_boundary(self, bug: BugState, ends: dict[int, ContourEnd]) -> BugState:
         """Return the state of a robot that fixes its goal, and begins to follow a boundary."""
         attempts = bug.attempts
+        best_point = None
         if bug.fixed_goal is None:
             attempts += 1
-        max_followed_length = math.inf
-        if self.detour is not None:
-            max_followed_length = self.detour * math.hypot(*self.goal) * _PATIENCE_DECAY**attempts
+        else:
+            best_point = bug.fixed_goal.best_point
+        max_length = math.inf
+        if self.controller.detour is not None:
+            max_length = self.controller.detour * math.hypot(*self.goal) * _PATIENCE_DECAY**attempts
         position = freeze(self.position)
         bug = replace(
             bug,
             mode=Mode.BOUNDARY,
             is_passing=True,
-            fixed_goal=freeze(self.position + self.goal),
             attempts=attempts,
-            entry_point=position,
-            last_position=position,
-            followed_length=0.0,
-            max_followed_length=max_followed_length,
+            fixed_goal=FixedGoal(freeze(self.position + self.goal), best_point),
+            boundary=FollowedBoundary(position, position, length=0.0, max_length=max_length),
         )
-        if self._is_goal_blocked() or max_followed_length < _MIN_BOUNDARY_LENGTH_M:
-            return self._move_to_best_point(replace(bug, best_point=self._find_best_point(bug, ends)))
+        if self._is_goal_blocked() or max_length < _MIN_BOUNDARY_LENGTH_M:
+            return self._move_to_best_point(bug, self._find_best_point(bug, ends))
         return self._follow_boundary(bug)
 
     def _is_goal_blocked(self) -> bool:
         """Return whether the goal is in a known obstacle, or too close to one."""
-        if not len(self.known_points):
+        if not self.obstacle_squares:
             return False
-        distance = np.hypot(*(self.goal - self.known_points).T).min()
-        return bool(distance < self.clearance + _SQUARE_SIDE_M)
+        centers = (np.array(list(self.obstacle_squares)) + 0.5) * _SQUARE_SIDE_M
+        distance = np.hypot(*(self.goal - (centers - self.position)).T).min()
+        return bool(distance < self.view.clearance + _SQUARE_SIDE_M)
 
     def _follow_boundary(self, bug: BugState) -> BugState:
         """Return the state of a robot that follows a boundary."""
-        assert bug.last_position is not None
-        followed_length = bug.followed_length + math.dist(self.position, bug.last_position)
-        bug = replace(bug, followed_length=followed_length, last_position=self.position)
-        distances = np.hypot(*self.points.T)
-        if np.isnan(distances).all():
+        assert bug.boundary is not None
+        assert bug.fixed_goal is not None
+        nearest_point = self.view.find_nearest_point()
+        if nearest_point is None:
             return self._head_for(bug, Mode.GOAL, self.position + self.goal)
-        ends = self._find_contour_ends(self.points[int(np.nanargmin(distances))])
+        ends = self.view.find_contour_ends(nearest_point, self.controller.jump)
         # A closed contour has no end to move to.
         offset = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
+        boundary = bug.boundary.extend(self.position)
         best_point = self._find_best_point(bug, ends)
-        bug = replace(bug, waypoint=freeze(self.position + offset), best_point=best_point)
+        bug = replace(
+            bug,
+            waypoint=freeze(self.position + offset),
+            fixed_goal=replace(bug.fixed_goal, best_point=best_point),
+            boundary=boundary,
+        )
         if bug.mode is Mode.RETURN:
-            if bug.followed_length > _MAX_RETURN_FACTOR * bug.max_followed_length:
+            if boundary.length > _MAX_RETURN_FACTOR * boundary.max_length:
                 # The robot has lost its best point, and stays where it is.
-                bug = replace(bug, best_point=freeze(self.position))
-            return self._move_to_best_point(bug)
+                best_point = freeze(self.position)
+            return self._move_to_best_point(bug, best_point)
         leaving_point = self._find_leaving_point(best_point)
         if leaving_point is not None:
             return self._head_for(bug, Mode.LEAVING, leaving_point, is_passing=True)
-        is_around = self._is_around(bug)
-        if is_around or not ends or bug.followed_length > bug.max_followed_length:
+        is_around = boundary.is_around()
+        if is_around or not ends or boundary.length > boundary.max_length:
             # After a full turn, the robot keeps going; otherwise it returns the way it came.
             turn = bug.turn if is_around else -bug.turn
-            return self._move_to_best_point(replace(bug, mode=Mode.RETURN, turn=turn))
+            return self._move_to_best_point(replace(bug, mode=Mode.RETURN, turn=turn), best_point)
         return bug
-
-    def _is_around(self, bug: BugState) -> bool:
-        """Return whether a robot has followed the whole boundary, back to its entry point."""
-        assert bug.entry_point is not None
-        if bug.followed_length <= 2.0 * math.pi * _RETURN_RADIUS_M:
-            return False
-        return math.dist(self.position, bug.entry_point) < _RETURN_RADIUS_M
 
     def _find_leaving_point(self, best_point: Array) -> Array | None:
         """Return the point in view nearest to the goal, (2,) m, if it is nearer than the best point."""
+        directions = self.view.directions
         # On each ray, the point nearest to the goal.
-        depths = np.clip((self.directions * self.goal).sum(axis=1), 0.0, self.free_distances)
-        remaining = np.hypot(*(self.goal - depths[:, None] * self.directions).T)
+        depths = np.clip((directions * self.goal).sum(axis=1), 0.0, self.view.free_distances)
+        remaining = np.hypot(*(self.goal - depths[:, None] * directions).T)
         ray = int(remaining.argmin())
         if remaining[ray] >= math.dist(self.position + self.goal, best_point) - _MIN_IMPROVEMENT_M:
             return None
-        return np.asarray(self.position + depths[ray] * self.directions[ray])
+        return np.asarray(self.position + depths[ray] * directions[ray])
 
     def _find_best_point(self, bug: BugState, ends: dict[int, ContourEnd]) -> Array:
         """Return the boundary point, followed so far or now in view, that is nearest to the goal, (2,) m."""
-        rays = np.arange(len(self.free_distances))
+        assert bug.fixed_goal is not None
+        rays = np.arange(len(self.view.free_distances))
         if len(ends) == 2:
             # The contour extends counter-clockwise from one end to the other.
             first = ends[-1].ray + 1
             count = (ends[1].ray - first) % len(rays)
             rays = np.sort((first + np.arange(count)) % len(rays))
-        best_so_far = np.zeros(2) if bug.best_point is None else bug.best_point - self.position
-        points = np.vstack([best_so_far, self.free_distances[rays, None] * self.directions[rays]])
+        best_so_far = np.zeros(2)
+        if bug.fixed_goal.best_point is not None:
+            best_so_far = bug.fixed_goal.best_point - self.position
+        contour = self.view.free_distances[rays, None] * self.view.directions[rays]
+        points = np.vstack([best_so_far, contour])
         nearest = np.hypot(*(self.goal - points).T).argmin()
         return freeze(self.position + points[nearest])
 
-    def _move_to_best_point(self, bug: BugState) -> BugState:
+    def _move_to_best_point(self, bug: BugState, best_point: Array) -> BugState:
         """Return the state of a robot that heads for its best point if that is in view, or returns to it."""
-        assert bug.best_point is not None
-        offset = bug.best_point - self.position
+        assert bug.fixed_goal is not None
+        goal = replace(bug.fixed_goal, best_point=best_point, resting_centroid=None)
+        offset = best_point - self.position
         distance = math.hypot(*offset)
-        free_distance = self._compute_free_distance(offset)
+        free_distance = self.view.compute_free_distance(offset)
         # Seen from here, the boundary may be a little closer to the point than it was before.
-        if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.clearance:
-            return replace(bug, mode=Mode.RETURN)
+        if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.view.clearance:
+            return replace(bug, mode=Mode.RETURN, fixed_goal=goal)
         fraction = min(1.0, free_distance / max(distance, _MIN_LENGTH))
         return replace(
             bug,
             mode=Mode.PROJECTED,
             waypoint=freeze(self.position + offset * fraction),
             is_passing=False,
-            entry_point=None,
-            resting_centroid=None,
+            fixed_goal=goal,
+            boundary=None,
         )
 
 

@@ -49,7 +49,7 @@ _FULL_TURN = 4.0
 """Pseudo-angle of a full turn; see `compute_pseudo_angle`."""
 
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions, which only that of a zero vector is below."""
+"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 
 _MUST_CHECK_SECTORS = -1.0
 """Squared clear distance in all bins of a source at a vertex; less than the square of any distance."""

@@ -138,7 +138,7 @@ def test_the_goal_is_fixed_while_a_robot_follows_a_boundary() -> None:
         bug = simulation.memory.bugs[0]
         modes.add(bug.mode)
         if bug.mode is Mode.BOUNDARY:
-            np.testing.assert_allclose(bug.fixed_goal, [5.0, 5.0], atol=1e-9)
+            np.testing.assert_allclose(bug.fixed_goal.position, [5.0, 5.0], atol=1e-9)
     assert modes >= {Mode.GOAL, Mode.BOUNDARY}
 
 
