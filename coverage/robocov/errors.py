@@ -141,12 +141,12 @@ class MapError(InputError):
         """
         first = mistakes[0]
         message = first.format_message(where)
-        others = len(mistakes) - 1 + unlisted
-        if others > 0:
-            message += f" (and {others} more)"
+        other_count = len(mistakes) - 1 + unlisted
+        if other_count > 0:
+            message += f" (and {other_count} more)"
         error = cls(message)
         error.mistakes = tuple(mistakes[: cls.MAX_LISTED])
-        error.unlisted = others + 1 - len(error.mistakes)
+        error.unlisted = other_count + 1 - len(error.mistakes)
         error.where = where
         error.line = first.line
         error.column = first.column
@@ -189,7 +189,7 @@ def quote(value: object) -> str:
         text = repr(value)
     except Exception:  # The `__repr__` of a user's class may fail.
         text = f"<{type(value).__name__}>"
-    return _cut(" ".join(text.split()))
+    return _shorten(" ".join(text.split()))
 
 
 def quote_json(value: object) -> str:
@@ -208,7 +208,7 @@ def quote_json(value: object) -> str:
     >>> quote_json({"radius": None})
     '{"radius": null}'
     """
-    return _cut(json.dumps(value, default=repr))
+    return _shorten(json.dumps(value, default=repr))
 
 
 def to_one_line(text: object) -> str:
@@ -265,7 +265,7 @@ def format_path(path: Sequence[str | int]) -> str:
     """
     text = ""
     for step in path:
-        name = step if isinstance(step, int) else _cut(step)
+        name = step if isinstance(step, int) else _shorten(step)
         if isinstance(name, str) and _is_plain_key(name):
             text += f".{name}" if text else name
         else:
@@ -421,8 +421,8 @@ def summarize_names(names: Sequence[str]) -> str:
     'a, b, c and 1 more'
     """
     text = ", ".join(names[:_MAX_LISTED_NAMES])
-    others = len(names) - _MAX_LISTED_NAMES
-    return f"{text} and {others} more" if others > 0 else text
+    other_count = len(names) - _MAX_LISTED_NAMES
+    return f"{text} and {other_count} more" if other_count > 0 else text
 
 
 def format_count(count: int, noun: str) -> str:
@@ -469,11 +469,11 @@ def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     message = f"unknown {kind} {quote(name)}"
     for similar_name in get_close_matches(name.lower(), names, n=1, cutoff=_MIN_SIMILARITY):
         message += f": did you mean {quote(similar_name)}?"
-    listing = ", ".join(_cut(to_one_line(known_name)) for known_name in names)
+    listing = ", ".join(_shorten(to_one_line(known_name)) for known_name in names)
     return f"{message} (known: {listing})"
 
 
-def _cut(text: str) -> str:
+def _shorten(text: str) -> str:
     if len(text) <= _MAX_QUOTED_CHARACTERS:
         return text
     return f"{text[: _MAX_QUOTED_CHARACTERS - 3]}..."

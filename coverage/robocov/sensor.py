@@ -21,6 +21,8 @@ from robocov.world.obstacle_pieces import Mover, Obstacles
 
 _MAX_RANGE_M = 1e6
 """Range that replaces an unlimited one, because pymunk's bounding boxes must be finite."""
+_INDEXING_STEP_S = 1e-9
+"""Duration of the step in which pymunk builds its spatial index; nothing moves in it."""
 _EVERYTHING = pymunk.ShapeFilter()
 
 
@@ -51,7 +53,7 @@ class RangeSensor:
         self._movers = movers
         self._space, self._mover_bodies = build_obstacle_space(Obstacles(walls, movers))
         # An empty step builds the spatial index; queries never change the space.
-        self._space.step(1e-9)
+        self._space.step(_INDEXING_STEP_S)
         self._failed_robots: dict[tuple[float, float, float], pymunk.Circle] = {}
 
     def copy(self) -> RangeSensor:

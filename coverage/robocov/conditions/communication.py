@@ -28,16 +28,16 @@ class Broadcast(NamedTuple):
 
     Attributes
     ----------
-    arrives, sent : int
-        Numbers of the steps, from time zero, in which the messages arrive and were sent.
+    sent_step, arrival_step : int
+        Numbers of the steps, from time zero, in which the messages were sent and arrive.
     positions : (n, 2) array, m
         Reported positions of the senders.
     is_received : (n, n) bool array
         Whether the row's robot receives the message of the column's robot.
     """
 
-    arrives: int
-    sent: int
+    sent_step: int
+    arrival_step: int
     positions: Array
     is_received: BoolArray
 
@@ -48,7 +48,7 @@ class Inbox:
 
     Attributes
     ----------
-    sent, arrived : (n, n) int array
+    sent_steps, arrival_steps : (n, n) int array
         Numbers of the steps in which the newest message from the column's robot to the row's robot was sent
         and arrived; `NEVER` if there is none.
     positions : (n, n, 2) array, m
@@ -57,8 +57,8 @@ class Inbox:
         In the order in which they arrive.
     """
 
-    sent: IntArray
-    arrived: IntArray
+    sent_steps: IntArray
+    arrival_steps: IntArray
     positions: Array
     in_flight: tuple[Broadcast, ...] = ()
 
@@ -76,7 +76,7 @@ class Inbox:
         Inbox
         """
         never = np.full((count, count), NEVER, dtype=np.intp)
-        return cls(sent=never, arrived=never.copy(), positions=np.zeros((count, count, 2)))
+        return cls(sent_steps=never, arrival_steps=never.copy(), positions=np.zeros((count, count, 2)))
 
     def select_robots(self, rows: IntArray) -> Inbox:
         """Return the inbox of a team of m robots, some of this team and some new.
@@ -102,8 +102,8 @@ class Inbox:
             for broadcast in self.in_flight
         )
         return Inbox(
-            sent=np.where(is_new_pair, NEVER, self.sent[old_pairs]),
-            arrived=np.where(is_new_pair, NEVER, self.arrived[old_pairs]),
+            sent_steps=np.where(is_new_pair, NEVER, self.sent_steps[old_pairs]),
+            arrival_steps=np.where(is_new_pair, NEVER, self.arrival_steps[old_pairs]),
             positions=self.positions[old_pairs],
             in_flight=in_flight,
         )
@@ -152,24 +152,24 @@ class Radio:
         in_flight = inbox.in_flight
         if self._is_sending(step):
             broadcast = Broadcast(
-                arrives=step + self._latency_steps,
-                sent=step,
+                sent_step=step,
+                arrival_step=step + self._latency_steps,
                 positions=np.array(reported_positions),
                 is_received=self._find_receivers(step, true_positions, working),
             )
             in_flight = (*in_flight, broadcast)
-        due = [broadcast for broadcast in in_flight if broadcast.arrives <= step]
+        due = [broadcast for broadcast in in_flight if broadcast.arrival_step <= step]
         if len(due) == 0:
             return replace(inbox, in_flight=in_flight)
-        sent = inbox.sent.copy()
-        arrived = inbox.arrived.copy()
+        sent_steps = inbox.sent_steps.copy()
+        arrival_steps = inbox.arrival_steps.copy()
         newest_positions = inbox.positions.copy()
         for broadcast in due:
-            sent[broadcast.is_received] = broadcast.sent
-            arrived[broadcast.is_received] = broadcast.arrives
+            sent_steps[broadcast.is_received] = broadcast.sent_step
+            arrival_steps[broadcast.is_received] = broadcast.arrival_step
             receiver, sender = np.nonzero(broadcast.is_received)
             newest_positions[receiver, sender] = broadcast.positions[sender]
-        return Inbox(sent, arrived, newest_positions, in_flight[len(due) :])
+        return Inbox(sent_steps, arrival_steps, newest_positions, in_flight[len(due) :])
 
     def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbors, Array, Array]:
         """Read the newest message that each working robot has from every robot that it has not forgotten.
@@ -191,11 +191,11 @@ class Radio:
         ages : (m,) array, s
             Times since the messages were sent.
         """
-        silence = (step - inbox.arrived) * self._dt
+        silence = (step - inbox.arrival_steps) * self._dt
         is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
-        robot, neighbor = np.nonzero((inbox.arrived >= 0) & is_recent & working[:, None])
+        robot, neighbor = np.nonzero((inbox.arrival_steps >= 0) & is_recent & working[:, None])
         neighbors = Neighbors.from_pairs(len(working), robot, neighbor, self._ranges)
-        ages = (step - inbox.sent[robot, neighbor]) * self._dt
+        ages = (step - inbox.sent_steps[robot, neighbor]) * self._dt
         return neighbors, inbox.positions[robot, neighbor], np.asarray(ages)
 
     def _is_sending(self, step: int) -> bool:

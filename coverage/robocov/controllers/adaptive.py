@@ -252,7 +252,10 @@ def _multiply(first: Array, second: Array) -> Array:
 
 @kernel
 def _solve(matrices: Array, right_sides: Array) -> Array:
-    """Return the solutions, (n, m), of symmetric positive definite systems, (n, m, m), by elimination."""
+    """Return the solutions, (n, m), of symmetric positive definite systems, (n, m, m), by elimination.
+
+    They have the same bits on all processors, unlike those of LAPACK.
+    """
     matrices = matrices.copy()
     solutions = right_sides.copy()
     m = solutions.shape[1]

@@ -106,7 +106,7 @@ class _Others(NamedTuple):
     is_fixed: BoolArray
     """(k,) Whether each is at rest, out of contact now, or not planned for."""
     is_quiet: bool
-    """Whether all of them are at rest."""
+    """Whether all of them are at rest or out of contact now."""
 
 
 class _LostRobots(NamedTuple):
@@ -408,6 +408,7 @@ class Atlas(BaseController):
         """Return the time until the next plan, s: at least the time to move to the next node."""
         period = max(self.period, time_to_next_node)
         if previous.basis is None and self.is_staggered:
+            # The periods after the first plan differ, so that the robots keep planning at different times.
             period = period * (1.0 + (robot + 1) * _GOLDEN_FRACTION % 1.0)
         return period
 
@@ -508,7 +509,7 @@ def _update_knowledge(
 def _find_evasion_goal(
     state: PlannerState, own_goal: Array, step_length: float, time: float, robot: int
 ) -> tuple[JamState, Array | None]:
-    """Return whether a robot is in a jam, and a goal outside the jam; None if it need not move away."""
+    """Return the state of a robot in a jam, and a goal outside the jam; None if it need not move away."""
     assert state.basis is not None
     positions = state.basis.positions
     position = positions[0]
@@ -555,7 +556,7 @@ def _extend_path(
     previous: PlannerState, state: PlannerState, position: Array, time: float, radius: float
 ) -> TraveledPath:
     """Return the path with the move since the last plan; after a change, a new path starts."""
-    if previous.basis is None or _has_changed(previous.basis, previous, state, radius):
+    if previous.basis is None or _has_changed(previous, state, radius):
         return TraveledPath(start_time=time)
     move = math.dist(position, previous.basis.positions[0])
     return replace(state.path, length=state.path.length + move)
@@ -637,11 +638,12 @@ def _list_others(teammates: Teammates, position: Array, time: float, *, is_agree
     )
 
 
-def _has_changed(basis: PlanBasis, previous: PlannerState, state: PlannerState, radius: float) -> bool:
-    """Return whether the team or the walls have changed since the last plan, which had the given basis."""
+def _has_changed(previous: PlannerState, state: PlannerState, radius: float) -> bool:
+    """Return whether the team or the walls have changed since the last plan."""
+    assert previous.basis is not None
     if state.knowledge.encountered != previous.knowledge.encountered:
         return True
-    changed_walls = state.known_map.count_changed_walls(basis.known_map)
+    changed_walls = state.known_map.count_changed_walls(previous.basis.known_map)
     return changed_walls * state.known_map.raster.cell_size > _CHANGED_WALL_RADII * radius
 
 

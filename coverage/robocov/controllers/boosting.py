@@ -65,6 +65,7 @@ class BoostLimits(NamedTuple):
     """Limits of the boosts of a robot."""
 
     max_boosts: int
+    """Maximum number of boosts."""
     max_duration: float
     """Maximum time of one boost, s."""
 
@@ -74,9 +75,9 @@ class Ascent:
     """Ascent of one robot, part of its memory. Immutable."""
 
     rest_position: Array
-    """(2,) m, position near which it has been since `rest_start`."""
+    """(2,) m, position that it has been near since `rest_start`."""
     rest_start: float
-    """s"""
+    """Time since which it has been near that position, s."""
     mode: Mode = Mode.GRADIENT
     boosts: int = 0
     """Number of boosts so far."""
@@ -85,7 +86,7 @@ class Ascent:
     trail: tuple[Array, ...] = ()
     """Points from that optimum to the robot, (2,) m each."""
     boost_start: float = 0.0
-    """s"""
+    """Time at which the last boost began, s."""
 
     def update(self, position: Array, time: float, value: float, limits: BoostLimits) -> Ascent:
         """Return the ascent after a scan.
@@ -267,11 +268,12 @@ class Boosting(BaseController):
         velocities = (
             compute_approach_velocities(gradient, self.k_grad, team.max_speed) * speed_fraction[:, None]
         )
-        for robot, ascent in enumerate(ascents):
-            if ascent.mode is Mode.RETURN:
-                offset = (ascent.trail[-1] - seen.positions[robot])[None]
-                max_speed = team.max_speed[robot : robot + 1]
-                velocities[robot] = compute_approach_velocities(offset, _RETURN_GAIN, max_speed)[0]
+        returning = [robot for robot, ascent in enumerate(ascents) if ascent.mode is Mode.RETURN]
+        if returning:
+            trail_ends = np.array([ascents[robot].trail[-1] for robot in returning])
+            velocities[returning] = compute_approach_velocities(
+                trail_ends - seen.positions[returning], _RETURN_GAIN, team.max_speed[returning]
+            )
         returns = update_returns(seen, memory.returns)
         margins = Margins.build_with_gap(team, self.clearance)
         obstacle_points = collect_obstacle_points(seen, returns)

@@ -115,9 +115,9 @@ class FrontierMedian(SharedMapController):
         """Return the target of each robot, (k, 2) m, or its position if it has none."""
         planner = situation.planner
         goals = situation.positions.copy()
-        roomy = np.flatnonzero(planner.is_roomy)
-        squared_distances = ((targets[:, None] - planner.nodes[roomy]) ** 2).sum(axis=2)
-        nodes = roomy[squared_distances.argmin(axis=1)]
+        with_clearance = np.flatnonzero(planner.has_clearance)
+        squared_distances = ((targets[:, None] - planner.nodes[with_clearance]) ** 2).sum(axis=2)
+        nodes = with_clearance[squared_distances.argmin(axis=1)]
         path_lengths = np.array(
             [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
         )

@@ -69,7 +69,7 @@ class IndividualController(Protocol):
 class IndividualMemories:
     """Memories of the robots of a team with an individual controller."""
 
-    own: Sequence[Any]
+    by_robot: Sequence[Any]
     """Memory of each robot."""
     triangulation: Mesh | None = None
     """Triangulation from which the next cells are computed."""
@@ -145,7 +145,7 @@ class IndividualControllerAdapter:
         forces = np.empty_like(seen.positions)
         memories = []
         for robot in range(len(forces)):
-            own = _build_view(seen, cells, robot, memory.own[robot])
+            own = _build_view(seen, cells, robot, memory.by_robot[robot])
             forces[robot] = self._call_controller(own)
             memories.append(own.memory)
         return Decision(

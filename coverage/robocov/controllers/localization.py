@@ -40,8 +40,8 @@ _MAX_DOUBT_FRACTION = 0.75
 class Tracks(NamedTuple):
     """Tracks of the other robots from their messages: row i, column j is robot i's track of robot j."""
 
-    sent: Array
-    """(n, n) s, when the newest message was sent, nan for none."""
+    sent_times: Array
+    """(n, n) s, times at which the newest messages were sent; nan for none."""
     counts: IntArray
     """(n, n) Number of messages."""
     positions: Array
@@ -59,8 +59,8 @@ class _Messages(NamedTuple):
     """(m,)"""
     positions: Array
     """(m, 2) m, reported position of the sender."""
-    sent: Array
-    """(m,) s, when each message was sent."""
+    sent_times: Array
+    """(m,) s, time at which each message was sent."""
 
 
 class Estimates(NamedTuple):
@@ -82,7 +82,7 @@ class Estimates(NamedTuple):
     def build_initial(cls, n: int) -> Estimates:
         """Build the state of n robots before the first observation."""
         tracks = Tracks(
-            sent=np.full((n, n), np.nan),
+            sent_times=np.full((n, n), np.nan),
             counts=np.zeros((n, n), dtype=np.intp),
             positions=np.zeros((n, n, 2)),
             velocities=np.zeros((n, n, 2)),
@@ -129,7 +129,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
         receiver=robot,
         sender=other,
         positions=seen.reported_positions,
-        sent=seen.time - seen.report_ages,
+        sent_times=seen.time - seen.report_ages,
     )
     tracks = _update_tracks(
         previous.tracks,
@@ -146,7 +146,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
         variance=variance,
         tracks=tracks,
     )
-    ages = np.clip(seen.time - tracks.sent[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
+    ages = np.clip(seen.time - tracks.sent_times[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
     neighbors = tracks.positions[robot, other] + ages[:, None] * tracks.velocities[robot, other]
     obstacle_points = seen.obstacle_points - seen.positions + positions
     estimated = replace(
@@ -187,7 +187,7 @@ def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observa
     robot, other = seen.neighbors.list_pairs()
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
-    ages = np.clip(seen.time - estimates.tracks.sent[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
+    ages = np.clip(seen.time - estimates.tracks.sent_times[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
     doubt = _DOUBT_SIGMAS * np.sqrt(estimates.variance[robot]) + _DOUBT_SPEED * ages
     doubt = np.minimum(doubt, _MAX_DOUBT_FRACTION * distance)
     factor = 1.0 - doubt / np.maximum(distance, _MIN_DISTANCE_M)
@@ -212,17 +212,17 @@ def _update_tracks(
         Assumed maximum speed of others.
     """
     tracks = Tracks(
-        previous.sent.copy(),
+        previous.sent_times.copy(),
         previous.counts.copy(),
         previous.positions.copy(),
         previous.velocities.copy(),
     )
-    is_heard = np.zeros(tracks.sent.shape, np.bool_)
+    is_heard = np.zeros(tracks.sent_times.shape, np.bool_)
     for m in range(len(messages.receiver)):
         i = messages.receiver[m]
         j = messages.sender[m]
         is_heard[i, j] = True
-        if tracks.counts[i, j] and not messages.sent[m] > tracks.sent[i, j] + _SENT_TOLERANCE_S:
+        if tracks.counts[i, j] and not messages.sent_times[m] > tracks.sent_times[i, j] + _SENT_TOLERANCE_S:
             continue
         if tracks.counts[i, j] == 0:
             for axis in range(2):
@@ -230,7 +230,7 @@ def _update_tracks(
                 tracks.positions[i, j, axis] = messages.positions[m, axis]
         else:
             _update_track(tracks, messages, m, sigma[i], maneuver[i], max_speed[i])
-        tracks.sent[i, j] = messages.sent[m]
+        tracks.sent_times[i, j] = messages.sent_times[m]
         tracks.counts[i, j] += 1
     # If a robot that is not heard now is heard again later, its track starts from scratch.
     for i in range(len(is_heard)):
@@ -247,7 +247,7 @@ def _update_track(
     """Update the position and the velocity of one track, in place, by message m."""
     i = messages.receiver[m]
     j = messages.sender[m]
-    dt = messages.sent[m] - tracks.sent[i, j]
+    dt = messages.sent_times[m] - tracks.sent_times[i, j]
     k = tracks.counts[i, j] + 1.0
     tracking_index = maneuver * dt * dt / max(sigma, _MIN_SIGMA_M)
     discriminant = 8.0 * tracking_index + tracking_index * tracking_index

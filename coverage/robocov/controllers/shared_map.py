@@ -101,7 +101,7 @@ class Situation(NamedTuple):
         A weight is the number of these cells that the node represents, times the density. It is 0 for a node
         that no robot can reach.
         """
-        weights = self.planner.sum_by_node(self.planner.window.crop(cells, False))
+        weights = self.planner.sum_by_node(self.planner.window.crop(cells, fill=False))
         weights = weights * np.isfinite(self.planner.compute_distances_from(self.positions))
         if self.density is not None and not self.density.is_uniform:
             weights = weights * self.density.evaluate(self.planner.nodes)
@@ -142,7 +142,7 @@ class Candidates(NamedTuple):
         # Candidates are farther apart than nodes.
         spacing = planner.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
         squared_distances = ((planner.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
-        is_close = planner.is_roomy & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
+        is_close = planner.has_clearance & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
         fine = Candidates.build_at_nodes(situation, weights, np.flatnonzero(is_close))
         return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
 

@@ -57,8 +57,14 @@ class Teammates(NamedTuple):
             Whether each robot known so far has failed or is missing. It is removed unless it is heard now.
         """
         now = np.full(len(robots), time)
-        distances = np.sqrt(((positions - own_position) ** 2).sum(axis=1))
-        observed = Teammates(robots, positions, now, distances, now, positions)
+        observed = Teammates(
+            robots=robots,
+            positions=positions,
+            heard_times=now,
+            heard_distances=np.sqrt(((positions - own_position) ** 2).sum(axis=1)),
+            rest_times=now,
+            rest_positions=positions,
+        )
         is_kept = ~(np.isin(self.robots, robots) | is_lost)
         joined = Teammates(
             *(np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True))

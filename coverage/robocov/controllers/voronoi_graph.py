@@ -82,7 +82,7 @@ class VoronoiGraphCoverage(SharedMapController):
         raster = known_map.raster
         window = Window.build_around(raster, situation.positions[0], math.inf, MAX_BLOCKS)
         is_reachable = _find_reachable_blocks(situation, window)
-        cells_by_block = window.crop(~known_map.is_blocked, False).reshape(window.block_shape)
+        cells_by_block = window.crop(~known_map.is_blocked, fill=False).reshape(window.block_shape)
         free_counts = cells_by_block.sum(axis=(1, 3))
         block_size = raster.cell_size * window.stride
         roadmap = VoronoiRoadmap.build(
@@ -99,14 +99,14 @@ class VoronoiGraphCoverage(SharedMapController):
 
 
 def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
-    """Return a mask of the blocks of the window that some robot can reach through roomy blocks only."""
+    """Return a mask of the blocks of the window that a robot can reach through blocks with clearance."""
     raster = situation.known_map.raster
     planner = situation.planner
     rows, columns = raster.shape
-    is_tight = window.crop(planner.is_tight[:rows, :columns], True)
-    is_roomy = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
-    labels, _ = ndimage.label(is_roomy, np.ones((3, 3)))
+    is_tight = window.crop(planner.is_tight[:rows, :columns], fill=True)
+    has_clearance = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
+    labels, _ = ndimage.label(has_clearance, np.ones((3, 3)))
     own_nodes = [planner.find_own_node(position) for position in situation.positions]
     row, column = raster.find_cells(planner.nodes[own_nodes])
     own_labels = labels[row // window.stride, column // window.stride]
-    return np.asarray(is_roomy & np.isin(labels, own_labels) & (labels > 0))
+    return np.asarray(has_clearance & np.isin(labels, own_labels) & (labels > 0))

@@ -71,11 +71,11 @@ class CircleObstacle:
     @cached_property
     def polygon(self) -> Polygon:
         """Polygon that represents the circle."""
-        sides = _MIN_SIDES
+        side_count = _MIN_SIDES
         if self.radius > MAX_SAGITTA_M:
             half_angle = math.acos(1.0 - MAX_SAGITTA_M / self.radius)
-            sides = max(sides, math.ceil(math.pi / half_angle))
-        angles = np.arange(sides) * (2.0 * np.pi / sides)
+            side_count = max(side_count, math.ceil(math.pi / half_angle))
+        angles = np.arange(side_count) * (2.0 * np.pi / side_count)
         unit_circle = np.column_stack([np.cos(angles), np.sin(angles)])
         return Polygon(unit_circle * self.radius + self.center)
 

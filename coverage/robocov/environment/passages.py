@@ -174,14 +174,14 @@ class _PassageSearch:
 
     def split_corners(self) -> list[IntArray]:
         """Return the reflex corners in groups of bounded size."""
-        groups = math.ceil(len(self._reflex_corners) / _CORNERS_AT_ONCE)
-        return np.array_split(self._reflex_corners, max(groups, 1))
+        group_count = math.ceil(len(self._reflex_corners) / _CORNERS_AT_ONCE)
+        return np.array_split(self._reflex_corners, max(group_count, 1))
 
     def list_gaps(self, corners: IntArray, low: float, high: float) -> Iterator[Gap]:
         """Yield the passages at some corners whose width is between `low` and `high`, the narrowest first."""
         candidates = self._find_candidates(corners, low, high)
-        batches = max(1, len(candidates.width) // _CANDIDATES_AT_ONCE)
-        for rows in np.array_split(np.arange(len(candidates.width)), batches):
+        batch_count = max(1, len(candidates.width) // _CANDIDATES_AT_ONCE)
+        for rows in np.array_split(np.arange(len(candidates.width)), batch_count):
             batch = candidates.select(rows)
             is_empty = self._has_empty_disc(batch)
             for k in np.flatnonzero(is_empty).tolist():

@@ -24,7 +24,7 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 def find_overlaps(
-    area: BaseGeometry, others: Mapping[Name, BaseGeometry], inside: BaseGeometry | None = None
+    area: BaseGeometry, others: Mapping[Name, BaseGeometry], container: BaseGeometry | None = None
 ) -> tuple[dict[Name, BaseGeometry], BaseGeometry | None]:
     """Find the shapes that overlap an area, and the part of the area outside a container.
 
@@ -34,7 +34,7 @@ def find_overlaps(
     ----------
     area : geometry, m
     others : mapping of name to geometry, m
-    inside : geometry or None, m
+    container : geometry or None, m
         Area that should contain the first one.
 
     Returns
@@ -42,14 +42,16 @@ def find_overlaps(
     overlaps : dict of name to geometry, m
         Intersections of the area with the shapes that overlap it.
     excess : geometry or None, m
-        The part of the area that is not in `inside`; None if there is no such part.
+        The part of the area that is not in `container`; None if there is no such part.
     """
     intersections = {name: area.intersection(shape) for name, shape in others.items()}
     overlaps = {name: shape for name, shape in intersections.items() if shape.area > _MIN_OVERLAP_M2}
-    if inside is None:
+    if container is None:
         return overlaps, None
-    excess = area.difference(inside)
-    return overlaps, excess if excess.area > _MIN_OVERLAP_M2 else None
+    excess = area.difference(container)
+    if excess.area <= _MIN_OVERLAP_M2:
+        return overlaps, None
+    return overlaps, excess
 
 
 def unite_shapes(shapes: NDArray[np.object_]) -> BaseGeometry:

@@ -106,20 +106,20 @@ class ResultFolder:
             If the folder cannot be written to, or a file not written by robocov is in the way.
         """
         with report_folder_errors(self.path):
-            staging = self.path / _STAGING_FOLDER
-            new_files = {
-                path.relative_to(staging).as_posix() for path in staging.rglob("*") if not path.is_dir()
-            }
+            # `self.staging` is a folder in this one if the result is one run of a comparison.
+            staging_root = self.path / _STAGING_FOLDER
+            staged_paths = [path for path in staging_root.rglob("*") if not path.is_dir()]
+            new_files = {path.relative_to(staging_root).as_posix() for path in staged_paths}
             if not new_files:
                 return
             self._prepare_targets(new_files)
             files = new_files if self._replaces else new_files | self._owned_files
             removed_files = self._owned_files - files
             journal = {**_HEADER, "files": sorted(files), "removed": sorted(removed_files)}
-            with replace_file(staging / _JOURNAL_FILE) as temporary:
+            with replace_file(staging_root / _JOURNAL_FILE) as temporary:
                 temporary.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
             # From here on, the new result is the valid one.
-            (staging / _JOURNAL_FILE).replace(self.path / _JOURNAL_FILE)
+            (staging_root / _JOURNAL_FILE).replace(self.path / _JOURNAL_FILE)
             _carry_out_journal(self.path)
             self._owned_files = files
             self._replaces = False

@@ -147,7 +147,7 @@ def _build_kind_mistake(path: JsonPath, value: object, kinds: list[str]) -> Mist
 
 
 def _find_weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
-    """Yield the mistakes in a density other than a raster."""
+    """Yield the mistakes in the weights and peaks of a density other than a raster."""
     peaks = getattr(model, "peaks", [])
     areas = getattr(model, "areas", [])
     for k, peak in enumerate(peaks):
@@ -161,7 +161,8 @@ def _find_weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
             yield Mistake.at_path((*path, "covariance"), describe_mismatch(expected, peak.covariance))
     has_base_weight = getattr(model, _BASE_WEIGHTS[model.kind]) > 0.0
     if not has_base_weight and not any(feature.weight > 0.0 for feature in (*peaks, *areas)):
-        yield Mistake.at_path(("density", "weight") if model.kind == "uniform" else ("density",), NO_WEIGHT)
+        weight_path: JsonPath = ("density", "weight") if model.kind == "uniform" else ("density",)
+        yield Mistake.at_path(weight_path, NO_WEIGHT)
 
 
 def _is_covariance(matrix: list[list[float]]) -> bool:

@@ -90,12 +90,12 @@ def compute_cost_history(
     require_type("record", record, Record, 'a Record, as in Record.load("run")')
     require_type("cost", cost, CoverageCost, "a CoverageCost")
     moments = select_sampled_moments(record, rate)
-    samples = len(moments)
-    mean_distance = np.empty(samples)
-    cost_values = np.empty(samples)
-    uncovered_area = np.empty(samples)
+    sample_count = len(moments)
+    mean_distance = np.empty(sample_count)
+    cost_values = np.empty(sample_count)
+    uncovered_area = np.empty(sample_count)
     has_mixed_speeds = record.team.has_mixed_speeds
-    mean_time = np.full(samples, np.nan)
+    mean_time = np.full(sample_count, np.nan)
     cost_at_time = TimeVaryingCost(cost)
     for sample, moment in enumerate(moments):
         time = float(record.time[moment])

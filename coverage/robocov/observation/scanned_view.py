@@ -150,7 +150,10 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
 
 
 def _predict_depth(view: View, reach: Array, side: int) -> Array:
-    """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it."""
+    """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it.
+
+    The two are those before it counter-clockwise if `side` is 1, clockwise if it is -1.
+    """
     inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     # A sinusoid f satisfies f(a + b) = 2 cos(b) f(a) - f(a - b); here b is the angle between two rays.
     factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])

@@ -21,6 +21,9 @@ _MAX_PUSHES = 60
 _OVERSHOOT = 1.005
 """Robots are pushed apart to this multiple of their spacing. With a factor of 1, they would only converge."""
 
+_RELATIVE_ROUNDING = 1e-9
+"""Fraction of the spacing by which robots may be too close because of rounding."""
+
 
 class ConfigurationSpace:
     """The free configuration space of robots of the same radius.
@@ -74,7 +77,7 @@ class ConfigurationSpace:
         areas = np.array(self.components, dtype=object)[component]
         positions = find_nearest_inside(areas, positions)
         for _ in range(_MAX_PUSHES):
-            max_distance = self.spacing * (1.0 - 1e-9)
+            max_distance = self.spacing * (1.0 - _RELATIVE_ROUNDING)
             pairs = cKDTree(positions).query_pairs(max_distance, output_type="ndarray")
             if len(pairs) == 0:
                 return positions

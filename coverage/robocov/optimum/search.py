@@ -245,13 +245,13 @@ class _Search:
         _, is_inside = cost.geodesics.snap_to_free_space(cost.points)
         site_component = is_inside.argmax(axis=1)
         areas = self.space.components
-        sites = np.bincount(site_component, minlength=len(areas))
-        usable = [k for k, area in enumerate(areas) if not area.is_empty and sites[k]]
+        site_counts = np.bincount(site_component, minlength=len(areas))
+        usable = [k for k, area in enumerate(areas) if not area.is_empty and site_counts[k]]
         # Components are sorted by area, the largest first.
         covered = usable[:robots]
         covered_area = sum(areas[k].area for k in covered)
-        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * robots)
-        spacing = max(math.sqrt(covered_area / count), self.space.spacing)
+        candidate_count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * robots)
+        spacing = max(math.sqrt(covered_area / candidate_count), self.space.spacing)
         candidates = [_spread_points(areas[k], spacing) for k in covered]
         self.component = np.repeat(covered, [len(points) for points in candidates]).astype(np.intp)
         if len(self.component) < robots:
@@ -292,10 +292,10 @@ class _Search:
         # all cells of a two by two square; ties are broken at random.
         row_offset = 2 * (row % side) - side + 1
         column_offset = 2 * (column % side) - side + 1
-        offset2 = row_offset**2 + column_offset**2
+        squared_offset = row_offset**2 + column_offset**2
         tie_breaker = np.random.default_rng(0).random(len(group))
         site = np.flatnonzero(is_covered)
-        site = site[np.lexsort((tie_breaker[site], offset2[site], group[site]))]
+        site = site[np.lexsort((tie_breaker[site], squared_offset[site], group[site]))]
         _, first, count = np.unique(group[site], return_index=True, return_counts=True)
         weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
         table = cost.geodesics.compute_distances(self.candidates, cost.points[site[first]])

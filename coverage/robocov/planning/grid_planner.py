@@ -43,7 +43,7 @@ class GridPlanner(MapWindow):
     """Distances and routes in a window of a discovered map, around its walls.
 
     A planner computes each result only once, and robots that share a map share the planner. The m nodes are
-    given by their indices. For *roomy* nodes and *tight* cells, see `MapWindow`.
+    given by their indices. For nodes *with clearance* and *tight* cells, see `MapWindow`.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class GridPlanner(MapWindow):
     def _edges(self) -> Edges:
         """Edges between nodes; those through unknown cells are longer."""
         return build_edges(
-            cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.is_roomy),
+            cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.has_clearance),
             rows=self.window.rows,
             columns=self.window.columns,
             stride=self.window.stride,
@@ -136,14 +136,14 @@ class GridPlanner(MapWindow):
 
     @cached_property
     def sources(self) -> IntArray:
-        """Candidate goals for a team, (c,): the roomy nodes in every k-th row and column of the lattice.
+        """Candidate goals for a team, (c,): the nodes with clearance in every k-th row and column.
 
         The stride k is the smallest one that limits their number; see `_MAX_SOURCES`.
         """
         max_sources = max(_MAX_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
         row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):
-            sources = np.flatnonzero(self.is_roomy & (row % k == k // 2) & (column % k == k // 2))
+            sources = np.flatnonzero(self.has_clearance & (row % k == k // 2) & (column % k == k // 2))
             if len(sources) <= max_sources:
                 break
         return sources
@@ -234,7 +234,7 @@ class GridPlanner(MapWindow):
         )
 
     def find_nearest_node(self, position: Array) -> int:
-        """Find the roomy node nearest to a position.
+        """Find the nearest node with clearance.
 
         Parameters
         ----------
@@ -245,13 +245,13 @@ class GridPlanner(MapWindow):
         int
             -1 if there is none.
         """
-        if not self.is_roomy.any():
+        if not self.has_clearance.any():
             return -1
         squared_distances = ((self.nodes - position) ** 2).sum(axis=1)
-        return int(np.where(self.is_roomy, squared_distances, np.inf).argmin())
+        return int(np.where(self.has_clearance, squared_distances, np.inf).argmin())
 
     def find_own_node(self, position: Array) -> int:
-        """Find the node of a robot: the nearest roomy one in sight, or else the nearest roomy one.
+        """Find the node of a robot: the nearest node with clearance that it sees, or else the nearest one.
 
         Parameters
         ----------
@@ -266,12 +266,12 @@ class GridPlanner(MapWindow):
         return int(visible[0]) if len(visible) else -1
 
     def _find_visible_nodes(self, position: Array) -> IntArray:
-        """Return the close roomy nodes in sight of a position, or the nearest one if none is in sight."""
+        """Return the close nodes with clearance in sight of a position, or the nearest if none is."""
         key = position.tobytes()
         if key not in self._visible_nodes:
             if len(self._visible_nodes) >= _MAX_CACHED_POSITIONS:
                 self._visible_nodes.clear()
-            close = self._find_close_nodes(position, self.is_roomy)
+            close = self._find_close_nodes(position, self.has_clearance)
             visible = close[self.find_clear_lines(position, self.nodes[close], self.is_blocked)]
             # A robot that seems to be inside a wall is actually next to it.
             self._visible_nodes[key] = visible if len(visible) else close[:1]
@@ -323,7 +323,7 @@ class GridPlanner(MapWindow):
         if first < 0:
             return np.array(position[None])
         distance, predecessor = self._find_shortest_paths(first)
-        close = self._find_close_nodes(goal, np.isfinite(distance) & self.is_roomy)
+        close = self._find_close_nodes(goal, np.isfinite(distance) & self.has_clearance)
         if not len(close):
             return np.array(position[None])
         is_visible = self.find_clear_lines(goal, self.nodes[close], self.is_tight)
@@ -341,8 +341,8 @@ class GridPlanner(MapWindow):
         return distances[0], predecessors[0]
 
     def _find_first_node(self, position: Array) -> int:
-        """Return the first node of a route, which is close, roomy and in sight, or -1 if there is none."""
-        close = self._find_close_nodes(position, self.is_roomy)
+        """Return the first node of a route, close, with clearance and in sight; -1 if there is none."""
+        close = self._find_close_nodes(position, self.has_clearance)
         is_visible = self.find_clear_lines(position, self.nodes[close], self.is_tight, 2.0 * self.clearance)
         if not is_visible.any():
             is_visible = self.find_clear_lines(position, self.nodes[close], self.is_blocked)

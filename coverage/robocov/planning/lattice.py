@@ -35,7 +35,7 @@ class LatticeCells(NamedTuple):
     """(h, w) Whether each cell is a wall or a presumed wall."""
     is_unknown: BoolArray
     """(h, w) Whether each cell has not been seen."""
-    is_roomy: BoolArray
+    has_clearance: BoolArray
     """(m,) Whether each node has the required clearance."""
 
 
@@ -163,12 +163,12 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node = row * columns + column
                 other = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_count)
-                # A node that is not roomy can be reached from one that is, but not the other way around.
-                is_roomy = cells.is_roomy[node]
-                is_other_roomy = cells.is_roomy[other]
-                if is_passable or (is_without_wall and is_roomy and not is_other_roomy):
+                # A node without clearance can be reached from one with it, but not the other way around.
+                has_clearance = cells.has_clearance[node]
+                other_has_clearance = cells.has_clearance[other]
+                if is_passable or (is_without_wall and has_clearance and not other_has_clearance):
                     lengths[node, _MAX_MOVE + up, _MAX_MOVE + right] = length
-                if is_passable or (is_without_wall and is_other_roomy and not is_roomy):
+                if is_passable or (is_without_wall and other_has_clearance and not has_clearance):
                     lengths[other, _MAX_MOVE - up, _MAX_MOVE - right] = length
     return lengths
 

@@ -46,8 +46,8 @@ class UnknownArea(NamedTuple):
 class MapWindow:
     """The cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
 
-    A cell is *tight* if its distance from a wall is less than the clearance. A node is *roomy* if the cell in
-    which it lies is not tight.
+    A cell is *tight* if its distance from a wall is less than the clearance. A node *has
+    clearance* if the cell in which it lies is not tight.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class MapWindow:
     @cached_property
     def is_blocked(self) -> BoolArray:
         """Whether each cell is a wall, a presumed wall, or outside the region, (h, w)."""
-        return self.window.crop(self.known_map.is_blocked, True)
+        return self.window.crop(self.known_map.is_blocked, fill=True)
 
     @cached_property
     def is_unknown(self) -> BoolArray:
@@ -74,7 +74,7 @@ class MapWindow:
     @cached_property
     def is_outside(self) -> BoolArray:
         """Whether each cell is outside the region, (h, w)."""
-        return self.window.crop(self.known_map.raster.is_outside, True)
+        return self.window.crop(self.known_map.raster.is_outside, fill=True)
 
     @cached_property
     def is_free(self) -> BoolArray:
@@ -110,7 +110,7 @@ class MapWindow:
         return self.window.compute_nodes(self.known_map.raster)
 
     @cached_property
-    def is_roomy(self) -> BoolArray:
+    def has_clearance(self) -> BoolArray:
         """Whether each node has the clearance, (m,)."""
         stride = self.window.stride
         return np.asarray(~self.is_tight[stride // 2 :: stride, stride // 2 :: stride].ravel())

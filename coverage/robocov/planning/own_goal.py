@@ -126,7 +126,7 @@ class _NodeSearch:
 
 
 def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
-    """Return the four nodes next to a node, in the order of `SIDES`; -1 where there is no roomy node."""
+    """Return the four nodes next to a node, in the order of `SIDES`; -1 where none has clearance."""
     rows = planner.window.rows
     columns = planner.window.columns
     row, column = divmod(node, columns)
@@ -134,7 +134,7 @@ def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
     for up, right in SIDES:
         is_inside = 0 <= row + up < rows and 0 <= column + right < columns
         neighbor = node + up * columns + right
-        neighbors.append(neighbor if is_inside and planner.is_roomy[neighbor] else -1)
+        neighbors.append(neighbor if is_inside and planner.has_clearance[neighbor] else -1)
     return neighbors
 
 

@@ -42,13 +42,13 @@ class VoronoiRoadmap(NamedTuple):
 
     @classmethod
     def build(
-        cls, is_roomy: BoolArray, is_free: BoolArray, spacing: float, max_vertices: int
+        cls, has_clearance: BoolArray, is_free: BoolArray, spacing: float, max_vertices: int
     ) -> VoronoiRoadmap:
         """Build the roadmap of the cells where a robot fits.
 
         Parameters
         ----------
-        is_roomy : (rows, columns) bool array
+        has_clearance : (rows, columns) bool array
             Whether each cell may be part of the graph.
         is_free : (rows, columns) bool array
             Whether each cell is to be assigned to a vertex.
@@ -61,10 +61,10 @@ class VoronoiRoadmap(NamedTuple):
         -------
         VoronoiRoadmap
         """
-        is_graph = find_voronoi_cells(is_roomy)
-        steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_graph) / max_vertices)))
-        first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBOR_STEPS)
-        vertices = np.column_stack(np.divmod(first_cells, is_roomy.shape[1]))
+        is_in_graph = find_voronoi_cells(has_clearance)
+        steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_in_graph) / max_vertices)))
+        first_cells, vertex_of_cell = _group_cells(is_in_graph, steps, _NEIGHBOR_STEPS)
+        vertices = np.column_stack(np.divmod(first_cells, has_clearance.shape[1]))
         starts, ends = _list_adjacent_groups(vertex_of_cell)
         lengths = compute_point_distances(vertices[starts], vertices[ends])
         graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
@@ -95,77 +95,83 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
     thinning, Pudney 1998). A cell stays if its nearest wall is in a very different direction from that of the
     next cell. Branches into corners therefore vanish, while those into rooms remain.
     """
-    is_graph = np.pad(is_free, 1)
-    wall_distance, nearest_wall = ndimage.distance_transform_edt(is_graph, return_indices=True)
-    is_between_walls = np.zeros_like(is_graph)
+    is_in_graph = np.pad(is_free, 1)
+    wall_distance, nearest_wall = ndimage.distance_transform_edt(is_in_graph, return_indices=True)
+    is_between_walls = np.zeros_like(is_in_graph)
     for axis in (0, 1):
-        before = (*(slice(None),) * axis, slice(None, -1))
-        after = (*(slice(None),) * axis, slice(1, None))
-        gap = np.sqrt((np.diff(nearest_wall, axis=axis + 1) ** 2).sum(axis=0))
+        # Views in which the axis is the first one of the array of cells.
+        distances = np.swapaxes(wall_distance, 0, axis)
+        walls = np.swapaxes(nearest_wall, 1, 1 + axis)
+        is_between = np.swapaxes(is_between_walls, 0, axis)
+        gap = np.sqrt((np.diff(walls, axis=1) ** 2).sum(axis=0))
         # Two points at this distance, in directions that differ by the angle, are this far apart.
-        distance = np.maximum(wall_distance[before], wall_distance[after])
+        distance = np.maximum(distances[:-1], distances[1:])
         is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + 1.0
-        is_between_walls[before] |= is_facing
-        is_between_walls[after] |= is_facing
-    order = np.flatnonzero(is_graph)
+        is_between[:-1] |= is_facing
+        is_between[1:] |= is_facing
+    order = np.flatnonzero(is_in_graph)
     order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
-    _thin(is_graph, is_between_walls & is_graph, order, _NEIGHBOR_STEPS)
-    return is_graph[1:-1, 1:-1]
+    _thin(is_in_graph, is_between_walls & is_in_graph, order, _NEIGHBOR_STEPS)
+    return is_in_graph[1:-1, 1:-1]
 
 
 @kernel
-def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbor_steps: IntArray) -> None:
+def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbor_steps: IntArray) -> None:
     """Remove cells that no connection depends on, in the given order, until no more can be removed."""
-    columns = is_graph.shape[1]
+    columns = is_in_graph.shape[1]
     has_changed = True
     while has_changed:
         has_changed = False
         for cell in order:
             row = cell // columns
             column = cell % columns
-            if not is_graph[row, column] or must_stay[row, column]:
+            if not is_in_graph[row, column] or must_stay[row, column]:
                 continue
-            if _count_crossings(is_graph, row, column, neighbor_steps) == 1:
-                is_graph[row, column] = False
+            if _count_crossings(is_in_graph, row, column, neighbor_steps) == 1:
+                is_in_graph[row, column] = False
                 has_changed = True
 
 
 @kernel
-def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbor_steps: IntArray) -> int:
+def _count_crossings(is_in_graph: BoolArray, row: int, column: int, neighbor_steps: IntArray) -> int:
     """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it."""
     crossings = 0
     for k in range(0, 8, 2):
-        has_side = _is_graph_at(is_graph, row, column, neighbor_steps[k])
-        has_corner = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 1) % 8])
-        has_next_side = _is_graph_at(is_graph, row, column, neighbor_steps[(k + 2) % 8])
+        has_side = _is_in_graph(is_in_graph, row, column, neighbor_steps[k])
+        has_corner = _is_in_graph(is_in_graph, row, column, neighbor_steps[(k + 1) % 8])
+        has_next_side = _is_in_graph(is_in_graph, row, column, neighbor_steps[(k + 2) % 8])
         if not has_side and (has_corner or has_next_side):
             crossings += 1
     return crossings
 
 
 @kernel
-def _is_graph_at(is_graph: BoolArray, row: int, column: int, step: IntArray) -> bool:
+def _is_in_graph(is_in_graph: BoolArray, row: int, column: int, step: IntArray) -> bool:
     """Return whether the cell one step away belongs to the graph."""
-    return bool(is_graph[row + step[_UP], column + step[_RIGHT]])
+    return bool(is_in_graph[row + step[_UP], column + step[_RIGHT]])
 
 
 @kernel
-def _group_cells(is_graph: BoolArray, max_steps: int, neighbor_steps: IntArray) -> tuple[IntArray, IntArray]:
+def _group_cells(
+    is_in_graph: BoolArray, max_steps: int, neighbor_steps: IntArray
+) -> tuple[IntArray, IntArray]:
     """Return the first cell of each group, and the group of each cell, (rows, columns), or -1 for none.
 
     A group consists of the cells within `max_steps` of its first cell that are not in an earlier group.
     """
-    rows, columns = is_graph.shape
-    group = np.full(is_graph.shape, -1)
-    first_cells = np.empty(is_graph.size, dtype=np.intp)
-    queue = np.empty(is_graph.size, dtype=np.intp)
-    steps = np.empty(is_graph.size, dtype=np.intp)
+    rows, columns = is_in_graph.shape
+    group = np.full(is_in_graph.shape, -1)
+    first_cells = np.empty(is_in_graph.size, dtype=np.intp)
+    queue = np.empty(is_in_graph.size, dtype=np.intp)
+    steps = np.empty(is_in_graph.size, dtype=np.intp)
     group_count = 0
-    for first in range(is_graph.size):
-        if not is_graph[first // columns, first % columns] or group[first // columns, first % columns] >= 0:
+    for first in range(is_in_graph.size):
+        row = first // columns
+        column = first % columns
+        if not is_in_graph[row, column] or group[row, column] >= 0:
             continue
         first_cells[group_count] = first
-        group[first // columns, first % columns] = group_count
+        group[row, column] = group_count
         queue[0] = first
         steps[0] = 0
         head = 0
@@ -179,7 +185,7 @@ def _group_cells(is_graph: BoolArray, max_steps: int, neighbor_steps: IntArray) 
                 i = row + neighbor_steps[k, _UP]
                 j = column + neighbor_steps[k, _RIGHT]
                 is_inside = 0 <= i < rows and 0 <= j < columns
-                if step < max_steps and is_inside and is_graph[i, j] and group[i, j] < 0:
+                if step < max_steps and is_inside and is_in_graph[i, j] and group[i, j] < 0:
                     group[i, j] = group_count
                     queue[tail] = i * columns + j
                     steps[tail] = step + 1

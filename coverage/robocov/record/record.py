@@ -240,8 +240,8 @@ class Record(Drawable):
         """
         if not time >= self.time[0] - TIME_ROUNDING_S:
             raise ParameterError(f"time: expected a number of at least {self.time[0]:g} s, got {quote(time)}")
-        moments = int(np.searchsorted(self.time, time + TIME_ROUNDING_S, side="right"))
-        return self._select_moments(slice(moments))
+        moment_count = int(np.searchsorted(self.time, time + TIME_ROUNDING_S, side="right"))
+        return self._select_moments(slice(moment_count))
 
     def thin(self, rate: float) -> Record:
         """Return the record with fewer moments.

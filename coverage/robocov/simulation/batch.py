@@ -259,8 +259,8 @@ class SimulationBatch:
         shape = (len(self), len(self.team), 2)
         if np.shape(forces) != shape:
             raise ParameterError(f"forces: expected an array of shape {shape}, got {np.shape(forces)}")
-        rows = len(self._joint_team)
-        return check_forces(np.asarray(forces).reshape(rows, 2), rows, "forces")
+        row_count = len(self._joint_team)
+        return check_forces(np.asarray(forces).reshape(row_count, 2), row_count, "forces")
 
     def _get_graphs(self) -> list[Neighbors]:
         """Return the communication graph of each run in this step."""

@@ -100,16 +100,16 @@ class ControllerCaller:
         ParameterError
             If the controller fails, or returns anything but a decision for each robot.
         """
-        robots = len(observations.positions)
+        robot_count = len(observations.positions)
         name = self.controller.name
         decide = self._informed_controller.decide
         if self._is_built_in:
-            return check_decision(decide(observations, memory), robots, name, observations.time)
+            return check_decision(decide(observations, memory), robot_count, name, observations.time)
         returned = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
         source = ""
         if not isinstance(self._informed_controller, IndividualControllerAdapter):
             source = format_location(decide)
-        decision = check_decision(returned, robots, name, observations.time, source)
+        decision = check_decision(returned, robot_count, name, observations.time, source)
         return copy_decision(decision, name, source)
 
     def _call(self, time: float, function: Callable[..., Any], *arguments: Any) -> Any:

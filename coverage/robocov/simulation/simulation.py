@@ -223,16 +223,16 @@ class Simulation:
         StartError
             If there is no room for a robot that joins.
         """
-        robots = len(self.team)
+        robot_count = len(self.team)
         if external_forces is not None:
-            external_forces = check_forces(external_forces, robots, "external_forces")
+            external_forces = check_forces(external_forces, robot_count, "external_forces")
         next_memory = self.memory
         if forces is None:
             decision = self.observe_and_decide().decision
             forces = decision.forces
             next_memory = decision.memory
         else:
-            forces = check_forces(forces, robots, "forces")
+            forces = check_forces(forces, robot_count, "forces")
         next_inbox = None if self._perception is None else self._get_knowledge().inbox
         positions_before = self.positions
         self._world.step(forces, self.dt, external_forces, time=self.time)

@@ -26,6 +26,9 @@ farther than this in one substep."""
 _MAX_SUBSTEPS = 64
 _COLLISION_SLOP_M = 1e-4
 """Overlap with a wall that pymunk does not correct."""
+_MOVER_COLLISION_BIAS = 1e-9
+"""Fraction of an overlap that remains after one second if obstacles move: not 0, so that a robot that one of
+them has run over is pushed out gradually."""
 _MIN_ITERATIONS = 20
 """Solver iterations for robots of equal mass."""
 _MAX_CORNER_WALLS = 3
@@ -43,18 +46,18 @@ class FreeSpace:
     team : Team
         All robots of all teams, n of them.
     positions, velocities : (n, 2) arrays, m and m/s
-    teams : int
+    team_count : int
         Number of teams, of equal size.
     """
 
     def __init__(
-        self, obstacles: Obstacles, team: Team, positions: Array, velocities: Array, teams: int = 1
+        self, obstacles: Obstacles, team: Team, positions: Array, velocities: Array, team_count: int = 1
     ) -> None:
         space, movers = build_obstacle_space(obstacles)
         space.iterations = 1
         space.collision_persistence = 1
         space.collision_bias = 1.0  # Overlaps are never pushed apart.
-        team_size = len(team) // teams
+        team_size = len(team) // team_count
         robots = []
         for row, (mass, radius) in enumerate(zip(team.mass.tolist(), team.radius.tolist(), strict=True)):
             body, disc = build_robot(mass=mass, radius=radius, team=row // team_size)
@@ -143,9 +146,8 @@ class ContactSolver:
         mass_ratio = float(team.mass.max() / team.mass.min())
         space.iterations = _MIN_ITERATIONS + math.ceil(2.0 * mass_ratio)
         space.collision_slop = _COLLISION_SLOP_M
-        # The fraction of an overlap that remains after one second. With 0, each substep removes all overlap.
-        # With moving obstacles, a robot that one of them has run over is pushed out gradually.
-        space.collision_bias = 1e-9 if self._movers else 0.0
+        # With 0, each substep removes all overlap.
+        space.collision_bias = _MOVER_COLLISION_BIAS if self._movers else 0.0
         self._space = space
         self._arrays = BodyArrays(space, capacity=len(self._movers) + len(team) + 1)
         self._mover_rows = self._arrays.find_rows(self._movers)

@@ -243,17 +243,19 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
     Braking comes first, then the turn, then speeding up.
     """
     speed_change = clip_magnitude(target.speed - motion.speed, limits.max_change)
-    wheel = motion.turning_rate * limits.half_track
-    turn_allowance = limits.max_change - max(-speed_change, 0.0)
-    new_wheel = wheel + clip_magnitude(target.turning_rate * limits.half_track - wheel, turn_allowance)
+    # Turning speeds are those of the right wheel relative to the center of the robot, m/s.
+    turning_speed = motion.turning_rate * limits.half_track
+    target_turning_speed = target.turning_rate * limits.half_track
+    max_turn_change = limits.max_change - max(-speed_change, 0.0)
+    new_turning_speed = turning_speed + clip_magnitude(target_turning_speed - turning_speed, max_turn_change)
     if speed_change < 0.0:
-        max_wheel = max(limits.max_speed - motion.speed - speed_change, 0.0)
-        new_wheel = clip_magnitude(new_wheel, max_wheel)
+        max_turning_speed = max(limits.max_speed - motion.speed - speed_change, 0.0)
+        new_turning_speed = clip_magnitude(new_turning_speed, max_turning_speed)
     else:
-        change_left = limits.max_change - abs(new_wheel - wheel)
-        speed_left = limits.max_speed - abs(new_wheel) - motion.speed
+        change_left = limits.max_change - abs(new_turning_speed - turning_speed)
+        speed_left = limits.max_speed - abs(new_turning_speed) - motion.speed
         speed_change = max(min(speed_change, change_left, speed_left), 0.0)
-    return _Motion(motion.speed + speed_change, new_wheel / limits.half_track)
+    return _Motion(motion.speed + speed_change, new_turning_speed / limits.half_track)
 
 
 @kernel

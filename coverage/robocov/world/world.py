@@ -31,6 +31,8 @@ MAX_MASS_RATIO = 1000.0
 """Largest ratio of the masses of two robots; beyond it contacts cannot be resolved."""
 
 _NO_FORCES = np.zeros((0, 2))
+_ROUNDING = 1e-9
+"""Amount by which the number of substeps may be too large because of rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,14 +201,14 @@ class World:
             possible_speeds = self._compute_speeds() + self._compute_external_acceleration(external) * dt
             speed = max(speed, float(possible_speeds.max()))
         crossed_radii = (speed + self._obstacles.max_speed) * dt / self._min_radius
-        return max(math.ceil(dt / MAX_SUBSTEP_S - 1e-9), math.ceil(crossed_radii))
+        return max(math.ceil(dt / MAX_SUBSTEP_S - _ROUNDING), math.ceil(crossed_radii))
 
     def _run_substep(self, forces: Array, external: Array, dt: float) -> None:
         """Move all robots by `dt` seconds: freely at first, then again where they touch something."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
-        if self._may_exceed_max_speed or len(external) > 0:
-            self._may_exceed_max_speed = True
+        may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
+        if may_exceed_max_speed:
             limits = self._compute_speed_limits(external, dt)
             response = response._replace(max_speed=limits.driving)
             max_speed_after_contact = limits.pushed
@@ -230,7 +232,7 @@ class World:
                 max_speed=max_speed_after_contact - turning_speed,
                 is_rolling=is_rolling,
             )
-        if self._may_exceed_max_speed:
+        if may_exceed_max_speed:
             speeds = compute_lengths(velocities)
             self._may_exceed_max_speed = bool((speeds > self.team.max_speed).any())
         self._set_state(positions, velocities, steering)
@@ -311,7 +313,7 @@ class World:
                     team=self.team[rows],
                     positions=self.positions[rows],
                     velocities=self.velocities[rows],
-                    teams=(rows.stop - rows.start) // self._team_size,
+                    team_count=(rows.stop - rows.start) // self._team_size,
                 )
                 space.set_movers(self._mover_states)
                 self._spaces.append((rows, space))

@@ -144,7 +144,7 @@ def test_messages_are_sent_whenever_a_period_has_passed(dt: str, rate: int) -> N
     sent_steps = []
     for step in range(100):
         inbox = radio.exchange_messages(inbox, step, positions, positions, working)
-        if inbox.sent[0, 1] == step:
+        if inbox.sent_steps[0, 1] == step:
             sent_steps.append(step)
     messages = [floor(Fraction(dt) * rate * step) for step in range(-1, 100)]
     assert sent_steps == [step for step in range(100) if messages[step + 1] > messages[step]]
@@ -160,8 +160,8 @@ def test_inboxes_are_immutable() -> None:
         first = radio.exchange_messages(inbox, step, positions, positions, working)
         second = radio.exchange_messages(inbox, step, positions, positions, working)
         np.testing.assert_array_equal(first.positions, second.positions)
-        np.testing.assert_array_equal(inbox.sent, content.sent)
-        np.testing.assert_array_equal(inbox.arrived, content.arrived)
+        np.testing.assert_array_equal(inbox.sent_steps, content.sent_steps)
+        np.testing.assert_array_equal(inbox.arrival_steps, content.arrival_steps)
         np.testing.assert_array_equal(inbox.positions, content.positions)
         assert len(inbox.in_flight) == len(content.in_flight)
         inbox = first
@@ -355,10 +355,10 @@ def test_inboxes_can_be_selected_for_another_team() -> None:
         inbox = radio.exchange_messages(inbox, step, positions, positions, working)
     # Robots 3 and 1 of the old team, with a new one between them.
     selected = inbox.select_robots(np.array([2, -1, 0]))
-    assert selected.sent[0, 2] == inbox.sent[2, 0]
+    assert selected.sent_steps[0, 2] == inbox.sent_steps[2, 0]
     np.testing.assert_array_equal(selected.positions[0, 2], inbox.positions[2, 0])
-    assert (selected.sent[1] == NEVER).all()
-    assert (selected.sent[:, 1] == NEVER).all()
+    assert (selected.sent_steps[1] == NEVER).all()
+    assert (selected.sent_steps[:, 1] == NEVER).all()
     assert len(selected.in_flight) == len(inbox.in_flight) == 2
     assert not selected.in_flight[0].is_received[:, 1].any()
     assert selected.in_flight[0].is_received[0, 2]

@@ -131,7 +131,8 @@ def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
     before, after = (
         np.hypot(*(each.reported_positions - each.positions[robot]).T) for each in (known, close)
     )
-    doubt = np.sqrt(estimates.variance)[robot] + 1.0 * (known.time - estimates.tracks.sent[robot, other])
+    ages = known.time - estimates.tracks.sent_times[robot, other]
+    doubt = np.sqrt(estimates.variance)[robot] + 1.0 * ages
     assert np.allclose(before - after, np.minimum(doubt, 0.75 * before))
 
 

@@ -53,7 +53,7 @@ def search_with_a_heap(planner: GridPlanner, first: int) -> dict[int, float]:
         if so_far > distance[node]:
             continue
         # No edge leads on from a node that is too close to a wall.
-        assert planner.is_roomy[node] or graph.indptr[node] == graph.indptr[node + 1]
+        assert planner.has_clearance[node] or graph.indptr[node] == graph.indptr[node + 1]
         for k in range(graph.indptr[node], graph.indptr[node + 1]):
             other = int(graph.indices[k])
             length = so_far + float(graph.data[k])
@@ -79,14 +79,14 @@ def test_without_walls_distances_are_nearly_straight() -> None:
 @given(seed=st.integers(0, 1000))
 def test_distances_are_those_of_a_plain_search(seed: int) -> None:
     planner = build_planner(build_random_blocks(seed))
-    if not planner.is_roomy.any():
+    if not planner.has_clearance.any():
         return
-    first = int(np.flatnonzero(planner.is_roomy)[0])
+    first = int(np.flatnonzero(planner.has_clearance)[0])
     expected = search_with_a_heap(planner, first)
     distances = planner.get_distances(first)
     assert set(np.flatnonzero(np.isfinite(distances)).tolist()) == set(expected)
     np.testing.assert_allclose(distances[list(expected)], list(expected.values()), rtol=1e-9)
-    last = int(np.flatnonzero(planner.is_roomy)[-1])
+    last = int(np.flatnonzero(planner.has_clearance)[-1])
     (limited,) = planner.compute_distances_within([last], 1.0)
     assert (limited[np.isfinite(limited)] <= 1.0).all()
 
@@ -97,11 +97,11 @@ def test_routes_keep_their_clearance_from_walls(seed: int) -> None:
     """Between its way-points a route keeps the clearance, up to half a cell."""
     planner = build_planner(build_random_blocks(seed), max_nodes=400)
     rng = np.random.default_rng(seed)
-    roomy_cells = np.argwhere(~planner.is_tight)
-    if not len(roomy_cells):
+    free_cells = np.argwhere(~planner.is_tight)
+    if not len(free_cells):
         return
-    position = RASTER.compute_centers(*roomy_cells[rng.integers(len(roomy_cells))])
-    goal = RASTER.compute_centers(*roomy_cells[rng.integers(len(roomy_cells))])
+    position = RASTER.compute_centers(*free_cells[rng.integers(len(free_cells))])
+    goal = RASTER.compute_centers(*free_cells[rng.integers(len(free_cells))])
     route = planner.find_route(position, goal)
     is_too_close = dilate(planner.is_blocked, planner.clearance / 0.1 - 0.5)
     for start, end in zip(np.vstack([position, route[:-1]]), route, strict=True):
@@ -130,7 +130,7 @@ def test_a_crack_is_no_passage(door: slice, is_passage: bool) -> None:
     planner = build_planner(build_wall_with_door(door), max_nodes=600)
     node = planner.find_own_node(np.array([1.0, 1.0]))
     is_beyond = planner.nodes[:, 0] > 3.5
-    assert np.isfinite(planner.get_distances(node)[is_beyond & planner.is_roomy]).any() == is_passage
+    assert np.isfinite(planner.get_distances(node)[is_beyond & planner.has_clearance]).any() == is_passage
     last = planner.find_route(np.array([1.0, 1.0]), np.array([5.0, 1.0]))[-1]
     assert (last[0] > 3.0) == is_passage
 

@@ -308,7 +308,7 @@ def test_copies_are_independent_of_memory_assigned_by_a_controller_for_one_robot
     for _ in range(4):
         simulation.step()
         twin.step()
-    assert simulation.memory.own == twin.memory.own == [[5]]
+    assert simulation.memory.by_robot == twin.memory.by_robot == [[5]]
     assert twin.positions.tobytes() == simulation.positions.tobytes()
 
 
@@ -321,7 +321,7 @@ def test_memory_assigned_by_a_controller_for_one_robot_reaches_its_next_step(emp
     simulation = Simulation(empty, Numbering(), [[2.0, 2.0], [4.0, 4.0]])
     for _ in range(3):
         simulation.step()
-    assert simulation.memory.own == [3, 6]
+    assert simulation.memory.by_robot == [3, 6]
 
 
 class MassController(FixedForces):

@@ -343,10 +343,10 @@ def test_a_controller_for_one_robot_keeps_its_memory(empty: Environment) -> None
     for _ in range(12):
         simulation.step()
         simulation.observe_and_decide()
-    assert [memory[-1] for memory in simulation.memory.own] == [12, 14]
+    assert [memory[-1] for memory in simulation.memory.by_robot] == [12, 14]
     twin = simulation.copy()
     simulation.step()
     twin.step()
-    assert [memory[-1] for memory in twin.memory.own] == [13, 15]
+    assert [memory[-1] for memory in twin.memory.by_robot] == [13, 15]
     assert simulation.positions.tobytes() == twin.positions.tobytes()
     assert (simulation.velocities[:, 0] > 0).all()

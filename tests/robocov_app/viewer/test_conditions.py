@@ -120,13 +120,13 @@ def test_the_other_robots_keep_their_messages_when_one_is_removed() -> None:
     after = session.timeline.panes[0].simulation.inbox
     assert after is not None
     pairs = np.ix_([0, 2, 3], [0, 2, 3])
-    assert (after.sent == before.sent[pairs]).all()
+    assert (after.sent_steps == before.sent_steps[pairs]).all()
     assert (after.positions == before.positions[pairs]).all()
     session.add_robot((3.0, 1.0))
     inbox = session.timeline.panes[0].simulation.inbox
     assert inbox is not None
-    assert (inbox.arrived[3] == -1).all()
-    assert (inbox.arrived[:, 3] == -1).all()
+    assert (inbox.arrival_steps[3] == -1).all()
+    assert (inbox.arrival_steps[:, 3] == -1).all()
     advance_session(session, 10)
 
 
