@@ -21,7 +21,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
 
-_MIN_STEP_FRACTION = 0.25
+_MIN_FIRST_LENGTH_FRACTION = 0.25
 """Minimum distance to a first waypoint, as a fraction of the spacing of sites: a site at the position of a
 robot would have an infinite weight."""
 
@@ -178,15 +178,18 @@ class GeodesicPlanner:
         return GeodesicPlan(goals=goals, waypoints=waypoints, remaining_lengths=remaining_lengths)
 
     def _compute_goals(self, positions: Array, exponent: float) -> Array:
-        """Return the goals, (k, 2) m, of robots at (k, 2) positions, from their geodesic cells."""
+        """Return the goals, (k, 2) m, of robots at (k, 2) positions, from their geodesic cells.
+
+        They are weighted means of first waypoints; see the notes of `GeodesicLloyd`.
+        """
         result = self.cost(positions)
         sites = np.flatnonzero(result.owner >= 0)
         owner = result.owner[sites]
         first_waypoints = result.first_waypoints[sites]
         distances = result.distances[sites]
-        steps = np.hypot(*(first_waypoints - positions[owner]).T)
-        steps = np.maximum(steps, _MIN_STEP_FRACTION * self.cost.spacing)
-        weights = np.maximum(distances, steps) ** (exponent - 1.0) / steps
+        first_lengths = np.hypot(*(first_waypoints - positions[owner]).T)
+        first_lengths = np.maximum(first_lengths, _MIN_FIRST_LENGTH_FRACTION * self.cost.spacing)
+        weights = np.maximum(distances, first_lengths) ** (exponent - 1.0) / first_lengths
         if result.weights is not None:
             weights *= result.weights[sites]
         n = len(positions)

@@ -224,6 +224,15 @@ def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
     return result.uncovered_area, result.mean_distance
 
 
+class _SiteGroups(NamedTuple):
+    """Groups of neighboring sites, each of which is one row of the distance table."""
+
+    representatives: IntArray
+    """(t,) The site of each group at which distances are measured."""
+    weights: Array | IntArray
+    """(t,) Sum of the weights of each group's sites; their number if all weights are equal."""
+
+
 class _Search:
     """The data that all restarts share.
 
@@ -249,10 +258,7 @@ class _Search:
         usable = [k for k, area in enumerate(areas) if not area.is_empty and site_counts[k]]
         # Components are sorted by area, the largest first.
         covered = usable[:robots]
-        covered_area = sum(areas[k].area for k in covered)
-        candidate_count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * robots)
-        spacing = max(math.sqrt(covered_area / candidate_count), self.space.spacing)
-        candidates = [_spread_points(areas[k], spacing) for k in covered]
+        candidates = self._spread_candidates(covered)
         self.component = np.repeat(covered, [len(points) for points in candidates]).astype(np.intp)
         if len(self.component) < robots:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
@@ -261,9 +267,17 @@ class _Search:
                 f"{environment.name!r}, got {robots}"
             )
         self.candidates = np.concatenate(candidates)
-        self.table = self._compute_table(site_component, np.isin(site_component, covered))
+        groups = self._group_sites(site_component, np.isin(site_component, covered))
+        self.table = self._compute_table(groups)
         # Many restarts find the same sources: descend from these only once.
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
+
+    def _spread_candidates(self, covered: list[int]) -> list[Array]:
+        """Return candidate positions in each of the covered components, (c, 2) m each."""
+        areas = [self.space.components[k] for k in covered]
+        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robots)
+        spacing = max(math.sqrt(sum(area.area for area in areas) / count), self.space.spacing)
+        return [_spread_points(area, spacing) for area in areas]
 
     def run_restart(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> _Outcome:
         """Find sources and descend from them."""
@@ -281,26 +295,31 @@ class _Search:
             )
         return self._outcome_by_sources[key]
 
-    def _compute_table(self, site_component: IntArray, is_covered: BoolArray) -> Array:
-        """Compute the distance table, with one site for each component in each square block of cells."""
+    def _group_sites(self, site_component: IntArray, is_covered: BoolArray) -> _SiteGroups:
+        """Group the covered sites by component, in square blocks of lattice cells."""
         cost = self.cost
         side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_TARGETS)))
         row, column = np.divmod(cost.cells, cost.lattice)
         square = row // side * cost.lattice + column // side
         group = square * len(self.space.components) + site_component
-        # Take the site nearest to the middle of the square. Integer offsets make ties exact, such as between
-        # all cells of a two by two square; ties are broken at random.
+        # A group is represented by the site nearest to the middle of its square. Integer offsets make ties
+        # exact, such as between all cells of a two by two square; ties are broken at random.
         row_offset = 2 * (row % side) - side + 1
         column_offset = 2 * (column % side) - side + 1
         squared_offset = row_offset**2 + column_offset**2
         tie_breaker = np.random.default_rng(0).random(len(group))
-        site = np.flatnonzero(is_covered)
-        site = site[np.lexsort((tie_breaker[site], squared_offset[site], group[site]))]
-        _, first, count = np.unique(group[site], return_index=True, return_counts=True)
-        weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
-        table = cost.geodesics.compute_distances(self.candidates, cost.points[site[first]])
-        table[np.isinf(table)] = _UNREACHABLE_SIZES * cost.geodesics.size
-        return np.ascontiguousarray((table * weight).T)
+        sites = np.flatnonzero(is_covered)
+        sites = sites[np.lexsort((tie_breaker[sites], squared_offset[sites], group[sites]))]
+        _, starts, counts = np.unique(group[sites], return_index=True, return_counts=True)
+        weights = counts if cost.weights is None else np.add.reduceat(cost.weights[sites], starts)
+        return _SiteGroups(representatives=sites[starts], weights=weights)
+
+    def _compute_table(self, groups: _SiteGroups) -> Array:
+        """Compute the table of weighted distances from groups of sites to the candidates."""
+        cost = self.cost
+        distances = cost.geodesics.compute_distances(self.candidates, cost.points[groups.representatives])
+        distances[np.isinf(distances)] = _UNREACHABLE_SIZES * cost.geodesics.size
+        return np.ascontiguousarray((distances * groups.weights).T)
 
     def _find_sources(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> IntArray:
         """Return the sources that one restart finds on the table, sorted, (n,).
