@@ -111,9 +111,9 @@ def build_team(groups: object, path: JsonPath, defaults: TeamDefaults | None = N
             f"{format_path(path)}: expected at least one table [[{format_path(path)}]], got {got}"
         )
     teams = [_build_group(group, (*path, k), defaults or {}) for k, group in enumerate(groups)]
-    robots = sum(len(team) for team in teams)
-    if robots > MAX_ROBOTS:
-        raise InputError(f"{format_path(path)}: expected at most {MAX_ROBOTS} robots, got {robots}")
+    robot_count = sum(len(team) for team in teams)
+    if robot_count > MAX_ROBOTS:
+        raise InputError(f"{format_path(path)}: expected at most {MAX_ROBOTS} robots, got {robot_count}")
     return Team.concatenate(teams)
 
 

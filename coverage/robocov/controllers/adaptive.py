@@ -162,7 +162,7 @@ class Adaptive(BaseController):
     def _learn_by_basis(
         self, seen: Observations, memory: AdaptiveMemory, is_own: BoolArray
     ) -> AdaptiveMemory:
-        """Return the memory after one implicit step of the adaptation law.
+        """Return the memory after one implicit step of the adaptation law in the notes of `Adaptive`.
 
         Parameters
         ----------
@@ -174,19 +174,23 @@ class Adaptive(BaseController):
         lattice = memory.lattice
         dt = self.period
         functions = lattice.evaluate_basis(seen.positions)
+        # Λ and λ.
         information = memory.information + dt * functions[:, :, None] * functions[:, None]
         projections = memory.projections + dt * functions * _measure(seen)[:, None]
         goals = compute_sample_centroids(is_own, lattice.samples, memory.estimates, seen.positions)
+        # P (C - p) is the integral of K (q - p)·(C - p) over the samples q of the cell.
         offsets = lattice.samples - seen.positions[:, None]
         moments = is_own * (offsets * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.sample_area
-        change = (
+        coupling = _multiply(moments, lattice.functions)
+        # With da/dt = drive - decay a, an implicit step solves (1 + dt decay) a' = a + dt drive.
+        drive = (
             self.learning * projections
             + self.consensus * self._average_neighbors(seen, memory.parameters)
-            + self.coupling * _multiply(moments, lattice.functions)
+            + self.coupling * coupling
         )
         identity = np.eye(memory.parameters.shape[1])
-        stiffness = self.learning * information + self.consensus * identity
-        parameters = _solve(identity + dt * stiffness, memory.parameters + dt * change)
+        decay = self.learning * information + self.consensus * identity
+        parameters = _solve(identity + dt * decay, memory.parameters + dt * drive)
         parameters = np.maximum(parameters, self.least)
         return replace(
             memory,

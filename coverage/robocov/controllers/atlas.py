@@ -245,7 +245,13 @@ class Atlas(BaseController):
         memory = self._plan_routes(seen, memory, first_plan_time=0.0 if estimates is None else _LISTENING_S)
         returns = update_returns(seen, memory.returns)
         command = follow_routes(
-            cautious, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
+            cautious,
+            memory.team,
+            routes=memory.routes,
+            legs=memory.legs,
+            returns=returns,
+            k_prop=self.k_prop,
+            response_time=self.response_time,
         )
         return Decision(
             forces=command.forces,

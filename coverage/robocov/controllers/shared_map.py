@@ -236,7 +236,13 @@ class SharedMapController(BaseController):
             memory = self._plan_routes(seen, memory)
         returns = update_returns(seen, memory.returns)
         command = follow_routes(
-            seen, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
+            seen,
+            memory.team,
+            routes=memory.routes,
+            legs=memory.legs,
+            returns=returns,
+            k_prop=self.k_prop,
+            response_time=self.response_time,
         )
         return Decision(
             forces=command.forces,
