@@ -399,8 +399,10 @@ class Atlas(BaseController):
         if first_node < 0:
             return None
         is_free = ~cooperation.is_fixed
+        # Robots that the plan has no goal for, which come last, are fixed.
+        is_planned_and_free = is_free[: len(goals) - 1]
         other_positions = state.basis.positions[1:].copy()
-        other_positions[is_free] = goals[1:][is_free[: len(goals) - 1]]
+        other_positions[is_free] = goals[1:][is_planned_and_free]
         return find_own_goal(
             planner,
             compute_node_weights(planner, seen.density),

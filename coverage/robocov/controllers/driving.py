@@ -221,7 +221,7 @@ def limit_approach_speed(
     normals = offsets / np.where(distance > 0.0, distance, np.nan)[..., None]
     gap = np.nan_to_num(distance - clearance)
     limits = np.minimum(rate * gap, np.sqrt(2.0 * braking * np.maximum(gap, 0.0)))
-    # Leading away at full speed would leave no choice for anything else.
+    # A robot that must move away at full speed could do nothing else, such as avoid a third object.
     limits = np.maximum(limits, -0.5 * max_speed[:, None])
     slowed, is_feasible = find_nearest_allowed(velocities, -normals, limits, max_speed)
     if is_feasible.all():

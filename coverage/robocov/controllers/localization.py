@@ -72,7 +72,7 @@ class Estimates(NamedTuple):
     """(n, 2) m, own positions."""
     velocities: Array
     """(n, 2) m/s, own velocities."""
-    fixes: Array
+    fix_counts: Array
     """(n,) Number of position fixes that were averaged."""
     variance: Array
     """(n,) m², of one fix in x or y."""
@@ -91,7 +91,7 @@ class Estimates(NamedTuple):
             time=0.0,
             positions=np.zeros((n, 2)),
             velocities=np.zeros((n, 2)),
-            fixes=np.zeros(n),
+            fix_counts=np.zeros(n),
             variance=np.zeros(n),
             tracks=tracks,
         )
@@ -123,7 +123,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     assumed to keep their velocities for at most 1.5 seconds since their last message.
     """
     assert seen.reported_positions is not None and seen.report_ages is not None
-    positions, fixes, variance = _filter_own_positions(seen, previous, team)
+    positions, fix_counts, variance = _filter_own_positions(seen, previous, team)
     robot, other = seen.neighbors.list_pairs()
     messages = _Messages(
         receiver=robot,
@@ -142,7 +142,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
         time=seen.time,
         positions=positions,
         velocities=seen.velocities,
-        fixes=fixes,
+        fix_counts=fix_counts,
         variance=variance,
         tracks=tracks,
     )
@@ -159,18 +159,21 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
     """Return the positions, the numbers of fixes and their variances after one more fix of each robot."""
     dt = seen.time - previous.time
     predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
-    residual = ((seen.positions - predicted) ** 2).sum(axis=1)
-    max_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
-    was_displaced = (residual > max_residual) & (previous.fixes >= _MIN_FIXES)
-    fixes = np.where(was_displaced, 1.0, previous.fixes + 1.0)
-    gain = np.maximum(1.0 / fixes, min(dt / _AVERAGING_S, 1.0))
-    # The residual of a mean of k - 1 fixes is larger than the error of one fix.
-    squared_error = 0.5 * residual * (1.0 - 1.0 / np.maximum(fixes, 1.0))
-    variance_gain = np.maximum(1.0 / np.maximum(fixes - 1.0, 1.0), gain)
+    squared_residual = ((seen.positions - predicted) ** 2).sum(axis=1)
+    # A residual that is too large for noise means that something has displaced the robot: start again.
+    max_squared_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
+    was_displaced = (squared_residual > max_squared_residual) & (previous.fix_counts >= _MIN_FIXES)
+    fix_counts = np.where(was_displaced, 1.0, previous.fix_counts + 1.0)
+    # The mean of all fixes at first, then of those in the last seconds.
+    gain = np.maximum(1.0 / fix_counts, min(dt / _AVERAGING_S, 1.0))
+    positions = predicted + gain[:, None] * (seen.positions - predicted)
+    # A fix differs more from the mean of k - 1 others than from the truth. There are two coordinates.
+    squared_error = 0.5 * squared_residual * (1.0 - 1.0 / np.maximum(fix_counts, 1.0))
+    # The first fix has no residual, so that there is one value less to average than there are fixes.
+    variance_gain = np.maximum(1.0 / np.maximum(fix_counts - 1.0, 1.0), gain)
     variance = previous.variance + variance_gain * (squared_error - previous.variance)
     variance = np.where(was_displaced, previous.variance, variance)
-    positions = predicted + gain[:, None] * (seen.positions - predicted)
-    return positions, fixes, variance
+    return positions, fix_counts, variance
 
 
 def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observations:

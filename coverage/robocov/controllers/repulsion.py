@@ -308,9 +308,8 @@ class Poduri(BaseController):
         is_near = np.zeros((n, n), dtype=bool)
         is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges
         rank = _rank_by_distance(links.robot, links.distance)
-        is_critical: BoolArray = (is_near.sum(axis=1)[links.robot] <= self.neighbours) & (
-            rank < self.neighbours
-        )
+        has_few_near = is_near.sum(axis=1) <= self.neighbours
+        is_critical: BoolArray = has_few_near[links.robot] & (rank < self.neighbours)
         others = np.flatnonzero(~is_critical)
         if seen.reported_positions is None:
             is_critical[others] = self._is_critical_for_neighbor(seen, links, is_near, others)

@@ -294,13 +294,13 @@ class SharedMapController(BaseController):
         sensing_range: float,
     ) -> Plan:
         """Return the plan of a robot; its radius and sensing range are in m."""
+        if former_plan is not None and _is_still_valid(former_plan, known_map, seen.density, group):
+            return replace(former_plan, group=group)
         window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
         former_goals = np.full(group.positions.shape, np.nan)
         if former_plan is None:
             planner = GridPlanner(known_map, window, radius + self.clearance)
         else:
-            if _is_still_valid(former_plan, known_map, seen.density, group):
-                return replace(former_plan, group=group)
             planner = former_plan.planner
             _, rows, former_rows = np.intersect1d(group.robots, former_plan.group.robots, return_indices=True)
             former_goals[rows] = former_plan.placement.goals[former_rows]

@@ -96,9 +96,10 @@ class Teammates(NamedTuple):
             Times at which the robot lost others. Only later reports about these count.
         """
         sources: list[Sequence[Array | IntArray]] = [self]
+        before_start = -1.0
         for report in reports:
             min_times = [
-                math.inf if other == robot else loss_times.get(other, -1.0)
+                math.inf if other == robot else loss_times.get(other, before_start)
                 for other in report.robots.tolist()
             ]
             is_new = report.heard_times > np.array(min_times)
