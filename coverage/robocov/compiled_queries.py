@@ -38,6 +38,15 @@ _PASSES_STRUCTS_IN_REGISTERS = sys.platform != "win32" and platform.machine() in
 _POINT_INFO_FIELDS = {"shape": 0, "point": 8, "distance": 24, "gradient": 32}
 _SEGMENT_INFO_FIELDS = {"shape": 0, "point": 8, "normal": 24, "alpha": 40}
 """Offsets of the fields of the structures that the queries fill, in bytes."""
+_INFO_SIZE = 6
+"""Size of either structure, in numbers of 8 bytes, in which its fields are read."""
+_POINT_X = 1
+"""Index of x of the point in the structure of a point query."""
+_POINT_Y = 2
+"""Index of y of the point."""
+_ALPHA = 5
+"""Index of the fraction in the structure of a segment query."""
+_RAY_RADIUS_M = 0.0
 _NO_GROUP = 0
 _ALL_CATEGORIES = -1
 """A filter's categories and mask as one integer, all bits set."""
@@ -162,7 +171,8 @@ _SEGMENT_QUERY = _get_address(ffi.addressof(lib, "cpSpaceSegmentQueryFirst"))
 
 @kernel
 def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array, points: Array) -> None:
-    info = np.empty(6)  # a cpPointQueryInfo
+    """Write the nearest points to `points`; see `find_nearest_points`."""
+    info = np.empty(_INFO_SIZE)  # a cpPointQueryInfo
     for i in range(len(positions)):
         arguments = (
             space,
@@ -174,8 +184,8 @@ def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array
             info.ctypes.data,
         )
         if call_c_function(query, arguments):
-            points[i, 0] = info[1]
-            points[i, 1] = info[2]
+            points[i, 0] = info[_POINT_X]
+            points[i, 1] = info[_POINT_Y]
         else:
             points[i, 0] = np.nan
             points[i, 1] = np.nan
@@ -185,7 +195,8 @@ def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array
 def _cast_rays(
     space: int, query: int, positions: Array, ends: Array, fractions: Array, is_hit: BoolArray
 ) -> None:
-    info = np.empty(6)  # a cpSegmentQueryInfo
+    """Write the fractions up to the first shapes, and whether there are any; see `cast_rays`."""
+    info = np.empty(_INFO_SIZE)  # a cpSegmentQueryInfo
     for i in range(len(positions)):
         for ray in range(ends.shape[1]):
             arguments = (
@@ -194,11 +205,11 @@ def _cast_rays(
                 positions[i, 1],
                 ends[i, ray, 0],
                 ends[i, ray, 1],
-                0.0,
+                _RAY_RADIUS_M,
                 _NO_GROUP,
                 _ALL_CATEGORIES,
                 info.ctypes.data,
             )
             if call_c_function(query, arguments):
-                fractions[i, ray] = info[5]
+                fractions[i, ray] = info[_ALPHA]
                 is_hit[i, ray] = True

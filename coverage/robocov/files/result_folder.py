@@ -173,10 +173,7 @@ def create_result(
             with report_folder_errors(folder):
                 replaced_files = _find_replaced_files(folder, overwrite=overwrite)
                 owned_files = replaced_files or set()
-                names = {*owned_files, *_FILES[kind], f"{_FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
-                for part in parts:
-                    names.update(f"{part}/{name}" for name in _FILES["run"])
-                for name in sorted(names):
+                for name in sorted(_list_possible_files(folder, kind, parts) | owned_files):
                     _require_replaceable(folder, name, owned_files)
             result = ResultFolder(folder, owned_files, replaces=replaced_files is not None)
             yield result
@@ -185,6 +182,14 @@ def create_result(
         if not existed:
             with suppress(OSError):
                 folder.rmdir()  # Fails, as it should, if the folder is not empty.
+
+
+def _list_possible_files(folder: Path, kind: ResultKind, parts: Iterable[str]) -> set[str]:
+    """Return the files that a result may have; of the frames, the first one and those that exist."""
+    names = {*_FILES[kind], f"{_FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
+    for part in parts:
+        names.update(f"{part}/{name}" for name in _FILES["run"])
+    return names
 
 
 @contextmanager

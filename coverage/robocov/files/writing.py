@@ -93,11 +93,8 @@ def resolve_target(target: Path) -> Path:
         if target.is_symlink():
             raise _build_error(target, "expected a file, got a link to nothing") from error
         return target
-    except (
-        OSError,
-        RuntimeError,
-        ValueError,
-    ) as error:  # Before Python 3.13 circular links are RuntimeErrors.
+    except (OSError, RuntimeError, ValueError) as error:
+        # Before Python 3.13, circular links raise RuntimeError.
         raise _build_error(target, f"cannot be written: {describe_error(error)}") from error
     if not stat.S_ISREG(mode):
         kind = _SPECIAL_FILES.get(stat.filemode(mode)[0], "something else")

@@ -152,18 +152,19 @@ class Geodesics:
             if progress is not None:
                 progress(first / count)
             end = min(first + _CORNERS_PER_REPORT, count)
-            indices, lengths = self._compute_rows(partial(compute, first, end), index_columns, length_columns)
+            compute_batch = partial(compute, first, end)
+            indices, lengths = self._run_for_batch(compute_batch, index_columns, length_columns)
             all_indices.append(indices)
             all_lengths.append(lengths)
         return np.concatenate(all_indices), np.concatenate(all_lengths)
 
-    def _compute_rows(
+    def _run_for_batch(
         self,
         compute: Callable[[AngularWallIndex, IntArray, Array], int],
         index_columns: int,
         length_columns: int,
     ) -> tuple[IntArray, Array]:
-        """Return the rows of a `CornerComputation` for one batch of corners."""
+        """Return the rows that a `CornerComputation` writes for one batch of corners."""
 
         def compute_rows(index: AngularWallIndex) -> tuple[IntArray, Array] | None:
             max_rows = len(index.entry_wall)

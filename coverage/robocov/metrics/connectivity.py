@@ -57,10 +57,10 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
         return Connectivity(1, float(n) if n > 1 else 0.0)
     robot, neighbor = neighbors.list_pairs()
     adjacency = coo_array((np.ones(len(robot)), (robot, neighbor)), (n, n))
-    components, _ = connected_components(adjacency, directed=False)
-    if n == 1 or components > 1:
-        return Connectivity(int(components), 0.0)
+    component_count, _ = connected_components(adjacency, directed=False)
+    if n == 1 or component_count > 1:
+        return Connectivity(int(component_count), 0.0)
     laplacian = np.diag(np.bincount(robot).astype(float))
     laplacian[robot, neighbor] = -1.0
     second_eigenvalue = float(np.linalg.eigvalsh(laplacian)[1])
-    return Connectivity(int(components), round(second_eigenvalue, _EIGENVALUE_DECIMALS))
+    return Connectivity(int(component_count), round(second_eigenvalue, _EIGENVALUE_DECIMALS))

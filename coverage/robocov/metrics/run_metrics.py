@@ -92,14 +92,14 @@ class RunMetrics:
         dict of str to float or None
             The names end in the units. Clearances are the smallest of the run, and None if they are infinite.
         """
-        figures: dict[str, float | None] = {}
+        final_values: dict[str, float | None] = {}
         for name, column in COLUMNS.items():
             if name == "time":
                 continue
             values = getattr(self, name)
             value = float(values.min() if name.endswith("clearance") else values[-1])
-            figures[column] = value if np.isfinite(value) else None
-        return figures
+            final_values[column] = value if np.isfinite(value) else None
+        return final_values
 
 
 class _Integrals(NamedTuple):

@@ -18,10 +18,12 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, compute_pseudo_angle
 from robocov.geodesic.grid import Grid
-from robocov.geodesic.walls import Walls, build_walls
+from robocov.geodesic.walls import END_X, END_Y, START_X, START_Y, Walls, build_walls
 
 _BINS = 512
 """Angular bins of a robot's view."""
+_INITIAL_ENTRIES_PER_BIN = 64
+"""Initial size of the index of walls, per bin. It is doubled whenever it is too small."""
 _QUARTER_SEGMENTS = 128
 """Sides per quadrant of the polygon that represents a sensing disc; its relative area error is 2.5e-5."""
 
@@ -131,7 +133,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
     walls = build_walls(shapely.transform(shapely.multipolygons(components), grid.snap))
     # The map's outer hull hides no free space, but it bounds the view.
     walls.can_hide[:] = True
-    index = AngularWallIndex.allocate(1, _BINS, 64 * _BINS)
+    index = AngularWallIndex.allocate(1, _BINS, _INITIAL_ENTRIES_PER_BIN * _BINS)
     for position in grid.snap(positions):
         while True:
             x, y = position
@@ -174,17 +176,20 @@ def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position:
 def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: IntArray) -> None:
     """Write the index of the wall that each of (m, 2) rays from the source hits first, -1 for none."""
     for m in range(len(rays)):
-        x, y = rays[m, 0], rays[m, 1]
+        x = rays[m, 0]
+        y = rays[m, 1]
         nearest[m] = -1
         min_distance = np.inf
-        entry = index.head[0, int(compute_pseudo_angle(x, y) * (_BINS * 0.25)) & (_BINS - 1)]
+        # The pseudo-angle of a full turn is 4.
+        unwrapped_bin = int(compute_pseudo_angle(x, y) * (_BINS * 0.25))
+        entry = index.head[0, unwrapped_bin & (_BINS - 1)]
         while entry >= 0:
             wall = index.entry_wall[entry]
             # From the source to the first end a, and from there along the wall u.
-            ax = ends[wall, 0] - index.positions[0, 0]
-            ay = ends[wall, 1] - index.positions[0, 1]
-            ux = ends[wall, 2] - ends[wall, 0]
-            uy = ends[wall, 3] - ends[wall, 1]
+            ax = ends[wall, START_X] - index.positions[0, 0]
+            ay = ends[wall, START_Y] - index.positions[0, 1]
+            ux = ends[wall, END_X] - ends[wall, START_X]
+            uy = ends[wall, END_Y] - ends[wall, START_Y]
             # The ray meets the line of the wall where a + s u = t (x, y).
             determinant = x * uy - y * ux
             if determinant != 0.0:
@@ -200,7 +205,8 @@ def _intersect(walls: Array, angles: Array) -> Array:
     """Return where rays from the origin meet (m, 4) walls, (m, 2); clipped to the ends of the walls."""
     x = np.cos(angles)
     y = np.sin(angles)
-    along = walls[:, 2:] - walls[:, :2]
+    starts = walls[:, [START_X, START_Y]]
+    along = walls[:, [END_X, END_Y]] - starts
     determinant = x * along[:, 1] - y * along[:, 0]
-    s = (walls[:, 0] * y - walls[:, 1] * x) / np.where(determinant == 0.0, np.inf, determinant)
-    return np.asarray(walls[:, :2] + s.clip(0.0, 1.0)[:, None] * along)
+    s = (starts[:, 0] * y - starts[:, 1] * x) / np.where(determinant == 0.0, np.inf, determinant)
+    return np.asarray(starts + s.clip(0.0, 1.0)[:, None] * along)

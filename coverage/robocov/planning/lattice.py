@@ -239,7 +239,7 @@ def compute_distances(
             nearest = min(nearest, distance[front[k]])
         # Divide the front into the nodes to settle and those that remain.
         settled_count = 0
-        remaining = 0
+        remaining_count = 0
         for k in range(front_size):
             node = front[k]
             if distance[node] < nearest + shortest_edge:
@@ -247,9 +247,9 @@ def compute_distances(
                 is_in_front[node] = False
                 settled_count += 1
             else:
-                front[remaining] = node
-                remaining += 1
-        front_size = remaining
+                front[remaining_count] = node
+                remaining_count += 1
+        front_size = remaining_count
         # Shorten the distances of the neighbors of settled nodes.
         for k in range(settled_count):
             node = settled[k]

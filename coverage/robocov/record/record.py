@@ -282,10 +282,10 @@ class Record(Drawable):
             turning_rate_rad_s.
         """
         pandas = import_optional("pandas", "pandas")
-        moments, robots = self.positions.shape[:2]
+        moment_count, robot_count = self.positions.shape[:2]
         columns: dict[str, Array | IntArray] = {
-            "time_s": np.repeat(self.time, robots),
-            "robot": np.tile(np.arange(robots), moments),
+            "time_s": np.repeat(self.time, robot_count),
+            "robot": np.tile(np.arange(robot_count), moment_count),
         }
         for array in self.arrays:
             if array == "time":

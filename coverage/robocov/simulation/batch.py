@@ -108,29 +108,30 @@ class SimulationBatch:
                 f"environment: expected obstacles that stand still, got map {environment.name!r}"
             )
         positions = _to_starts(starts)
-        runs, robots, _ = positions.shape
+        run_count, robot_count, _ = positions.shape
         self.environment = environment
-        self.team = check_team(team, robots)
+        self.team = check_team(team, robot_count)
         self.dt = dt
         self._steps = 0
         for start_positions in positions:
             require_free_starts(environment, start_positions, self.team, MAX_START_OVERLAP_M)
         self._caller = ControllerCaller(controller, environment.static, time=0.0)
-        self._joint_team = Team.concatenate([self.team] * runs)
-        self._rows = [slice(run * robots, (run + 1) * robots) for run in range(runs)]
+        self._joint_team = Team.concatenate([self.team] * run_count)
+        self._rows = [slice(run * robot_count, (run + 1) * robot_count) for run in range(run_count)]
         obstacles = build_obstacles(environment)
-        self._world = World(obstacles, self._joint_team, positions.reshape(-1, 2), runs=runs)
+        self._world = World(obstacles, self._joint_team, positions.reshape(-1, 2), runs=run_count)
         self.sensor = RangeSensor(obstacles.walls)
         self._complete_graphs: list[Neighbors] | None = None
         if np.isinf(self.team.communication_range).all():
-            self._complete_graphs = [Neighbors(robots)] * runs
+            self._complete_graphs = [Neighbors(robot_count)] * run_count
             self._complete_joint_graph = Neighbors.combine(self._complete_graphs)
-        self._decides_jointly = robots <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
-        self._memories: list[Any] = []
+        self._decides_jointly = robot_count <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
+        # One memory for all runs, or one for each.
         if self._decides_jointly:
-            self._memories = [self._caller.begin(environment.region, self._joint_team, self.time)]
+            memories = [self._caller.begin(environment.region, self._joint_team, self.time)]
         else:
-            self._memories = [self._begin_run() for _ in range(runs)]
+            memories = [self._begin_run() for _ in range(run_count)]
+        self._memories: list[Any] = memories
         self._start_step()
 
     def _start_step(self) -> None:

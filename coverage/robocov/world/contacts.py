@@ -205,6 +205,7 @@ class ContactSolver:
             final = self._arrays.states[rows].copy()
             for row, (vx, vy) in enumerate(final[:, 2:].tolist()):
                 final[row, 2:] *= compute_clip_factor(vx, vy, float(max_speed[row]))
+            # These corrections change the positions; the velocities are those from before.
             self._finish_corrections(members, dt / substeps)
             final[:, :2] = self._arrays.states[rows, :2]
             return final

@@ -115,11 +115,9 @@ class World:
         self._min_radius = float(team.radius.min())
         self._runs = runs
         self._team_size = len(team) // runs
+        self._may_exceed_max_speed = velocities is not None
         if velocities is None:
             velocities = np.zeros((len(team), 2))
-            self._may_exceed_max_speed = False
-        else:
-            self._may_exceed_max_speed = True
         velocities = np.array(velocities, dtype=float)
         self._set_state(
             np.array(positions, dtype=float), velocities, initialize_steering(team, velocities, steering)
