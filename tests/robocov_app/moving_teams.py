@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from reported_results import walk
+from reported_results import build_record
 
 from robocov import load_map
 from robocov.environment import UniformStart
@@ -15,7 +15,7 @@ def build_moving_record(robots: int, seconds: float = 6.0) -> Record:
     """Build a record of robots that cross the map "rooms" between random places."""
     environment = load_map("rooms")
     starts = {**environment.starts, "spread": UniformStart()}
-    return walk(replace(environment, starts=starts), robots=robots, seconds=seconds)
+    return build_record(replace(environment, starts=starts), robots=robots, seconds=seconds)
 
 
 def list_hues(hues: dict[str, Any], moments: Iterable[int]) -> list[list[int]]:

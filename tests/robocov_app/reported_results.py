@@ -1,4 +1,4 @@
-"""Results for the tests of reports: made up in memory, and really run on the disk."""
+"""Results for the tests of reports: made up in memory, or saved in folders."""
 
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,7 +11,14 @@ from robocov.environment import Environment
 from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.record import Record
 from robocov.team import Team
-from robocov_app.report.results import FIGURES, Entry, Result
+from robocov_app.report.results.result import (
+    FIGURE_NAMES,
+    Gains,
+    ReportedResult,
+    ReportedRun,
+    ResultKind,
+    TeamParameters,
+)
 from robocov_app.runs.execution import Run, save_numbers
 from robocov_app.runs.saved_runs import SavedRun
 from robocov_app.terminal.output import replace_non_finite, write_json
@@ -22,7 +29,7 @@ HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
 LABELS = {"rapf": "RAPF", "rpf": "RPF", "lloyd": "Lloyd"}
 
 
-def walk(
+def build_record(
     environment: Environment = ROOMS,
     *,
     controller: str = "rapf",
@@ -33,16 +40,17 @@ def walk(
     seed: int = 0,
     gains: dict[str, float | None] | None = None,
 ) -> Record:
-    """Return a made-up record: every robot walks on a bent way between two free places."""
-    begin = environment.start("spread").sample(robots, seed)
+    """Return a made-up record: every robot moves on a bent path between two free positions."""
+    start = environment.start("spread").sample(robots, seed)
     end = environment.start("spread").sample(robots, seed + 1000)
     time = np.arange(round(seconds * hz) + 1) / hz
-    part = (time / max(seconds, 1e-9))[:, None, None]
-    side = np.random.default_rng(seed).normal(size=(1, robots, 2)) * 0.4
-    positions = begin + (end - begin) * part + side * np.sin(np.pi * part)
-    low, high = environment.region.vertices.min(axis=0), environment.region.vertices.max(axis=0)
+    fraction = (time / max(seconds, 1e-9))[:, None, None]
+    bend = np.random.default_rng(seed).normal(size=(1, robots, 2)) * 0.4
+    positions = start + (end - start) * fraction + bend * np.sin(np.pi * fraction)
+    low = environment.region.vertices.min(axis=0)
+    high = environment.region.vertices.max(axis=0)
     positions = np.clip(positions, low + 0.1, high - 0.1)
-    nothing = np.full_like(positions, np.nan)
+    unknown = np.full_like(positions, np.nan)
     return Record(
         environment=environment,
         team=Team.homogeneous(robots),
@@ -56,38 +64,39 @@ def walk(
         positions=positions,
         velocities=np.zeros_like(positions),
         forces=np.zeros_like(positions),
-        goals=nothing if controller == "rpf" else np.broadcast_to(end, positions.shape).copy(),
-        obstacle_points=nothing,
+        goals=unknown if controller == "rpf" else np.broadcast_to(end, positions.shape).copy(),
+        obstacle_points=unknown,
     )
 
 
-def falling(record: Record, final: float, hz: float = 10.0) -> CostHistory:
+def build_history(record: Record, final: float, hz: float = 10.0) -> CostHistory:
     """Return a made-up cost that falls from 6 m to `final`."""
     time = record.time[:: max(round(1.0 / record.dt / hz), 1)]
     if time[-1] != record.time[-1]:
         time = np.append(time, record.time[-1])
-    span = max(float(time[-1]), 1e-9)
-    distance = final + (6.0 - final) * (1.0 - time / span) ** 2
+    duration = max(float(time[-1]), 1e-9)
+    distance = final + (6.0 - final) * (1.0 - time / duration) ** 2
     return CostHistory(time, distance, 50.0 * distance, np.zeros_like(time))
 
 
-def entry(
+def build_run(
     controller: str = "rapf",
     seed: int = 0,
     final: float | None = 2.0,
     *,
     map_name: str = "rooms",
     robots: int = 4,
-    gains: tuple[tuple[str, float | None], ...] = (),
-    team: tuple[tuple[str, float | None], ...] = (),
+    gains: Gains = (),
+    team: TeamParameters = (),
     start: str | None = "spread",
     error: str | None = None,
     **figures: float | None,
-) -> Entry:
-    """Return a run as a report knows it."""
-    told = dict.fromkeys(FIGURES) | {"mean_distance_m": final, "contacts": 0} | figures
-    name = "-".join(map(str, (map_name, controller, robots, start, seed, gains, team)))
-    return Entry(
+) -> ReportedRun:
+    """Return a run of a result."""
+    all_figures = dict.fromkeys(FIGURE_NAMES) | {"mean_distance_m": final, "contacts": 0} | figures
+    properties = (map_name, controller, robots, start, seed, gains, team)
+    folder_name = "-".join(map(str, properties)).replace("/", "-")
+    return ReportedRun(
         map=map_name,
         controller=controller,
         label=LABELS.get(controller, controller),
@@ -96,55 +105,57 @@ def entry(
         start=start,
         seed=seed,
         gains=gains,
-        figures={} if error else told,
+        figures={} if error else all_figures,
         error=error,
-        folder=Path(name.replace("/", "-")),
+        folder=Path(folder_name),
     )
 
 
-def result_of(
-    entries: list[Entry],
+def build_result(
+    runs: list[ReportedRun],
     *,
-    kind: str = "sweep",
+    kind: ResultKind = "sweep",
     loaded: dict[Path, SavedRun] | None = None,
     maps: dict[str, Environment] | None = None,
-    wanted: int | None = None,
-    units: dict[str, str] | None = None,
-) -> Result:
-    """Return a result of these runs."""
-    return Result(
+    expected_count: int | None = None,
+    gain_units: dict[str, str] | None = None,
+) -> ReportedResult:
+    """Return a result with these runs."""
+    return ReportedResult(
         kind=kind,
         folder=Path("study"),
-        entries=tuple(entries),
-        maps=dict.fromkeys(dict.fromkeys(each.map for each in entries), ROOMS) if maps is None else maps,
-        wanted=len(entries) if wanted is None else wanted,
-        units={} if units is None else units,
-        meanings={},
+        runs=tuple(runs),
+        maps=dict.fromkeys((run.map for run in runs), ROOMS) if maps is None else maps,
+        expected_count=len(runs) if expected_count is None else expected_count,
+        gain_units=gain_units or {},
+        gain_meanings={},
         facts={"duration_s": 6.0, "dt_s": 0.1, "lattice": 16},
-        loaded={} if loaded is None else loaded,
+        loaded=loaded or {},
     )
 
 
-def watched(entries: list[Entry], environment: Environment = ROOMS, **walking: float) -> Result:
-    """Return a result whose runs have made-up records and costs."""
+def build_recorded_result(
+    runs: list[ReportedRun], environment: Environment = ROOMS, **options: float
+) -> ReportedResult:
+    """Return a result whose runs have made-up records and costs; the options are those of the records."""
     loaded = {}
-    for each in entries:
-        if each.error is None:
-            record = walk(
-                environment,
-                controller=each.controller,
-                label=each.label,
-                robots=each.robots,
-                seed=each.seed or 0,
-                **walking,
-            )
-            history = falling(record, 2.0 if np.isnan(each.final) else each.final)
-            loaded[each.folder] = SavedRun(each.folder, record, history)
-    names = dict.fromkeys(each.map for each in entries)
-    return result_of(entries, loaded=loaded, maps=dict.fromkeys(names, environment))
+    for run in runs:
+        if run.error is not None:
+            continue
+        record = build_record(
+            environment,
+            controller=run.controller,
+            label=run.label,
+            robots=run.robots,
+            seed=run.seed or 0,
+            **options,
+        )
+        final = 2.0 if np.isnan(run.final_distance) else run.final_distance
+        loaded[run.folder] = SavedRun(run.folder, record, build_history(record, final))
+    return build_result(runs, loaded=loaded, maps=dict.fromkeys((run.map for run in runs), environment))
 
 
-def saved_run(folder: Path, record: Record) -> Run:
+def save_run(folder: Path, record: Record) -> Run:
     """Write the folder of a run with its real cost."""
     folder.mkdir(parents=True)
     history = compute_cost_history(record, CoverageCost(record.environment, 16), 5.0)
@@ -153,16 +164,18 @@ def saved_run(folder: Path, record: Record) -> Run:
     return run
 
 
-def saved_comparison(folder: Path, controllers: tuple[str, ...] = ("rapf", "rpf")) -> None:
+def save_comparison(folder: Path, controllers: tuple[str, ...] = ("rapf", "rpf")) -> None:
     """Write the folder of a comparison."""
-    runs = {name: saved_run(folder / name, walk(SQUARE, controller=name)) for name in controllers}
-    rows = [{"controller": name, **run.summary} for name, run in runs.items()]
+    runs = {}
+    for controller in controllers:
+        runs[controller] = save_run(folder / controller, build_record(SQUARE, controller=controller))
+    rows = [{"controller": controller, **run.summary} for controller, run in runs.items()]
     content = {"format": "robocov-comparison", "version": 1, "folders": list(runs), "runs": rows}
     write_json(folder / "comparison.json", replace_non_finite(content))
 
 
 class Page(HTMLParser):
-    """What a page consists of: every element with its attributes, and all of its words."""
+    """The elements of a page with their attributes, and its texts."""
 
     VOID = frozenset("area base br col embed hr img input link meta source track wbr".split())
 

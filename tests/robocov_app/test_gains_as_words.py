@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import open_viewer
-from reported_results import entry, result_of
+from reported_results import build_result, build_run
 from swept import ROOM, InProcess, small_study
 
 from robocov.errors import InputError, ParameterError
@@ -16,10 +16,10 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.figures.results import Dependence, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import choose_controller_styles
-from robocov_app.report.groups import dependences, gain_text
-from robocov_app.report.plots import dependence_plots
-from robocov_app.report.results import gathered
-from robocov_app.report.tables import controllers_table
+from robocov_app.report.analysis.groups import find_varying_gains, format_gains
+from robocov_app.report.plots.dependences import build_dependence_plots
+from robocov_app.report.results.loading import load_result
+from robocov_app.report.tables.controllers import build_controllers_table
 from robocov_app.sweep.gains import build_gains
 from robocov_app.sweep.sampling import Range, Sampling
 from robocov_app.sweep.study_file import read_study
@@ -131,24 +131,25 @@ def test_tables_hold_words(swept_folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_report_tells_words(swept_folder: Path) -> None:
-    result = gathered(swept_folder)
-    assert dependences(result) == {"target": ["rapf"]}
-    plots = list(dependence_plots(result, "k"))
+    result = load_result(swept_folder)
+    assert find_varying_gains(result) == {"target": ["rapf"]}
+    plots = build_dependence_plots(result, "k")
     assert [plot.title for plot in plots] == ["target"]
     assert "medians at centroid:" in plots[0].svg and "median:" in plots[0].svg
     assert (
-        gain_text([("target", "median"), ("height", 0.5)], {"height": "m"}) == "target median, height 0.5 m"
+        format_gains([("target", "median"), ("height", 0.5)], {"height": "m"})
+        == "target median, height 0.5 m"
     )
 
 
 def test_values_of_words_are_told_where_they_are_many() -> None:
     runs = [
-        entry(gains=(("target", word), ("k", 0.1 * k)))
+        build_run(gains=(("target", word), ("k", 0.1 * k)))
         for k in range(1, 8)
         for word in ("centroid", "median")
     ]
-    result = result_of(runs)
-    (row,) = controllers_table(result).rows
+    result = build_result(runs)
+    (row,) = build_controllers_table(result).rows
     assert row[2] == "target centroid or median, k 0.1 to 0.7"
 
 

@@ -20,9 +20,9 @@ from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve
 from robocov_app.look.theme import LIGHT
 from robocov_app.report import replay
 from robocov_app.report.document import load_template
-from robocov_app.report.plots import Plot
+from robocov_app.report.plots.plot import PagePlot
 from robocov_app.report.svg import inline_svg
-from robocov_app.report.tables import Table
+from robocov_app.report.tables.table import PageTable
 from robocov_app.report.theme_css import build_theme_rules
 
 
@@ -130,7 +130,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         version=__version__,
         style=build_theme_rules(":root") + replay.read_asset("report.css"),
         marks=MARKER_PATHS,
-        looks=entries.styles,
+        styles=entries.styles,
         overview=_build_overview(labels, tracks),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=ratings.NOTES,
@@ -146,7 +146,7 @@ def _sort_by_gap(rating: Rating) -> tuple[bool, float]:
     return bool(np.isnan(gap)), gap
 
 
-def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> Table:
+def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
     """Build the table of median gaps on all tracks, sorted by the mean rank."""
     gaps: dict[tuple[str, str], float] = {}
     ranks: dict[str, list[int]] = {}
@@ -160,7 +160,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
         cells = [format_number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks]
         rows.append((label, *cells))
     headings = [suite.format_heading(name) for name in tracks]
-    return Table("Median gap to the best placement known, %", ("Controller", *headings), rows)
+    return PageTable("Median gap to the best placement known, %", ("Controller", *headings), rows)
 
 
 def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
@@ -171,8 +171,8 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
         "name": name,
         "title": suite.format_heading(name),
         "summary": _summarize_track(name, track_ratings),
-        "table": Table("Ratings", ratings.HEAD, rows, frozenset({1})),
-        "families": Table("Median gap by families of maps, %", family_head, family_rows),
+        "table": PageTable("Ratings", ratings.HEAD, rows, frozenset({1})),
+        "families": PageTable("Median gap by families of maps, %", family_head, family_rows),
         "plots": _build_plots(name, track_ratings, entries),
     }
 
@@ -186,7 +186,7 @@ def _summarize_track(name: str, track_ratings: Sequence[Rating]) -> str:
     return f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries."
 
 
-def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[Plot]:
+def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
     """Build the plots of a track: the gap against each quantity that differs between controllers."""
     plots = []
     for key, quantity in QUANTITIES.items():
@@ -208,7 +208,7 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         description = f"Median gap against {quantity.axis_label}. {'; '.join(texts)}."
         figure = draw_pareto_figure(points, quantity.axis_label)
         svg = inline_svg(figure, f"{name}-{key}", description)
-        plots.append(Plot(f"Gap and {quantity.title}", svg))
+        plots.append(PagePlot(f"Gap and {quantity.title}", svg))
     return plots
 
 
@@ -339,7 +339,7 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     return front
 
 
-def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Table:
+def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
     rows = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]
@@ -350,4 +350,4 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
         versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
         rows.append((label, entry["controller"], source, gains or ratings.NO_VALUE, versions))
     head = ("Controller", "Name", "Code", "Gains", "Made with")
-    return Table("Entries", head, rows, frozenset({1, 2, 3, 4}))
+    return PageTable("Entries", head, rows, frozenset({1, 2, 3, 4}))

@@ -20,7 +20,7 @@ from robocov_app.terminal.output import echo, print_answer
 from robocov_app.terminal.progress import show_progress
 
 if TYPE_CHECKING:
-    from robocov_app.report.results import Result
+    from robocov_app.report.results.result import ReportedResult
 
 _SESSION_SUFFIX = ".robocov"
 
@@ -84,9 +84,9 @@ def _write_report(
 ) -> None:
     """Gather the results, write the page, and print the answer."""
     from robocov_app.report.document import build_report
-    from robocov_app.report.results import gathered
+    from robocov_app.report.results.loading import load_result
 
-    results = [replace(gathered(folder), part=description) for folder, description in sections]
+    results = [replace(load_result(folder), description=description) for folder, description in sections]
     check_target(target, overwrite=options.overwrite)
     results = _read_runs(options, results)
     _check_damaged_runs(options, results)
@@ -105,17 +105,17 @@ def _write_report(
     print_answer(options, answer, *lines, f"written to {target} ({len(data) / 1e6:.2f} MB)")
 
 
-def _read_runs(options: Arguments, results: Sequence[Result]) -> list[Result]:
+def _read_runs(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:
     """Read all runs, about 10 ms each, and return the results with unreadable runs marked as damaged."""
-    read_results = []
+    readable_results = []
     for result in results:
         is_quiet = options.json or result.kind != "sweep"
-        with show_progress("runs read", len(result.fine), quiet=is_quiet) as update:
-            read_results.append(result.readable(update))
-    return read_results
+        with show_progress("runs read", len(result.completed_runs), quiet=is_quiet) as update:
+            readable_results.append(result.drop_unreadable(update))
+    return readable_results
 
 
-def _check_damaged_runs(options: Arguments, results: Sequence[Result]) -> None:
+def _check_damaged_runs(options: Arguments, results: Sequence[ReportedResult]) -> None:
     """Print a warning for each damaged run.
 
     Raises
@@ -123,8 +123,8 @@ def _check_damaged_runs(options: Arguments, results: Sequence[Result]) -> None:
     InputError
         If all runs are damaged.
     """
-    damaged_runs = [(result.folder, run) for result in results for run in result.damaged]
-    if not any(result.entries for result in results):
+    damaged_runs = [(result.folder, run) for result in results for run in result.damaged_runs]
+    if not any(result.runs for result in results):
         folder, run = damaged_runs[0]
         raise InputError(f"{folder}: {run.folder}: {run.reason}; no run is left to report")
     if options.json:
@@ -133,16 +133,16 @@ def _check_damaged_runs(options: Arguments, results: Sequence[Result]) -> None:
         echo(f"robocov: warning: {folder}: {run.folder} is left out: {run.reason}", to_stderr=True)
 
 
-def _add_references(options: Arguments, results: Sequence[Result]) -> list[Result]:
+def _add_references(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:
     """Return the results with the best placements, from the cache or by a search."""
-    from robocov_app.report.results import with_references
+    from robocov_app.report.results.references import add_references
 
     complete_results = []
     for result in results:
-        settings = {entry.setting for entry in result.fine}
+        settings = {run.setting for run in result.completed_runs}
         is_quiet = options.json or not options.optimum
         with show_progress("searching", len(settings), quiet=is_quiet) as update:
-            complete_results.append(with_references(result, search=options.optimum, tell=update))
+            complete_results.append(add_references(result, search=options.optimum, report_progress=update))
     return complete_results
 
 
@@ -161,28 +161,28 @@ def _name_folder(folder: Path, scratch: Path) -> str:
     return str(folder.relative_to(scratch) if folder.is_relative_to(scratch) else folder)
 
 
-def _count_runs(result: Result, folder: str, shown: int) -> dict[str, Any]:
+def _count_runs(result: ReportedResult, folder: str, shown: int) -> dict[str, Any]:
     """Return the numbers of runs in a section of the page, for programs."""
     return {
         "folder": folder,
         "kind": result.kind,
-        "runs": len(result.fine),
-        "failed": len(result.failed),
-        "damaged": [run._asdict() for run in result.damaged],
-        "missing": result.missing,
+        "runs": len(result.completed_runs),
+        "failed": len(result.failed_runs),
+        "damaged": [run._asdict() for run in result.damaged_runs],
+        "missing": result.missing_count,
         "shown": shown,
     }
 
 
-def _describe_result(result: Result, folder: str) -> str:
+def _describe_result(result: ReportedResult, folder: str) -> str:
     """Return the numbers of runs in a section of the page as text."""
-    texts = [f"{folder}: {result.kind} of {format_count(len(result.fine), 'run')}"]
-    if result.failed:
-        texts.append(f"{len(result.failed)} failed")
-    if result.damaged:
-        texts.append(f"{len(result.damaged)} cannot be read")
-    if result.missing:
-        texts.append(f"{result.missing} of {result.wanted} missing")
+    texts = [f"{folder}: {result.kind} of {format_count(len(result.completed_runs), 'run')}"]
+    if result.failed_runs:
+        texts.append(f"{len(result.failed_runs)} failed")
+    if result.damaged_runs:
+        texts.append(f"{len(result.damaged_runs)} cannot be read")
+    if result.missing_count:
+        texts.append(f"{result.missing_count} of {result.expected_count} missing")
     return ", ".join(texts)
 
 

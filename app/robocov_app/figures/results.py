@@ -33,7 +33,7 @@ _BESIDE = 13.0  # points between a row's name and the axis, where its mark stand
 _HALF = 0.27  # half of the height of a box, in rows
 # where an axis of ratios may have its marks; and beyond, powers of ten
 _RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0)
-MOST_LEVELS = 15  # different values of a gain up to which medians are drawn; more are a sample of a range
+MAX_LEVELS = 15  # different values of a gain up to which medians are drawn; more are a sample of a range
 MOST_LETTERS = 28  # of a name on an axis or in a legend
 MOST_RUNS = 600  # points that are drawn of a controller over a gain; of more, every so many-th
 _WIDE = 8.0  # an axis is logarithmic when its highest value is so many times its lowest
@@ -71,7 +71,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
     page = Page(size, LIGHT, 1.0)
     curves, around = [], []
     for name, style, time, values in bands:
-        low, middle, high = quartiles(values)
+        low, middle, high = compute_quartiles(values)
         around.append((low, high) if len(values) > 1 else None)
 
         def width_of(name: str, time: Array = time, middle: Array = middle) -> float:
@@ -121,7 +121,7 @@ def plot_final_costs(
 
 
 @plain_style()
-def plot_paired(pairs: Sequence[Pairs], label: str, width: int, scale: float, theme: Theme = LIGHT) -> Figure:
+def plot_pairs(pairs: Sequence[Pairs], label: str, width: int, scale: float, theme: Theme = LIGHT) -> Figure:
     """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis."""
     places, _, total = laid_rows([("", len(pairs))])
     axes, names = rows_page(total, [each.label for each in pairs], theme, width, scale)
@@ -141,7 +141,7 @@ def plot_paired(pairs: Sequence[Pairs], label: str, width: int, scale: float, th
     return figure_of(axes)
 
 
-def quartiles(values: Array) -> Array:
+def compute_quartiles(values: Array) -> Array:
     """Return the quartiles and the median between, (3, T), over finite rows of (m, T); nan for none."""
     kept = np.where(np.isfinite(values), values, np.nan)
     result = np.full((3, values.shape[1]), np.nan)
@@ -352,7 +352,7 @@ def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined
     dots: Any = {"color": color, "markeredgewidth": 0.0, "linestyle": "none"}
     axes.plot(where[::step], each.values[::step], style.mark, markersize=3.6, alpha=0.5, **dots)
     levels = np.unique(where)
-    if len(levels) > MOST_LEVELS:
+    if len(levels) > MAX_LEVELS:
         axes.plot([], [], style.mark, markersize=5.0, label=label, **dots)
         return
     medians = np.array([np.median(each.values[where == level]) for level in levels])

@@ -1,7 +1,8 @@
-"""Reports: results as one page of HTML that needs nothing else, neither network nor other files."""
+"""A report: results as one HTML page that needs neither a network nor other files."""
 
 import base64
 import hashlib
+import math
 import re
 from collections.abc import Sequence
 from functools import cache
@@ -15,12 +16,29 @@ from robocov.text import escape_controls
 from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS
 from robocov_app.look.curve_styles import MARKER_PATHS
 from robocov_app.look.labels import shorten_word
-from robocov_app.report import facts, plots, replay, tables
-from robocov_app.report import groups as grouped
+from robocov_app.report import facts, findings, replay
+from robocov_app.report.analysis.comparisons import NEGLIGIBLE_DIFFERENCE, compare_groups
+from robocov_app.report.analysis.groups import (
+    choose_group_styles,
+    label_runs,
+    list_settings,
+    list_variants,
+)
+from robocov_app.report.analysis.selection import MAX_SHOWN_RUNS, select_runs
+from robocov_app.report.analysis.tuning import choose_compared_groups
 from robocov_app.report.descriptions import list_lifetimes
 from robocov_app.report.embedding import MAX_BYTES, ReplayRun
 from robocov_app.report.pictures import draw_map, draw_run, has_path
-from robocov_app.report.results import Entry, Result
+from robocov_app.report.plots.costs import build_cost_plots, build_final_cost_plots
+from robocov_app.report.plots.dependences import build_dependence_plots
+from robocov_app.report.plots.metrics import build_metric_plots
+from robocov_app.report.plots.pairs import build_pair_plots
+from robocov_app.report.plots.plot import MAX_PANELS, GroupStyles
+from robocov_app.report.results.result import ReportedResult, ReportedRun
+from robocov_app.report.tables.controllers import build_controllers_table, build_gain_sets_table
+from robocov_app.report.tables.failures import build_failures_table
+from robocov_app.report.tables.pairs import build_map_pairs_tables, build_pairs_table
+from robocov_app.report.tables.summaries import build_runs_table, build_summary_tables
 from robocov_app.report.theme_css import build_theme_rules
 
 MAX_MAPS = 12
@@ -42,12 +60,14 @@ class Report(NamedTuple):
     shown: tuple[int, ...]
 
 
-def build_report(results: Sequence[Result], *, title: str | None = None, theme: str = "auto") -> Report:
+def build_report(
+    results: Sequence[ReportedResult], *, title: str | None = None, theme: str = "auto"
+) -> Report:
     """Build a page with a section for each result. The same results give the same page.
 
     Parameters
     ----------
-    results : sequence of Result
+    results : sequence of ReportedResult
     title : str, optional
         By default, what was run.
     theme : str
@@ -78,61 +98,77 @@ def build_report(results: Sequence[Result], *, title: str | None = None, theme: 
     return Report(escape_controls(html), tuple(section["shown"] for section in sections))
 
 
-def _build_section(result: Result, key: str, max_bytes: int) -> dict[str, Any]:
-    """Build what the template shows of a result; `key` starts the ids of the section."""
-    styles = grouped.styles(result)
-    compared, chosen_gains = grouped.compared_groups(result)
-    comparisons = grouped.comparisons(compared)
-    choice = grouped.chosen(result, grouped.MOST_RUNS, replay.MAX_PANES)
-    runs = _build_replay_runs(result, choice.entries)
+def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str, Any]:
+    """Build the variables of a result's section in the template; `key` starts the ids of the section."""
+    styles = choose_group_styles(result)
+    selection = select_runs(result, MAX_SHOWN_RUNS, replay.MAX_PANES)
+    runs = _build_replay_runs(result, selection.runs)
+    thumbnails = [_build_thumbnail(*pair) for pair in zip(runs, selection.runs, strict=True)]
     return {
         "key": key,
-        "result": result,
-        "looks": styles,
-        "title": facts.title_of(result),
-        "lede": facts.lede(result, comparisons),
-        "gaps": facts.gaps(result),
-        "settings": len(grouped.settings(result)),
-        "failures": tables.failures_table(result),
-        "summaries": tables.summary_tables(result),
-        "costs": list(plots.cost_plots(result, styles, f"{key}c")),
-        "medians": any(len(group.entries) > 1 for group in grouped.variants(result)),
-        "measures": plots.measure_plots(result, runs, styles, f"{key}m"),
-        "finals": list(plots.final_plots(result, styles, f"{key}f")),
-        "in_pairs": result.kind == "sweep" and any(comparison.pairs > 1 for comparison in comparisons),
-        "pairs": tables.pairs_table(comparisons) if comparisons else None,
-        "pairs_plots": list(plots.paired_plots(comparisons, styles, f"{key}p")),
-        "map_pairs": tables.map_pairs_tables(comparisons),
-        "compared": comparisons,
-        "chosen_gains": chosen_gains,
-        "dependences": list(plots.dependence_plots(result, f"{key}d")),
-        "choice": choice.words if len(runs) > 1 else "",
-        "sparse": any(not has_path(run.record) for run in runs),
-        "moving": any(run.record.environment.has_moving_obstacles for run in runs),
-        "changing": any(_has_failures(run) for run in runs),
-        "thumbnails": [_build_thumbnail(*run) for run in zip(runs, choice.entries, strict=True)],
-        "replay": replay.build_replay_part(runs, choice.panes, max_bytes) if runs else "",
+        "styles": styles,
+        "title": facts.format_title(result),
+        "maps": result.maps,
+        "facts": facts.list_facts(result),
+        "gain_meanings": facts.list_gain_meanings(result),
+        "densities": facts.format_densities(result),
+        "missing_runs": findings.list_missing_runs(result),
+        "problems": findings.list_problems(result),
+        "settings": len(list_settings(result)),
+        "controllers": build_controllers_table(result),
+        "gain_sets": build_gain_sets_table(result),
+        "summaries": build_summary_tables(result),
+        "every_run": build_runs_table(result),
+        "failures": build_failures_table(result),
+        "costs": build_cost_plots(result, styles, f"{key}c"),
+        "has_medians": any(len(group.runs) > 1 for group in list_variants(result)),
+        "metrics": build_metric_plots(result, runs, styles, f"{key}m"),
+        "finals": build_final_cost_plots(result, styles, f"{key}f"),
+        **_build_comparison_variables(result, styles, key),
+        "dependences": build_dependence_plots(result, f"{key}d"),
+        "selection_note": selection.note if len(runs) > 1 else "",
+        "has_unknown_paths": any(not has_path(run.record) for run in runs),
+        "has_moving_obstacles": any(run.record.environment.has_moving_obstacles for run in runs),
+        "has_failed_robots": any(_has_failures(run) for run in runs),
+        "thumbnails": thumbnails,
+        "replay": replay.build_replay_part(runs, selection.panes, max_bytes) if runs else "",
         "shown": len(runs),
     }
 
 
-def _build_replay_runs(result: Result, entries: Sequence[Entry]) -> list[ReplayRun]:
-    """Return runs of a result with their titles and styles."""
-    labels = grouped.labels(result)
-    styles = grouped.styles(result)
-    runs = []
-    for entry in entries:
-        label = labels[entry]
-        run = ReplayRun(
-            record=result.record(entry),
-            history=result.history(entry),
-            title=facts.run_title(result, entry, label),
-            facts=facts.run_facts(result, entry),
+def _build_comparison_variables(result: ReportedResult, styles: GroupStyles, key: str) -> dict[str, Any]:
+    """Build the variables about comparisons in pairs, and the findings, which quote them."""
+    compared_groups, tuning_note = choose_compared_groups(result)
+    comparisons = compare_groups(compared_groups)
+    has_pairs = any(comparison.pair_count > 1 for comparison in comparisons)
+    return {
+        "findings": findings.list_findings(result, comparisons),
+        "are_findings_in_pairs": result.kind == "sweep" and has_pairs,
+        "comparisons": comparisons,
+        "tuning_note": tuning_note,
+        "pairs": build_pairs_table(comparisons) if comparisons else None,
+        "pair_plots": build_pair_plots(comparisons, styles, f"{key}p"),
+        "map_pairs": build_map_pairs_tables(comparisons),
+    }
+
+
+def _build_replay_runs(result: ReportedResult, runs: Sequence[ReportedRun]) -> list[ReplayRun]:
+    """Return runs of a result with their records, titles and styles."""
+    labels = label_runs(result)
+    styles = choose_group_styles(result)
+    replay_runs = []
+    for run in runs:
+        label = labels[run]
+        replay_run = ReplayRun(
+            record=result.read_record(run),
+            history=result.read_history(run),
+            title=facts.format_run_title(result, run, label),
+            facts=facts.format_run_facts(result, run),
             label=label,
             style=styles[label],
         )
-        runs.append(run)
-    return runs
+        replay_runs.append(replay_run)
+    return replay_runs
 
 
 def _has_failures(run: ReplayRun) -> bool:
@@ -142,13 +178,13 @@ def _has_failures(run: ReplayRun) -> bool:
     return any(failure is not None for _, failure in list_lifetimes(run.record))
 
 
-def _build_thumbnail(run: ReplayRun, entry: Entry) -> dict[str, Any]:
-    """Build what the template shows of a small picture of a run."""
+def _build_thumbnail(replay_run: ReplayRun, run: ReportedRun) -> dict[str, Any]:
+    """Build the variables of a small picture of a run in the template."""
     return {
-        "run": run,
-        "rest": run.title.removeprefix(run.label).removeprefix(" · "),
-        "picture": draw_run(run.record, run.history, is_hidden=True),
-        "final": f"{entry.final:.3f} m" if entry.final == entry.final else "",
+        "run": replay_run,
+        "subtitle": replay_run.title.removeprefix(replay_run.label).removeprefix(" · "),
+        "picture": draw_run(replay_run.record, replay_run.history, is_hidden=True),
+        "final": "" if math.isnan(run.final_distance) else f"{run.final_distance:.3f} m",
     }
 
 
@@ -164,12 +200,10 @@ def load_template(name: str) -> Template:
     )
     environment.filters["short"] = _shorten_words
     environment.globals |= {
-        "most_maps": MAX_MAPS,
-        "most_panels": plots.MOST_PANELS,
-        "few_maps": MIN_BOOTSTRAP_MAPS,
-        "negligible": grouped.NEGLIGIBLE,
-        "facts": facts,
-        "tables": tables,
+        "max_maps": MAX_MAPS,
+        "max_panels": MAX_PANELS,
+        "min_bootstrap_maps": MIN_BOOTSTRAP_MAPS,
+        "negligible_difference": NEGLIGIBLE_DIFFERENCE,
         "draw_map": draw_map,
     }
     return environment.get_template(name)

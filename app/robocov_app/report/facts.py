@@ -1,186 +1,196 @@
-"""Facts of a result in words: what was run, what came of it, what went wrong."""
+"""What was run, in words: titles and facts of results and of their runs."""
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from robocov.errors import format_count
 from robocov_app.render.density import density_label
-from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, labels, setting_label
-from robocov_app.report.results import Entry, Result, printable
+from robocov_app.report.analysis.groups import format_gains, format_setting
+from robocov_app.report.results.result import ReportedResult, ReportedRun, replace_unprintable
 from robocov_app.sweep.parameters import UNITS, format_parameter
 
+_MAX_LISTED_NAMES = 4
+_MAX_LISTED_SEEDS = 12
 
-def title_of(result: Result) -> str:
+
+def format_title(result: ReportedResult) -> str:
+    """Return the title of a result: its controllers and maps, or the name of the sweep."""
     if result.kind == "sweep":
-        return f"Sweep {printable(result.folder.resolve().name)}"
-    controllers = list(dict.fromkeys(entry.label for entry in result.entries))
-    title = f"{_listed(controllers)} on {_listed(list(result.maps))}"
-    return f"{title} · {result.part}" if result.part else title
+        return f"Sweep {replace_unprintable(result.folder.resolve().name)}"
+    controllers = list(dict.fromkeys(run.label for run in result.runs))
+    title = f"{_list_names(controllers)} on {_list_names(list(result.maps))}"
+    return f"{title} · {result.description}" if result.description else title
 
 
-def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
-    fine = [entry for entry in result.fine if np.isfinite(entry.final)]
-    if not fine:
-        return ["No run has a result."]
-    if result.kind == "sweep":
-        pairs = [each for each in comparisons if each.pairs > 1]
-        words = [each.headline() for each in pairs[:MOST_SAID]]
-        if len(pairs) > MOST_SAID:
-            words.append(f"{format_count(len(pairs) - MOST_SAID, 'more comparison')} below.")
-        median = np.median([entry.final for entry in fine])
-        return words or [f"{format_count(len(fine), 'run')}, median final distance {median:.3f} m."]
-    if len(fine) == 1:
-        (entry,) = fine
-        at, gap = entry.figures.get("settled_at_s"), result.gap(entry)
-        rest = "not settled by the end" if at is None else f"settled after {at:.1f} s"
-        above = f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
-        return [f"At the end the nearest robot is {entry.final:.3f} m away on average{above}; {rest}."]
-    lowest, names = min(entry.final for entry in fine), labels(result)
-    parts = []
-    for entry in sorted(fine, key=lambda each: each.final):
-        above = f" (+{100 * (entry.final / lowest - 1):.0f} %)" if entry.final > lowest > 0 else ""
-        parts.append(f"{names[entry]} {entry.final:.3f} m{above}")
-    weighed = ", weighed by φ" if weighed_text(result) else ""
-    return [f"Final mean distance to the nearest robot{weighed}: {', '.join(parts)}."]
+def _list_names(names: Sequence[str]) -> str:
+    """Return the first names as text, and how many more there are."""
+    text = ", ".join(names[:_MAX_LISTED_NAMES])
+    if len(names) > _MAX_LISTED_NAMES:
+        text += f" and {len(names) - _MAX_LISTED_NAMES} more"
+    return text
 
 
-def facts(result: Result) -> list[tuple[str, str]]:
-    starts = dict.fromkeys(entry.start for entry in result.entries)
-    sizes = sorted({entry.robots for entry in result.entries})
-    done = len(result.fine)
-    runs = [str(done) if done == result.wanted else f"{done} done"]
-    runs += [f"{len(result.failed)} failed"] * bool(result.failed)
-    runs += [f"{len(result.damaged)} unreadable"] * bool(result.damaged)
-    runs += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
-    seeds = sorted({entry.seed for entry in result.entries if entry.seed is not None})
-    drawn = ", ".join(map(str, seeds[:12])) + (f", … ({len(seeds)})" if len(seeds) > 12 else "")
-    if len(seeds) > 2 and seeds[-1] - seeds[0] == len(seeds) - 1:
-        drawn = f"{seeds[0]} to {seeds[-1]}"
-    team = result.facts.get("team")
-    parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
-    for name, _ in result.entries[0].team if result.entries else ():
-        values = dict.fromkeys(format_parameter(name, dict(entry.team)[name]) for entry in result.entries)
-        parts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
-    versions = result.facts.get("versions")
-    versions = versions if isinstance(versions, dict) else {}
+def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
+    """List what was run.
 
-    def known(form: str, name: str, factor: int = 1) -> str:
-        value = result.facts.get(name)
-        return "" if value is None else form.format(factor * value)
+    Parameters
+    ----------
+    result : ReportedResult
 
-    rows = [
-        ("Runs", ", ".join(runs)),
+    Returns
+    -------
+    list of (str, str)
+        Terms with their texts, such as ``("Duration", "60 s")``. Facts that are not known are left out.
+    """
+    starts = dict.fromkeys(run.start for run in result.runs)
+    start_names = ["given positions" if start is None else start for start in starts]
+    sizes = sorted({run.robots for run in result.runs})
+    facts = [
+        ("Runs", _format_run_counts(result)),
         ("Maps", ", ".join(result.maps)),
-        ("Weighed by", weighed_text(result)),
+        ("Weighed by", format_densities(result)),
         ("Robots", ", ".join(map(str, sizes))),
-        ("Team", ", ".join(filter(None, parts))),
-        ("Starts", ", ".join("given positions" if start is None else start for start in starts)),
-        ("Seeds", drawn),
-        ("Duration", known("{:.6g} s", "duration_s")),
-        ("Control period", known("{:.4g} ms", "dt_s", 1000)),
-        ("Cost evaluated on", known("a lattice of {0} × {0} sites", "lattice")),
-        ("Versions", ", ".join(f"{name} {number}" for name, number in versions.items())),
+        ("Team", _format_team(result)),
+        ("Starts", ", ".join(start_names)),
+        ("Seeds", _format_seeds(result)),
     ]
-    return [(term, text) for term, text in rows if text]
+    duration = result.facts.get("duration_s")
+    if duration is not None:
+        facts.append(("Duration", f"{duration:.6g} s"))
+    period = result.facts.get("dt_s")
+    if period is not None:
+        facts.append(("Control period", f"{1000 * period:.4g} ms"))
+    lattice = result.facts.get("lattice")
+    if lattice is not None:
+        facts.append(("Cost evaluated on", f"a lattice of {lattice} × {lattice} sites"))
+    versions = result.facts.get("versions")
+    if isinstance(versions, dict):
+        facts.append(("Versions", ", ".join(f"{name} {number}" for name, number in versions.items())))
+    return [(term, text) for term, text in facts if text]
 
 
-def meanings(result: Result) -> list[tuple[str, str]]:
-    used = {name for entry in result.entries for name, _ in entry.gains}
-    return [(name, text) for name, text in result.meanings.items() if name in used and text]
+def _format_run_counts(result: ReportedResult) -> str:
+    """Return how many runs are done, failed, unreadable and missing."""
+    done = len(result.completed_runs)
+    counts = [str(done) if done == result.expected_count else f"{done} done"]
+    if result.failed_runs:
+        counts.append(f"{len(result.failed_runs)} failed")
+    if result.damaged_runs:
+        counts.append(f"{len(result.damaged_runs)} unreadable")
+    if result.missing_count:
+        counts.append(f"{result.missing_count} of {result.expected_count} missing")
+    return ", ".join(counts)
 
 
-def weighed_text(result: Result) -> str:
-    """Return by which densities the places of which maps count, empty where all places count the same."""
-    words = {name: density_label(environment) for name, environment in result.maps.items()}
-    return "; ".join(each if len(words) == 1 else f"{name}: {each}" for name, each in words.items() if each)
+def _format_seeds(result: ReportedResult) -> str:
+    """Return the seeds as a range if they follow each other, otherwise as a list."""
+    seeds = sorted({run.seed for run in result.runs if run.seed is not None})
+    if len(seeds) > 2 and seeds[-1] - seeds[0] == len(seeds) - 1:
+        return f"{seeds[0]} to {seeds[-1]}"
+    text = ", ".join(map(str, seeds[:_MAX_LISTED_SEEDS]))
+    if len(seeds) > _MAX_LISTED_SEEDS:
+        text += f", … ({len(seeds)})"
+    return text
 
 
-def gaps(result: Result) -> list[str]:
-    words = []
-    if result.failed:
-        total = Counter(entry.label for entry in result.entries)
-        failed = Counter(entry.label for entry in result.failed)
-        whose = ", ".join(f"{label} {count} of {total[label]}" for label, count in failed.most_common())
-        why = _firsts([entry.error or "" for entry in result.failed])
-        words.append(
-            f"{len(result.failed)} of {format_count(len(result.entries), 'run')} failed ({whose}): {why}"
-        )
-    if result.damaged:
-        reasons = [f"{each.folder} ({each.reason})" for each in result.damaged]
-        be = "is" if len(reasons) == 1 else "are"
-        words.append(
-            f"{format_count(len(reasons), 'run')} cannot be read and {be} left out: {_firsts(reasons)}"
-        )
-    if result.missing:
-        verb = "is" if result.missing == 1 else "are"
-        words.append(
-            f"Not finished: {result.missing} of {format_count(result.wanted, 'run')} {verb} missing."
-        )
-    return words
+def _format_team(result: ReportedResult) -> str:
+    """Return the parameters of the team: those of all runs, then those with several values."""
+    texts = []
+    team = result.facts.get("team")
+    if isinstance(team, dict):
+        texts += [_format_team_parameter(str(key), value) for key, value in team.items()]
+    varying_parameters = result.runs[0].team if result.runs else ()
+    for name, _ in varying_parameters:
+        values = dict.fromkeys(format_parameter(name, dict(run.team)[name]) for run in result.runs)
+        texts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
+    return ", ".join(text for text in texts if text)
 
 
-def _firsts(texts: Sequence[str]) -> str:
-    different = list(dict.fromkeys(texts))
-    more = f"; and {len(different) - 3} more" if len(different) > 3 else ""
-    return f"{'; '.join(different[:3])}{more}."
+def _format_team_parameter(key: str, value: Any) -> str:
+    """Return a parameter of a team as text; empty if it is unknown.
 
-
-def troubles(result: Result) -> list[str]:
-    fine = result.fine
-    moving = [e.has("mean_distance_m") and not e.has("settled_at_s") for e in fine]
-    found = {
-        "a robot touched a wall or another one": [(e.figures.get("contacts") or 0) > 0 for e in fine],
-        "a robot was stuck at the end": [(e.figures.get("stuck_robots") or 0) > 0 for e in fine],
-        "the team had not settled by the end": moving,
-    }
-    if len(fine) == 1:
-        return [f"{what[0].upper()}{what[1:]}." for what, (here,) in found.items() if here]
-    return [f"In {sum(where)} of {len(fine)} runs {what}." for what, where in found.items() if any(where)]
-
-
-def run_title(result: Result, entry: Entry, label: str) -> str:
-    parts = [label]
-    if len({each.setting for each in result.entries}) > 1 or result.kind == "run":
-        parts.append(setting_label(result, entry.setting))
-    if entry.start and len({(each.map, each.start) for each in result.entries}) > len(result.maps):
-        parts.append(entry.start)
-    if entry.seed is not None and len({each.seed for each in result.entries}) > 1:
-        parts.append(f"seed\u00a0{entry.seed}")
-    return " · ".join(parts)
-
-
-def run_facts(result: Result, entry: Entry) -> str:
-    figures = entry.figures
-    words = [f"Gains: {gain_text(entry.gains, result.units)}"] if entry.gains else []
-    if entry.has("mean_time_s"):
-        words.append(f"mean time {figures['mean_time_s']:.3f} s")
-    at = figures.get("settled_at_s")
-    words.append("not settled" if at is None else f"settled at {at:.1f} s")
-    if (contacts := figures.get("contacts")) is not None:
-        words.append(format_count(int(contacts), "contact"))
-    if (path := figures.get("path_length_m")) is not None:
-        words.append(f"{path:.2f} m of path per robot")
-    return f"{'; '.join(words)}."
-
-
-def _listed(names: Sequence[str], most: int = 4) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
-
-
-def _parameter(key: str, value: Any) -> str:
-    """Return a parameter of a team as words: of a sweep's study, or of a run with the unit in the name."""
+    Parameters
+    ----------
+    key : str
+        Name of the parameter, which in the file of a run is followed by its unit.
+    value : str, float, None or list of these
+        A value for all robots, or one for each.
+    """
     name = next((name for name in UNITS if key == name or key.startswith(f"{name}_")), None)
     if name is None:
         return ""
-    words, unit = name.replace("_", " "), UNITS[name]
-    values = value if isinstance(value, list) else [value]
+    label = name.replace("_", " ")
     if isinstance(value, str):
-        return f"{words} {format_parameter(name, value)}"
-    if values and all(isinstance(each, int | float) for each in values):
-        low, high = min(values), max(values)
-        return f"{words} {low:.4g} {unit}" if low == high else f"{words} {low:.4g} to {high:.4g} {unit}"
-    return f"{words} without limit" if values and all(each is None for each in values) else ""
+        return f"{label} {format_parameter(name, value)}"
+    values = value if isinstance(value, list) else [value]
+    if not values:
+        return ""
+    if all(item is None for item in values):
+        return f"{label} without limit"
+    if not all(isinstance(item, int | float) for item in values):
+        return ""
+    low, high = min(values), max(values)
+    unit = UNITS[name]
+    if low == high:
+        return f"{label} {low:.4g} {unit}"
+    return f"{label} {low:.4g} to {high:.4g} {unit}"
+
+
+def list_gain_meanings(result: ReportedResult) -> list[tuple[str, str]]:
+    """List the gains of the runs with their meanings, as far as these are known."""
+    used_names = {name for run in result.runs for name, _ in run.gains}
+    meanings = result.gain_meanings.items()
+    return [(name, meaning) for name, meaning in meanings if name in used_names and meaning]
+
+
+def format_densities(result: ReportedResult) -> str:
+    """Return the densities by which locations on the maps are weighted; empty if there are none."""
+    labels = {name: density_label(environment) for name, environment in result.maps.items()}
+    if len(labels) == 1:
+        return "".join(labels.values())
+    return "; ".join(f"{name}: {label}" for name, label in labels.items() if label)
+
+
+def format_run_title(result: ReportedResult, run: ReportedRun, label: str) -> str:
+    """Return the title of a run: its label, and what distinguishes it from other runs.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    run : ReportedRun
+    label : str
+        Label of its variant.
+
+    Returns
+    -------
+    str
+    """
+    texts = [label]
+    has_several_settings = len({other.setting for other in result.runs}) > 1
+    if has_several_settings or result.kind == "run":
+        texts.append(format_setting(result, run.setting))
+    has_several_starts = len({(other.map, other.start) for other in result.runs}) > len(result.maps)
+    if run.start and has_several_starts:
+        texts.append(run.start)
+    has_several_seeds = len({other.seed for other in result.runs}) > 1
+    if run.seed is not None and has_several_seeds:
+        texts.append(f"seed\u00a0{run.seed}")
+    return " · ".join(texts)
+
+
+def format_run_facts(result: ReportedResult, run: ReportedRun) -> str:
+    """Return the gains and the most important figures of a run as a sentence."""
+    texts = []
+    if run.gains:
+        texts.append(f"Gains: {format_gains(run.gains, result.gain_units)}")
+    if run.has_figure("mean_time_s"):
+        texts.append(f"mean time {run.figures['mean_time_s']:.3f} s")
+    settled_at = run.figures.get("settled_at_s")
+    texts.append("not settled" if settled_at is None else f"settled at {settled_at:.1f} s")
+    contacts = run.figures.get("contacts")
+    if contacts is not None:
+        texts.append(format_count(int(contacts), "contact"))
+    path_length = run.figures.get("path_length_m")
+    if path_length is not None:
+        texts.append(f"{path_length:.2f} m of path per robot")
+    return f"{'; '.join(texts)}."

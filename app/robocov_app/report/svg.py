@@ -1,4 +1,4 @@
-"""matplotlib's figures as small SVG in a page, text as text: colors of the light theme become variables."""
+"""matplotlib figures as small SVG in a page: texts stay texts, and colors follow the theme of the page."""
 
 import io
 import re
@@ -17,117 +17,196 @@ from robocov_app.report.theme_css import list_css_colors
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
 _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": None, "Type": None}
-_SPACE = "{http://www.w3.org/2000/svg}"
+_NAMESPACE = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
-_MANY = 8  # so many equal round marks are drawn as one dotted line
-_PLOTTED = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd")
+_COLOR = re.compile(r"#[0-9a-f]{6}")
+_CIRCLE_START = re.compile(r"M0 (\d*\.?\d+)C")
+"""Start of the path of a round mark: its radius, then the first curve."""
+_SHAPES = ("path", "text", "rect", "image")
+_COORDINATES = ("x", "y", "width", "height")
+_PATH_DECIMALS = 2
+_COORDINATE_DECIMALS = 1
+_MIN_DOTS = 8
+"""Number of equal round marks from which they become one dotted line."""
+_PLOT_COLORS = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd")
+"""Names of the colors in plots. If two have the same value, the first name is used."""
 
 
-def inline_svg(figure: Figure, key: str, sentence: str) -> str:
-    """Return a figure in light colors as SVG; ids begin with `key`, `sentence` tells what it shows."""
+def inline_svg(figure: Figure, key: str, description: str) -> str:
+    """Turn a figure into an SVG element.
+
+    Parameters
+    ----------
+    figure : Figure
+        In the colors of the light theme, which become variables of the page.
+    key : str
+        Start of all ids in the element.
+    description : str
+        For readers who cannot see the plot.
+
+    Returns
+    -------
+    str
+    """
     for patch in (figure.patch, *(axes.patch for axes in figure.axes)):
         patch.set_visible(False)
     text = io.StringIO()
     with plain_style(), matplotlib.rc_context(_STYLE):
         figure.savefig(text, format="svg", metadata=_METADATA, dpi=figure.dpi)
     source = fromstring(text.getvalue())
-    box = " ".join(_short(number, 1) for number in source.get("viewBox", "").split())
-    root = Element("svg", {"class": "plot", "viewBox": box, "role": "img", "aria-label": sentence})
+    view_box = [_shorten_number(number, 1) for number in source.get("viewBox", "").split()]
+    attributes = {
+        "class": "plot",
+        "viewBox": " ".join(view_box),
+        "role": "img",
+        "aria-label": description,
+    }
+    root = Element("svg", attributes)
     body = Element("g", {"stroke-linejoin": "round"})
-    copy = _Copy(key)
-    copy.drawn(source, body)
-    root.extend([copy.definitions, body] if len(copy.definitions) else [body])
+    copy = _SmallCopy(key)
+    copy.copy_children(source, body)
+    if len(copy.definitions):
+        root.append(copy.definitions)
+    root.append(body)
     return tostring(root, encoding="unicode", short_empty_elements=True)
 
 
-class _Copy:
-    """A copy of what is drawn, without the groups and ids that nothing needs, and with short names."""
+class _SmallCopy:
+    """Copy of the shapes in an SVG, without groups and ids that are not needed, and with short names.
+
+    Parameters
+    ----------
+    key : str
+        Start of all ids.
+
+    Attributes
+    ----------
+    definitions : Element
+        Shapes that others refer to.
+    """
 
     def __init__(self, key: str) -> None:
         self.definitions = Element("defs")
         self._key = key
         self._names: dict[str, str] = {}
 
-    def drawn(self, source: Element, target: Element) -> None:
-        uses = [child for child in source if child.tag == f"{_SPACE}use"]
-        dots = self._dotted(uses) if len(uses) >= _MANY else None
-        if dots is not None:
-            target.append(dots)
+    def copy_children(self, source: Element, target: Element) -> None:
+        """Copy the shapes in one element into another, in the same order."""
+        uses = [child for child in source if child.tag == f"{_NAMESPACE}use"]
+        dotted_line = self._build_dotted_line(uses) if len(uses) >= _MIN_DOTS else None
+        if dotted_line is not None:
+            target.append(dotted_line)
         for child in source:
-            tag, clip = child.tag.removeprefix(_SPACE), child.get("clip-path")
+            tag = child.tag.removeprefix(_NAMESPACE)
             if tag == "defs":
-                for shape in (each for each in child if "id" in each.attrib):
-                    element = self._element(shape)
-                    element.extend([self._element(part) for part in shape])
-                    element.set("id", self._name(shape.attrib["id"]))
-                    element.attrib.pop("style", None)  # uses have their own
-                    self.definitions.append(element)
+                self._copy_definitions(child)
             elif tag == "g":
-                into = {} if clip is None else {"clip-path": self._renamed(clip)}
-                self.drawn(child, SubElement(target, "g", into) if into else target)
-            elif tag in ("path", "text", "rect", "image") or (tag == "use" and dots is None):
-                target.append(self._element(child))
+                self._copy_group(child, target)
+            elif tag in _SHAPES or (tag == "use" and dotted_line is None):
+                target.append(self._copy_element(child))
 
-    def _name(self, old: str) -> str:
-        return self._names.setdefault(old, f"{self._key}-{len(self._names)}")
+    def _copy_definitions(self, source: Element) -> None:
+        """Copy shapes that others refer to."""
+        for shape in source:
+            if "id" not in shape.attrib:
+                continue
+            element = self._copy_element(shape)
+            element.extend([self._copy_element(child) for child in shape])
+            element.set("id", self._shorten_name(shape.attrib["id"]))
+            # Each use of the shape has its own style.
+            element.attrib.pop("style", None)
+            self.definitions.append(element)
 
-    def _renamed(self, reference: str) -> str:
-        return f"url(#{self._name(reference.removeprefix('url(#').removesuffix(')'))})"
+    def _copy_group(self, source: Element, target: Element) -> None:
+        """Copy the shapes in a group. The group itself is only needed if it clips them."""
+        clip = source.get("clip-path")
+        if clip is not None:
+            target = SubElement(target, "g", {"clip-path": self._shorten_reference(clip)})
+        self.copy_children(source, target)
 
-    def _element(self, source: Element) -> Element:
-        """Return an element with short numbers and the page's colors, without children."""
-        element = Element(source.tag.removeprefix(_SPACE))
-        element.text = source.text if element.tag == "text" else None
+    def _shorten_name(self, name: str) -> str:
+        """Return the short name of an id."""
+        return self._names.setdefault(name, f"{self._key}-{len(self._names)}")
+
+    def _shorten_reference(self, reference: str) -> str:
+        """Return a reference, ``url(#name)``, with the short name."""
+        name = reference.removeprefix("url(#").removesuffix(")")
+        return f"url(#{self._shorten_name(name)})"
+
+    def _copy_element(self, source: Element) -> Element:
+        """Return an element with short numbers and the colors of the page, without its children."""
+        element = Element(source.tag.removeprefix(_NAMESPACE))
+        if element.tag == "text":
+            element.text = source.text
         for name, value in source.attrib.items():
-            if name == "d":  # numbers of two decimals: no user sees the difference
-                words = [_short(word, 2) if _NUMBER.fullmatch(word) else word for word in value.split()]
-                element.set("d", re.sub(r" ?([A-Za-z]) ?", r"\1", " ".join(words)))
+            if name == "d":
+                element.set(name, _shorten_path(value))
             elif name == _LINK:
                 element.set("href", f"#{self._names[value.removeprefix('#')]}")
             elif name == "style":
-                element.set("style", _colored(value))
-            elif name in ("x", "y", "width", "height"):
-                element.set(name, _short(value, 1))
+                element.set(name, _replace_colors(value))
+            elif name in _COORDINATES:
+                element.set(name, _shorten_number(value, _COORDINATE_DECIMALS))
             elif name == "transform" and not value.startswith("rotate(-0 "):
                 element.set(name, value)
         if "clip-path" in source.attrib:
-            element.set("clip-path", self._renamed(source.attrib["clip-path"]))
+            element.set("clip-path", self._shorten_reference(source.attrib["clip-path"]))
         return element
 
-    def _dotted(self, uses: Sequence[Element]) -> Element | None:
-        """Return many equal round marks as one path: dots of a round pen. None where they are not that."""
+    def _build_dotted_line(self, uses: Sequence[Element]) -> Element | None:
+        """Return many equal round marks as one path, the dots of a round pen; None if they are different."""
         first = uses[0]
-        if any(use.get(_LINK) != first.get(_LINK) or use.get("style") != first.get("style") for use in uses):
+        link = first.get(_LINK, "")
+        style = first.get("style", "")
+        if any(use.get(_LINK) != link or use.get("style", "") != style for use in uses):
             return None
-        name = self._names[first.get(_LINK, "").removeprefix("#")]
-        shape = next(each for each in self.definitions if each.get("id") == name)
-        begin = re.match(r"M0 (\d*\.?\d+)C", shape.get("d", ""))
-        if begin is None:
+        name = self._names[link.removeprefix("#")]
+        shape = next(shape for shape in self.definitions if shape.get("id") == name)
+        circle = _CIRCLE_START.match(shape.get("d", ""))
+        if circle is None:
             return None
-        look = dict(part.split(": ") for part in first.get("style", "").split("; "))
-        places = "".join(f"M{_short(use.get('x', '0'), 1)} {_short(use.get('y', '0'), 1)}h0" for use in uses)
-        opacity = look.get("opacity", look.get("fill-opacity", "1"))
-        style = (
-            f"fill: none; stroke: {look['fill']}; stroke-linecap: round; "
-            f"stroke-width: {2 * float(begin[1]):g}; opacity: {opacity}"
+        properties = dict(declaration.split(": ") for declaration in style.split("; "))
+        opacity = properties.get("opacity", properties.get("fill-opacity", "1"))
+        line_style = (
+            f"fill: none; stroke: {properties['fill']}; stroke-linecap: round; "
+            f"stroke-width: {2 * float(circle[1]):g}; opacity: {opacity}"
         )
-        return Element("path", {"d": places, "style": _colored(style)})
+        dots = []
+        for use in uses:
+            x = _shorten_number(use.get("x", "0"), _COORDINATE_DECIMALS)
+            y = _shorten_number(use.get("y", "0"), _COORDINATE_DECIMALS)
+            dots.append(f"M{x} {y}h0")
+        return Element("path", {"d": "".join(dots), "style": _replace_colors(line_style)})
 
 
-def _short(number: str, decimals: int) -> str:
-    return f"{float(number):.{decimals}f}".rstrip("0").rstrip(".") if "." in number else number
+def _shorten_path(path: str) -> str:
+    """Return path data with rounded numbers, and without spaces at letters."""
+    words = []
+    for word in path.split():
+        is_number = _NUMBER.fullmatch(word) is not None
+        words.append(_shorten_number(word, _PATH_DECIMALS) if is_number else word)
+    return re.sub(r" ?([A-Za-z]) ?", r"\1", " ".join(words))
 
 
-def _colored(style: str) -> str:
-    parts = [part for part in style.split("; ") if not part.startswith("font-family:")]
-    text = ";".join(part.replace(": ", ":") for part in parts)
-    return re.sub(r"#[0-9a-f]{6}", lambda match: _variables()[match[0]], text)
+def _shorten_number(number: str, decimals: int) -> str:
+    """Return a number with at most some decimals, without zeros at its end."""
+    if "." not in number:
+        return number
+    return f"{float(number):.{decimals}f}".rstrip("0").rstrip(".")
+
+
+def _replace_colors(style: str) -> str:
+    """Return a style without spaces and fonts, and with variables instead of colors."""
+    declarations = [part for part in style.split("; ") if not part.startswith("font-family:")]
+    text = ";".join(declaration.replace(": ", ":") for declaration in declarations)
+    return _COLOR.sub(lambda match: _map_colors_to_variables()[match[0]], text)
 
 
 @cache
-def _variables() -> dict[str, str]:
-    """Return what stands for each color of the light theme that plots use, its first name."""
+def _map_colors_to_variables() -> dict[str, str]:
+    """Return the CSS variable of each color of the light theme that occurs in plots."""
     colors = list_css_colors(LIGHT)
-    names = [*_PLOTTED, *(name for name in colors if name.startswith(("other-", "heat-")))]
+    names = [*_PLOT_COLORS, *(name for name in colors if name.startswith(("other-", "heat-")))]
+    # The first name of a color comes last, and replaces the others.
     return {format_hex_color(colors[name]): f"var(--rc-{name})" for name in reversed(names)}

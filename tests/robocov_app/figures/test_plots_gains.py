@@ -5,7 +5,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from robocov_app.figures.results import (
-    MOST_LEVELS,
+    MAX_LEVELS,
     MOST_RUNS,
     Dependence,
     plot_gain_grid,
@@ -49,7 +49,7 @@ def test_the_axis_is_logarithmic_where_that_fits(gains, scale) -> None:
 
 
 def test_a_sampled_range_has_points_alone() -> None:
-    gains = np.geomspace(0.01, 10.0, 3 * MOST_LEVELS)
+    gains = np.geomspace(0.01, 10.0, 3 * MAX_LEVELS)
     axes = drawn(gains, np.ones(len(gains)), "k")
     assert not [line for line in axes.lines if line.get_linestyle() not in ("None", "none")]
     assert len(axes.get_xticks()) <= 8

@@ -13,10 +13,10 @@ from robocov_app.figures.results import (
     Band,
     Pairs,
     Sample,
+    compute_quartiles,
     plot_cost_bands,
     plot_final_costs,
-    plot_paired,
-    quartiles,
+    plot_pairs,
 )
 from robocov_app.figures.statistics import bootstrap
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
@@ -56,7 +56,7 @@ def boxes(rows: list[tuple[str, list[Sample]]], width: int = 420) -> Axes:
 
 
 def paired(pairs: list[Pairs]) -> Axes:
-    return plot_paired(pairs, "ratio", 420, 1.0).axes[0]
+    return plot_pairs(pairs, "ratio", 420, 1.0).axes[0]
 
 
 def test_a_band_reaches_from_the_first_quartile_to_the_third() -> None:
@@ -149,7 +149,7 @@ def test_every_value_of_a_sample_is_a_point(width) -> None:
 def test_what_is_not_finite_is_left_out() -> None:
     axes = boxes([("", [Sample("RAPF", style("rapf"), np.array([1.0, np.nan, 3.0]))])])
     assert axes.lines[0].get_xdata().tolist() == [1.0, 3.0]
-    low, middle, high = quartiles(np.array([[1.0, np.nan], [3.0, np.nan], [np.inf, np.nan]]))
+    low, middle, high = compute_quartiles(np.array([[1.0, np.nan], [3.0, np.nan], [np.inf, np.nan]]))
     assert (low[0], middle[0], high[0]) == (1.5, 2.0, 2.5)
     assert np.isnan([low[1], middle[1], high[1]]).all()
 

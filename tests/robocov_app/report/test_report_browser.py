@@ -12,7 +12,7 @@ import pytest
 from drawn_run import ROOMS
 from driven_browser import CHROMIUM, DRIVER, Browser
 from moving_teams import build_moving_record, list_hues
-from reported_results import HOSTILE, entry, falling, walk, watched
+from reported_results import HOSTILE, build_history, build_record, build_recorded_result, build_run
 
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
@@ -24,7 +24,7 @@ from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.report.document import build_report
 from robocov_app.report.embedding import ReplayRun, embed_axis_rules, embed_map, embed_run
 from robocov_app.report.replay import build_replay_html, read_asset
-from robocov_app.report.results import Damaged
+from robocov_app.report.results.result import DamagedRun
 
 pytestmark = [
     pytest.mark.slow,
@@ -34,7 +34,9 @@ pytestmark = [
 
 SECONDS = 6.0
 ENTRIES = [
-    entry(name, seed, base + 0.1 * seed) for seed in (0, 1) for name, base in (("rapf", 1.5), ("rpf", 3.0))
+    build_run(name, seed, base + 0.1 * seed)
+    for seed in (0, 1)
+    for name, base in (("rapf", 1.5), ("rpf", 3.0))
 ]
 
 READABLE = """
@@ -86,7 +88,10 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "report.html"
-    result = replace(watched([*ENTRIES, entry("lloyd", error="it broke")], seconds=SECONDS), wanted=9)
+    result = replace(
+        build_recorded_result([*ENTRIES, build_run("lloyd", error="it broke")], seconds=SECONDS),
+        expected_count=9,
+    )
     path.write_text(build_report([result]).html, encoding="utf-8")
     return path
 
@@ -144,8 +149,8 @@ def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
         "return [...document.querySelectorAll('.pane > canvas')].map((c) => [c.width, c.height])"
     )
     for pane, (name, final) in enumerate((("rapf", 1.5), ("rpf", 3.0))):
-        record = walk(controller=name, seed=0, seconds=SECONDS)
-        history = falling(record, final)
+        record = build_record(controller=name, seed=0, seconds=SECONDS)
+        history = build_history(record, final)
         cost = np.interp(seconds, history.time, history.mean_distance)
         assert float(opened.all(".facts strong")[pane].text.split()[0]) == pytest.approx(cost, abs=2e-3)
         moment = round(seconds * 10)
@@ -356,10 +361,11 @@ def test_who_wants_little_motion_gets_few_pictures(browser, page) -> None:
 
 
 def test_hostile_names_do_nothing(browser, tmp_path) -> None:
-    entries = [replace(entry(HOSTILE, seed, map_name=HOSTILE), label=HOSTILE) for seed in range(2)]
+    entries = [replace(build_run(HOSTILE, seed, map_name=HOSTILE), label=HOSTILE) for seed in range(2)]
     path = tmp_path / "hostile.html"
     path.write_text(
-        build_report([watched(entries, replace(ROOMS, name=HOSTILE), seconds=2.0)]).html, encoding="utf-8"
+        build_report([build_recorded_result(entries, replace(ROOMS, name=HOSTILE), seconds=2.0)]).html,
+        encoding="utf-8",
     )
     browser.open(path)
     browser.find(".add").click()
@@ -369,7 +375,7 @@ def test_hostile_names_do_nothing(browser, tmp_path) -> None:
 
 
 def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
-    runs = [ReplayRun(walk(seed=k, seconds=2.0), None, f"run {k}") for k in range(2)]
+    runs = [ReplayRun(build_record(seed=k, seconds=2.0), None, f"run {k}") for k in range(2)]
     cells = "".join(f"<section>{build_replay_html([run])}</section>" for run in runs)
     path = tmp_path / "notebook.html"
     path.write_text(
@@ -389,7 +395,7 @@ def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
 
 @pytest.mark.parametrize("robots", [1, 2, 5, 40])
 def test_cells_are_voronoi_cells(browser, robots) -> None:
-    record = walk(robots=robots, seed=robots)
+    record = build_record(robots=robots, seed=robots)
     places = record.positions[0]
     if robots == 5:
         places[4] = places[3]  # two in one place have the same cell
@@ -417,9 +423,9 @@ def test_obstacles_are_where_they_are_in_the_run(browser, repeat) -> None:
 
 
 def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_on(browser, tmp_path) -> None:
-    record = replace(walk(), conditions=Conditions(failures=((2, 2.0),), joins=((3, 4.0),)))
+    record = replace(build_record(), conditions=Conditions(failures=((2, 2.0),), joins=((3, 4.0),)))
     page = tmp_path / "replay.html"
-    run = ReplayRun(record, falling(record, 2.0), "a run")
+    run = ReplayRun(record, build_history(record, 2.0), "a run")
     page.write_text(f"<!doctype html><main>{build_replay_html([run])}</main>", encoding="utf-8")
     browser.open(page)
     browser.until(lambda: browser.all(".chart"))
@@ -494,7 +500,7 @@ def test_ticks_are_few_whatever_they_span(browser, low, high, wanted) -> None:
 
 @pytest.mark.parametrize("values", [(2.0, 2.0 + ULP), (2.0, 2.0), (-0.0, 0.0), (1e-3, 1e300), (np.nan, 2.0)])
 def test_no_curve_freezes_the_page(browser, tmp_path, values) -> None:
-    result = watched([entry(), entry("rpf")], seconds=2.0)
+    result = build_recorded_result([build_run(), build_run("rpf")], seconds=2.0)
     for folder, saved in result.loaded.items():
         time = saved.history.time
         distance = np.where(np.arange(len(time)) % 2, *values)
@@ -512,7 +518,8 @@ def test_no_name_is_too_long_for_a_page(browser, tmp_path, width) -> None:
     name = "W" * 300
     runs = [
         replace(
-            entry(own, seed, 2.0, map_name=f"{name}{m}", start=name, gains=((name, 1.0 + seed),)), label=own
+            build_run(own, seed, 2.0, map_name=f"{name}{m}", start=name, gains=((name, 1.0 + seed),)),
+            label=own,
         )
         for own in (f"{name}1", f"{name}2")
         for m in range(2)
@@ -520,9 +527,11 @@ def test_no_name_is_too_long_for_a_page(browser, tmp_path, width) -> None:
     ]
     failed = replace(runs[0], error=f"{name} {name}", figures={}, seed=9)
     result = replace(
-        watched(runs, replace(ROOMS, name=name), seconds=2.0), units={name: name}, meanings={name: name}
+        build_recorded_result(runs, replace(ROOMS, name=name), seconds=2.0),
+        gain_units={name: name},
+        gain_meanings={name: name},
     )
-    result = replace(result, entries=(*result.entries, failed), damaged=(Damaged(name, name),))
+    result = replace(result, runs=(*result.runs, failed), damaged_runs=(DamagedRun(name, name),))
     path = tmp_path / "names.html"
     path.write_text(build_report([result], title=name).html, encoding="utf-8")
     browser.open(path, width, 844)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from called import answer, complaint
 from drawn_run import SQUARE
-from reported_results import saved_comparison, saved_run, walk
+from reported_results import build_record, save_comparison, save_run
 
 from robocov.files.result_folder import create_result, is_report
 from robocov_app.cli import main
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    saved_run(tmp_path / "one", walk(SQUARE, robots=2, seconds=1.0))
+    save_run(tmp_path / "one", build_record(SQUARE, robots=2, seconds=1.0))
     return tmp_path / "one"
 
 
@@ -37,7 +37,7 @@ def test_a_page_stands_in_the_folder_of_the_run(run, capsys) -> None:
 
 
 def test_the_answer_as_json(run, tmp_path, capsys) -> None:
-    saved_comparison(tmp_path / "both")
+    save_comparison(tmp_path / "both")
     out = tmp_path / "page.html"
     said = answer(capsys, "report", str(run), str(tmp_path / "both"), "--out", str(out), "--title", "<Two>")
     assert said["path"] == str(out) and said["bytes"] == out.stat().st_size
@@ -60,7 +60,7 @@ def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
 
 def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run) -> None:
     assert main(["report", str(run)]) == 0
-    saved_run(run / "again", walk(SQUARE, robots=2, seconds=1.0))
+    save_run(run / "again", build_record(SQUARE, robots=2, seconds=1.0))
     (run / "again" / "report.html").write_text("mine")
     for folder, left in ((run, ["again", "run.json"]), (run / "again", ["report.html", "run.json"])):
         with create_result(folder, overwrite=True) as result:
@@ -126,7 +126,7 @@ def test_a_wheel_has_all_that_pages_are_made_of(tmp_path) -> None:
 
 @pytest.mark.slow
 def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
-    saved_comparison(tmp_path / "both")
+    save_comparison(tmp_path / "both")
     content = json.loads((tmp_path / "both/comparison.json").read_text())
     content |= {"folders": ["rapf", "rpf", "lloyd"], "runs": []}
     (tmp_path / "both/comparison.json").write_text(json.dumps(content))
@@ -137,7 +137,7 @@ def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
 
 @pytest.mark.slow
 def test_one_damaged_run_is_named_and_the_report_goes_on(run, tmp_path, capsys) -> None:
-    saved_comparison(tmp_path / "both")
+    save_comparison(tmp_path / "both")
     (tmp_path / "both/rpf/record.npz").write_bytes(b"PK")
     assert main(["report", str(tmp_path / "both")]) == 0
     said = capsys.readouterr()
@@ -177,10 +177,12 @@ def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypa
 
 
 def test_a_dimensionless_gain_has_no_unit(run) -> None:
-    saved_run(
+    save_run(
         run / "atlas",
         replace(
-            walk(SQUARE, robots=2, seconds=1.0), controller="atlas", gains={"threshold": 0.01, "stake": 0.004}
+            build_record(SQUARE, robots=2, seconds=1.0),
+            controller="atlas",
+            gains={"threshold": 0.01, "stake": 0.004},
         ),
     )
     assert main(["report", str(run / "atlas")]) == 0

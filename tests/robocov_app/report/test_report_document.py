@@ -1,4 +1,4 @@
-"""The page as a whole: its parts, its size, and that nothing can go out of it or break it."""
+"""The page as a whole: its sections, its size, and that hostile names cannot break it."""
 
 import hashlib
 import json
@@ -9,7 +9,7 @@ from html import unescape
 
 import pytest
 from drawn_run import HALL, ROOMS
-from reported_results import HOSTILE, Page, entry, result_of, watched
+from reported_results import HOSTILE, Page, build_recorded_result, build_result, build_run
 
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
@@ -17,11 +17,13 @@ from robocov.files.result_folder import is_report
 from robocov.text import escape_controls
 from robocov_app.look.curve_styles import MARKER_PATHS
 from robocov_app.report.document import MAX_WORD_CHARS, build_report
-from robocov_app.report.results import Damaged
+from robocov_app.report.results.result import DamagedRun
 from robocov_app.runs.saved_runs import SavedRun
 
 SWEEP = [
-    entry(name, seed, base + 0.2 * seed + 0.3 * k, gains=(("k_rep", k), ("limit", None if k > 1 else 2.0)))
+    build_run(
+        name, seed, base + 0.2 * seed + 0.3 * k, gains=(("k_rep", k), ("limit", None if k > 1 else 2.0))
+    )
     for seed in range(5)
     for name, base in (("rapf", 1.0), ("rpf", 2.0))
     for k in (0.1, 1.0, 3.0)
@@ -31,10 +33,12 @@ SWEEP = [
 @pytest.fixture(scope="module")
 def html() -> str:
     """A page of a sweep with gains, failures and missing runs."""
-    return build_report([replace(watched([*SWEEP, entry("mine", error=HOSTILE)]), wanted=40)]).html
+    return build_report(
+        [replace(build_recorded_result([*SWEEP, build_run("mine", error=HOSTILE)]), expected_count=40)]
+    ).html
 
 
-def test_it_is_well_formed_and_its_ids_are_unique(html) -> None:
+def test_the_page_is_well_formed_and_its_ids_are_unique(html) -> None:
     page = Page(html)
     ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
     assert len(ids) == len(set(ids))
@@ -45,7 +49,7 @@ def test_it_is_well_formed_and_its_ids_are_unique(html) -> None:
             assert attributes["href"][1:] in ids
 
 
-def test_it_has_its_landmarks_headings_and_a_way_past_the_head(html) -> None:
+def test_the_page_has_landmarks_headings_and_a_skip_link(html) -> None:
     page = Page(html)
     for tag in ("header", "nav", "main", "footer", "h1", "title"):
         assert len(page.all(tag)) == 1, tag
@@ -57,7 +61,7 @@ def test_it_has_its_landmarks_headings_and_a_way_past_the_head(html) -> None:
         assert "aria-label" in section or "aria-labelledby" in section
 
 
-def test_all_that_is_drawn_is_said_in_words(html) -> None:
+def test_all_pictures_and_plots_are_described(html) -> None:
     page = Page(html)
     pictures = page.all("svg")
     assert len(pictures) > 30
@@ -81,7 +85,7 @@ def test_tables_have_captions_and_scopes(html) -> None:
     assert {each.get("scope") for each in page.all("th")} == {"col", "row"}
 
 
-def test_nothing_can_go_out_of_it(html) -> None:
+def test_the_page_needs_no_network(html) -> None:
     assert not re.findall(r"(?:https?:)?//[\w.-]+\.\w|@import|url\((?!#)", unescape(html))
     page = Page(html)
     for _, attributes in page.elements:
@@ -97,15 +101,16 @@ def test_nothing_can_go_out_of_it(html) -> None:
 
 
 def test_hostile_names_stay_names() -> None:
-    entries = [
+    runs = [
         replace(
-            entry(HOSTILE, seed, 2.0 + seed, map_name=HOSTILE, gains=((HOSTILE, 1.0 + seed),)), label=HOSTILE
+            build_run(HOSTILE, seed, 2.0 + seed, map_name=HOSTILE, gains=((HOSTILE, 1.0 + seed),)),
+            label=HOSTILE,
         )
         for seed in range(3)
     ]
-    entries.append(replace(entries[0], error=HOSTILE, figures={}, start=HOSTILE, seed=9))
-    result = watched(entries, replace(ROOMS, name=HOSTILE))
-    result = replace(result, units={HOSTILE: HOSTILE}, meanings={HOSTILE: HOSTILE})
+    runs.append(replace(runs[0], error=HOSTILE, figures={}, start=HOSTILE, seed=9))
+    result = build_recorded_result(runs, replace(ROOMS, name=HOSTILE))
+    result = replace(result, gain_units={HOSTILE: HOSTILE}, gain_meanings={HOSTILE: HOSTILE})
     html = build_report([result], title=HOSTILE).html
     page = Page(html)
     assert not page.all("img")
@@ -121,19 +126,20 @@ def test_hostile_names_stay_names() -> None:
 
 def test_the_same_results_give_the_same_bytes() -> None:
     first, again = (
-        build_report([watched([*SWEEP[:4], entry("mine", error=HOSTILE)])]).html for _ in range(2)
+        build_report([build_recorded_result([*SWEEP[:4], build_run("mine", error=HOSTILE)])]).html
+        for _ in range(2)
     )
     assert again == first
 
 
 @pytest.mark.slow
 def test_fifty_runs_take_less_than_three_megabytes() -> None:
-    entries = [
-        entry(name, seed, 2.0 + 0.1 * seed, robots=6, map_name=("rooms", "flat")[seed % 2])
+    runs = [
+        build_run(name, seed, 2.0 + 0.1 * seed, robots=6, map_name=("rooms", "flat")[seed % 2])
         for seed in range(25)
         for name in ("rapf", "rpf")
     ]
-    page = build_report([watched(entries, seconds=60.0, hz=60.0)])
+    page = build_report([build_recorded_result(runs, seconds=60.0, hz=60.0)])
     assert page.shown == (50,)
     assert len(page.html.encode()) < 3_000_000
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page.html)[1])
@@ -141,19 +147,19 @@ def test_fifty_runs_take_less_than_three_megabytes() -> None:
 
 
 @pytest.mark.slow
-def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
-    entries = [entry("rapf", seed, 2.0, robots=30) for seed in range(50)]
-    result = watched(entries[:1], seconds=300.0, hz=5.0)
+def test_fifty_long_runs_of_large_teams_take_less_than_three_megabytes() -> None:
+    runs = [build_run("rapf", seed, 2.0, robots=30) for seed in range(50)]
+    result = build_recorded_result(runs[:1], seconds=300.0, hz=5.0)
     (saved,) = result.loaded.values()
-    loaded = {each.folder: SavedRun(each.folder, saved.record, saved.history) for each in entries}
-    page = build_report([result_of(entries, loaded=loaded, maps={"rooms": ROOMS})])
+    loaded = {each.folder: SavedRun(each.folder, saved.record, saved.history) for each in runs}
+    page = build_report([build_result(runs, loaded=loaded, maps={"rooms": ROOMS})])
     assert page.shown == (50,) and len(page.html.encode()) < 3_000_000
 
 
 @pytest.mark.slow
-def test_several_results_are_sections_that_share_nothing() -> None:
-    one = watched([entry(), entry("rpf", final=3.0)])
-    other = watched([entry("lloyd", map_name="hall")], HALL)
+def test_several_results_are_sections_with_ids_of_their_own() -> None:
+    one = build_recorded_result([build_run(), build_run("rpf", final=3.0)])
+    other = build_recorded_result([build_run("lloyd", map_name="hall")], HALL)
     page = build_report(
         [replace(one, kind="comparison"), replace(other, kind="run"), replace(one, kind="comparison")]
     )
@@ -165,15 +171,17 @@ def test_several_results_are_sections_that_share_nothing() -> None:
     assert "3 results" in parsed.words
 
 
-def test_what_there_is_nothing_of_has_no_section() -> None:
-    headings = re.findall(r"<h2[^>]*>([^<]+)", build_report([replace(watched([entry()]), kind="run")]).html)
+def test_empty_sections_are_left_out() -> None:
+    headings = re.findall(
+        r"<h2[^>]*>([^<]+)", build_report([replace(build_recorded_result([build_run()]), kind="run")]).html
+    )
     assert headings == ["What was run", "Results", "Replay", "Cost over time", "Metrics"]
-    failed = build_report([result_of([entry(error="it broke")])]).html
+    failed = build_report([build_result([build_run(error="it broke")])]).html
     assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["What was run", "Failures"]
     assert "it broke" in failed and "No run has a result." in failed
 
 
-def test_sections_are_there_where_they_tell_something(html) -> None:
+def test_a_sweep_has_all_of_its_sections(html) -> None:
     headings = re.findall(r"<h2[^>]*>([^<]+)", html)
     assert headings == [
         *("What was run", "Results", "Replay", "Cost over time", "Final cost", "In pairs"),
@@ -185,63 +193,70 @@ def test_sections_are_there_where_they_tell_something(html) -> None:
 
 @pytest.mark.parametrize("theme", ["auto", "light", "dark"])
 def test_themes(theme) -> None:
-    html = build_report([watched([entry()])], theme=theme).html
+    html = build_report([build_recorded_result([build_run()])], theme=theme).html
     assert ("prefers-color-scheme" in html.partition("</style>")[0]) == (theme == "auto")
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: build_report([watched([entry()])], theme="sepia"), "unknown theme 'sepia'"),
+        (
+            lambda: build_report([build_recorded_result([build_run()])], theme="sepia"),
+            "unknown theme 'sepia'",
+        ),
     ],
 )
-def test_bad_input_is_named(call, message) -> None:
+def test_an_unknown_theme_is_rejected(call, message) -> None:
     with pytest.raises(ParameterError) as caught:
         call()
     assert message in str(caught.value)
 
 
-def test_failures_are_the_first_that_is_told(html) -> None:
+def test_failures_are_at_the_top(html) -> None:
     words = html.partition("<body>")[2]
     assert words.index("1 of 31 runs failed (mine 1 of 1): ") < words.index("Not finished: 9 of 40")
     assert words.index("Not finished") < words.index('class="lede"') < words.index("<table")
 
 
-def test_variants_have_their_own_marks_and_names_in_tables_pictures_and_the_replay(html) -> None:
+def test_variants_have_the_same_marks_and_labels_in_tables_pictures_and_the_replay(html) -> None:
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
-    looks = {(run["label"], run["style"], run["mark"], str(run["dashes"])) for run in data["runs"]}
-    assert len(looks) == 6
-    for part in zip(*looks, strict=True):
+    styles = {(run["label"], run["style"], run["mark"], str(run["dashes"])) for run in data["runs"]}
+    assert len(styles) == 6
+    for part in zip(*styles, strict=True):
         assert len(set(part)) == 6
-    for label, style, mark, _ in looks:
+    for label, style, mark, _ in styles:
         cell = f'<path d="{mark}" style="fill:var(--rc-{style})"/></svg>{label}<'
         assert html.count(cell) >= 3  # gains, results, trajectories
 
 
-def test_a_long_name_is_cut_and_stands_whole_beside() -> None:
+def test_a_long_name_is_shortened_and_whole_in_its_tool_tip() -> None:
     name = "<b>" + "ü" * 297
     whole = name.replace("<", "&lt;").replace(">", "&gt;")
-    html = build_report([watched([entry(map_name=name)], replace(ROOMS, name=name))], title=name).html
+    html = build_report(
+        [build_recorded_result([build_run(map_name=name)], replace(ROOMS, name=name))], title=name
+    ).html
     page = Page(html)
     cut = [word for words in page.words for word in words.split() if "…" in word]
     assert len(cut) >= 3 and max(map(len, cut)) <= MAX_WORD_CHARS and f'title="{whole}"' in html
 
 
-def test_a_result_all_of_whose_runs_are_damaged_is_a_section_that_says_so() -> None:
-    lost = replace(result_of([]), damaged=(Damaged("run", "record.npz: no zip file"),), wanted=1)
-    html = build_report([watched([entry()]), lost]).html
+def test_a_result_with_only_damaged_runs_has_a_section_with_the_reason() -> None:
+    damaged = replace(
+        build_result([]), damaged_runs=(DamagedRun("run", "record.npz: no zip file"),), expected_count=1
+    )
+    html = build_report([build_recorded_result([build_run()]), damaged]).html
     assert "1 run cannot be read and is left out: run (record.npz: no zip file)." in html
 
 
-def test_a_page_knows_its_own(tmp_path) -> None:
+def test_a_report_is_recognized(tmp_path) -> None:
     path = tmp_path / "page.html"
-    path.write_text(build_report([watched([entry()])]).html)
+    path.write_text(build_report([build_recorded_result([build_run()])]).html)
     assert is_report(path)
     path.write_text("<!doctype html><title>mine</title>")
     assert not is_report(path) and not is_report(tmp_path / "none.html")
 
 
-def test_marks_are_those_of_the_plots() -> None:
+def test_all_marks_have_paths() -> None:
     from robocov_app.look.curve_styles import choose_controller_styles
 
     styles = choose_controller_styles(["rapf", "rpf", "lloyd", *"abcdefghijklmnop"]).values()
@@ -253,7 +268,7 @@ def test_marks_are_those_of_the_plots() -> None:
 def test_the_replay_explains_obstacles_that_move() -> None:
     cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
     words = [
-        "paler obstacles move" in build_report([watched([entry()], environment)]).html
+        "paler obstacles move" in build_report([build_recorded_result([build_run()], environment)]).html
         for environment in (ROOMS, replace(ROOMS, obstacles=(cart,)))
     ]
     assert words == [False, True]

@@ -9,7 +9,7 @@ import pytest
 from drawn_run import HALL, ROOMS
 from hypothesis import given
 from hypothesis import strategies as st
-from reported_results import HOSTILE, falling, walk
+from reported_results import HOSTILE, build_history, build_record
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
@@ -40,8 +40,8 @@ def read_back(text: str, low: float, high: float) -> np.ndarray:
 
 
 def run_of(seconds: float = 6.0, **walking) -> ReplayRun:
-    record = walk(seconds=seconds, **walking)
-    return ReplayRun(record, falling(record, 2.0), "a run")
+    record = build_record(seconds=seconds, **walking)
+    return ReplayRun(record, build_history(record, 2.0), "a run")
 
 
 def places_of(data: dict, record, name: str = "positions") -> np.ndarray:
@@ -116,21 +116,21 @@ def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
 
 
 def test_a_run_without_goals_cost_or_path() -> None:
-    record = walk(controller="rpf")
+    record = build_record(controller="rpf")
     data = embed_run(ReplayRun(record, None, "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
     assert data["goals"] is None and data["cost"] is None and data["path"]
     ends = replace(
         record, **{name: getattr(record, name)[[0, -1]] for name in ("time", "positions", "goals")}
     )
     assert not has_path(ends)
-    data = embed_run(ReplayRun(ends, falling(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
+    data = embed_run(ReplayRun(ends, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
     assert data["count"] == 2 and not data["path"]
     assert data["cost"]["count"] > 20  # of the cost there is more
     assert np.abs(places_of(data, record) - record.positions[[0, -1]]).max() < 1e-3
 
 
 def test_goals_that_come_and_go_are_none_where_they_are_not() -> None:
-    record = walk(hz=5.0)
+    record = build_record(hz=5.0)
     record.goals[:10] = np.nan
     run = ReplayRun(record, None, "x")
     data = embed_run(run, 0, STYLE, MAX_RATE_HZ, has_goals=True)
@@ -168,8 +168,10 @@ def test_obstacles_that_move_are_apart_from_those_that_stand() -> None:
 
 
 def test_a_run_of_a_single_moment() -> None:
-    record = walk(seconds=0.0)
-    data = embed_run(ReplayRun(record, falling(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True)
+    record = build_record(seconds=0.0)
+    data = embed_run(
+        ReplayRun(record, build_history(record, 2.0), "x"), 0, STYLE, MAX_RATE_HZ, has_goals=True
+    )
     assert data["end"] == 0.0 and data["count"] == 1
     json.dumps(data, allow_nan=False)
 

@@ -10,7 +10,7 @@ from drawn_run import HALL, ROOMS
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from reported_results import HOSTILE, falling, walk
+from reported_results import HOSTILE, build_history, build_record
 
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
@@ -37,7 +37,7 @@ def test_relative_steps_of_a_path_add_up(points) -> None:
 
 
 def test_who_failed_is_crossed_out_and_who_never_joined_is_not_there() -> None:
-    record = walk(robots=5)
+    record = build_record(robots=5)
     bad = Conditions(failures=((2, 2.0),), joins=((4, 3.0), (5, 99.0)))
     picture = draw_run(replace(record, conditions=bad), None, has_numbers=True)
     root = drawn(picture)
@@ -50,8 +50,8 @@ def test_who_failed_is_crossed_out_and_who_never_joined_is_not_there() -> None:
 
 
 def test_a_run_has_its_robots_where_they_ended() -> None:
-    record = walk(robots=5)
-    root = drawn(draw_run(record, falling(record, 2.0), 400, 300, has_numbers=True))
+    record = build_record(robots=5)
+    root = drawn(draw_run(record, build_history(record, 2.0), 400, 300, has_numbers=True))
     frame = PictureFrame(ROOMS, 400, 300)
     places = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "robot")])
     assert places == pytest.approx(frame.to_pixels(record.positions[-1]), abs=0.06)
@@ -75,8 +75,8 @@ def test_a_map_fits_into_its_picture(environment, room) -> None:
 
 
 def test_every_picture_says_what_it_shows() -> None:
-    record = walk()
-    said = drawn(draw_run(record, falling(record, 2.345))).get("aria-label")
+    record = build_record()
+    said = drawn(draw_run(record, build_history(record, 2.345))).get("aria-label")
     assert said == (
         "RAPF on map rooms: trajectories of 4 robots from start spread over 6 s. "
         "The mean distance to the nearest robot falls from 6.000 m to 2.345 m."
@@ -90,14 +90,14 @@ def test_every_picture_says_what_it_shows() -> None:
 
 
 def test_names_are_words() -> None:
-    record = walk(replace(ROOMS, name=HOSTILE), label=HOSTILE)
+    record = build_record(replace(ROOMS, name=HOSTILE), label=HOSTILE)
     root = drawn(draw_run(record, None))  # is XML in spite of them
     assert HOSTILE in root.get("aria-label")
     assert not [each for each in root.iter() if each.tag in ("img", "script")]
 
 
 def test_a_record_without_a_path_has_no_lines() -> None:
-    record = walk()
+    record = build_record()
     names = ("time", "positions", "goals")
     ends = replace(record, **{name: getattr(record, name)[[0, -1]] for name in names})
     root = drawn(draw_run(ends, None))
@@ -105,7 +105,7 @@ def test_a_record_without_a_path_has_no_lines() -> None:
 
 
 def test_a_very_large_team_makes_no_very_large_picture() -> None:
-    record = walk(robots=MAX_ROBOTS + 1, hz=2.0)
+    record = build_record(robots=MAX_ROBOTS + 1, hz=2.0)
     root = drawn(draw_run(record, None))
     assert not of_class(root, "cell") and not of_class(root, "way")
     assert len(of_class(root, "robot")) == MAX_ROBOTS + 1

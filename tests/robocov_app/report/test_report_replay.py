@@ -5,7 +5,7 @@ import re
 from dataclasses import replace
 
 from drawn_run import ROOMS
-from reported_results import HOSTILE, Page, falling, walk
+from reported_results import HOSTILE, Page, build_history, build_record
 
 from robocov.text import escape_controls
 from robocov_app.report.embedding import ReplayRun
@@ -19,9 +19,11 @@ from robocov_app.report.replay import (
 
 
 def runs_of(count: int = 2, name: str = "run") -> list[ReplayRun]:
-    records = [walk(seed=seed, controller=("rapf", "rpf", "lloyd")[seed % 3]) for seed in range(count)]
+    records = [
+        build_record(seed=seed, controller=("rapf", "rpf", "lloyd")[seed % 3]) for seed in range(count)
+    ]
     return [
-        ReplayRun(record, falling(record, 2.0), f"{name} {k}", "It went well.")
+        ReplayRun(record, build_history(record, 2.0), f"{name} {k}", "It went well.")
         for k, record in enumerate(records)
     ]
 
@@ -43,7 +45,7 @@ def test_a_fragment_brings_all_that_it_needs() -> None:
 
 
 def test_runs_of_one_controller_with_other_gains_look_different() -> None:
-    runs = [ReplayRun(walk(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
+    runs = [ReplayRun(build_record(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
     looks = [
         (run["style"], run["mark"], tuple(run["dashes"])) for run in data_of(build_replay_html(runs))["runs"]
     ]
@@ -59,7 +61,7 @@ def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
 
 
 def test_no_name_gets_out_of_its_place() -> None:
-    record = replace(walk(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
+    record = replace(build_record(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
     html = build_replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
     assert len(page.all("script")) == 2 and not page.all("img")

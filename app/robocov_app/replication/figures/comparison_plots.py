@@ -11,7 +11,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from robocov.arrays import Array
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import TITLE, Page
-from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_paired
+from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_pairs
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.look.theme import Theme
 from robocov_app.replication.design.contenders import OURS
@@ -79,7 +79,7 @@ def plan_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Draw 
 
 
 def _draw_pairs(pairs: Sequence[Pairs], label: str, theme: Theme) -> Figure:
-    figure = plot_paired(pairs, label, WIDE_PX, PAGE_SCALE, theme)
+    figure = plot_pairs(pairs, label, WIDE_PX, PAGE_SCALE, theme)
     (axes,) = figure.axes
     low, high = axes.get_xlim()
     if sum(low <= tick <= high for tick in axes.get_xticks()) < _MIN_TICKS:

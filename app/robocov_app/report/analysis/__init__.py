@@ -1,0 +1,1 @@
+"""Runs of a result grouped by controller and gains, scaled, compared in pairs, and selected for display."""

@@ -1,0 +1,196 @@
+"""Comparison of groups in pairs of runs: ratios of final mean distances, with 95 % intervals."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.figures.statistics import (
+    MIN_BOOTSTRAP_MAPS,
+    Interval,
+    bootstrap,
+    group_by,
+    mean_with_t_interval,
+)
+from robocov_app.report.analysis.groups import RunGroup
+from robocov_app.report.results.result import ReportedRun
+
+MAX_COMPARED_GROUPS = 4
+"""Maximum number of groups that are all compared with each other. More are compared with the first."""
+NEGLIGIBLE_DIFFERENCE = 0.001
+"""Fraction by which a cost must differ to be called better or worse."""
+
+PairVerdict: TypeAlias = Literal["better", "worse", "undecided"]
+_VERDICTS: tuple[PairVerdict, ...] = ("better", "worse", "undecided")
+
+
+class MapPairs(NamedTuple):
+    """The pairs of runs on one map.
+
+    Attributes
+    ----------
+    map_name : str
+    first_distances, second_distances : (m,) array, m
+        Final mean distances of the runs in each pair.
+    ratio : Interval
+        Geometric mean of the ratios over starts and seeds.
+    """
+
+    map_name: str
+    first_distances: Array
+    second_distances: Array
+    ratio: Interval
+
+    @property
+    def verdict(self) -> PairVerdict:
+        """Whether the first group is better, by an interval without negligible differences."""
+        if self.ratio.high < 1.0 - NEGLIGIBLE_DIFFERENCE:
+            return "better"
+        if self.ratio.low > 1.0 + NEGLIGIBLE_DIFFERENCE:
+            return "worse"
+        return "undecided"
+
+    @property
+    def pair_count(self) -> int:
+        """Number of pairs."""
+        return len(self.first_distances)
+
+    @property
+    def lower_count(self) -> int:
+        """Number of pairs in which the first group has the lower distance."""
+        return int((self.first_distances < self.second_distances).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class GroupComparison:
+    """Two groups compared on the cases that both have.
+
+    Attributes
+    ----------
+    first, second : RunGroup
+    maps : tuple of MapPairs
+    ratio : Interval
+        Ratio of the first by the second: over maps, or over seeds if there is only one map.
+    unpaired_count : int
+        Number of cases of only one group.
+    """
+
+    first: RunGroup
+    second: RunGroup
+    maps: tuple[MapPairs, ...]
+    ratio: Interval
+    unpaired_count: int
+
+    @property
+    def label(self) -> str:
+        """Labels of both groups."""
+        return f"{self.first.label} / {self.second.label}"
+
+    @property
+    def pair_count(self) -> int:
+        """Number of pairs on all maps."""
+        return sum(pairs.pair_count for pairs in self.maps)
+
+    def format_verdicts(self) -> str:
+        """Return on how many maps the first group is better, worse or neither."""
+        counts = Counter(pairs.verdict for pairs in self.maps)
+        map_count = len(self.maps)
+        if len(counts) == 1:
+            maps = {1: "the map", 2: "both maps"}.get(map_count, f"all {map_count} maps")
+            return f"{self.maps[0].verdict} on {maps}"
+        texts = [f"{verdict} on {counts[verdict]}" for verdict in _VERDICTS if counts[verdict]]
+        return ", ".join([f"{texts[0]} of {map_count} maps", *texts[1:]])
+
+    def format_headline(self) -> str:
+        """Return the outcome as one sentence."""
+        names = f"{self.first.label} against {self.second.label}"
+        map_count = len(self.maps)
+        if map_count > 1:
+            if map_count < MIN_BOOTSTRAP_MAPS:
+                # The interval is left out: it would be narrow if the few maps happen to agree.
+                ratio = f"{self.ratio.estimate:.3f} over {map_count} maps only"
+            else:
+                ratio = f"{format_ratio(self.ratio)} over {map_count} maps"
+            return f"{names}: {self.format_verdicts()}; ratio {ratio}."
+        ratio = format_ratio(self.ratio)
+        if self.pair_count == 1:
+            return f"{names}: ratio {ratio} in the only pair."
+        return f"{names}: {self.maps[0].verdict}, ratio {ratio} over {self.pair_count} pairs."
+
+
+def format_ratio(ratio: Interval) -> str:
+    """Return a ratio with its interval, if it has one."""
+    text = f"{ratio.estimate:.3f}"
+    if np.isfinite(ratio.low):
+        text += f" ({ratio.low:.3f} to {ratio.high:.3f})"
+    return text
+
+
+def compare_groups(groups: Sequence[RunGroup]) -> list[GroupComparison]:
+    """Compare groups that have cases in common.
+
+    Parameters
+    ----------
+    groups : sequence of RunGroup
+
+    Returns
+    -------
+    list of GroupComparison
+        All pairs of groups; if there are many groups, only those with the first one.
+    """
+    first_groups = groups if len(groups) <= MAX_COMPARED_GROUPS else groups[:1]
+    comparisons = []
+    for number, first in enumerate(first_groups):
+        for second in groups[number + 1 :]:
+            comparison = compare_pair(first, second)
+            if comparison is not None:
+                comparisons.append(comparison)
+    return comparisons
+
+
+def compare_pair(first: RunGroup, second: RunGroup) -> GroupComparison | None:
+    """Compare two groups; None if they have no case in common."""
+    first_runs = _index_by_case(first)
+    second_runs = _index_by_case(second)
+    paired_runs = [run for case, run in first_runs.items() if case in second_runs]
+    if not paired_runs:
+        return None
+    maps = []
+    for map_name, runs in group_by(paired_runs, lambda run: run.map).items():
+        first_distances = np.array([run.final_distance for run in runs])
+        second_distances = np.array([second_runs[run.case].final_distance for run in runs])
+        ratio = _estimate_ratio(runs, first_distances / second_distances)
+        maps.append(MapPairs(map_name, first_distances, second_distances, ratio))
+    ratio = maps[0].ratio
+    if len(maps) > 1:
+        logarithms = [float(np.log(pairs.ratio.estimate)) for pairs in maps]
+        ratio = _exponentiate(bootstrap(logarithms, "mean"))
+    unpaired_cases = first_runs.keys() ^ second_runs.keys()
+    return GroupComparison(first, second, tuple(maps), ratio, len(unpaired_cases))
+
+
+def _index_by_case(group: RunGroup) -> dict[tuple[object, ...], ReportedRun]:
+    """Return the runs of a group whose distances have a ratio, by their cases."""
+    return {run.case: run for run in group.runs if 0.0 < run.final_distance < np.inf}
+
+
+def _estimate_ratio(runs: Sequence[ReportedRun], ratios: Array) -> Interval:
+    """Return the geometric mean of the ratios of runs on one map.
+
+    Runs of different teams from the same start and seed count once: they are no independent evidence.
+    """
+    effects: dict[tuple[str | None, int | None], list[float]] = {}
+    for run, effect in zip(runs, np.log(ratios).tolist(), strict=True):
+        effects.setdefault((run.start, run.seed), []).append(effect)
+    means = [float(np.mean(values)) for values in effects.values()]
+    return _exponentiate(mean_with_t_interval(means))
+
+
+def _exponentiate(effect: Interval) -> Interval:
+    """Turn an interval of logarithms into one of ratios."""
+    with np.errstate(over="ignore"):
+        estimate, low, high = np.exp([effect.estimate, effect.low, effect.high]).tolist()
+    return Interval(estimate, low, high)

@@ -1,0 +1,52 @@
+"""Final mean distances as multiples of a median, so that runs on different maps can be shown together."""
+
+from collections.abc import Callable, Iterable, Mapping
+from operator import attrgetter
+from typing import TypeAlias
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.figures.statistics import group_by
+from robocov_app.report.results.result import ReportedResult, ReportedRun
+
+Scales: TypeAlias = Mapping[ReportedRun, float]
+"""What the final mean distance of each run is divided by, m."""
+
+
+def compute_medians(
+    result: ReportedResult, key: Callable[[ReportedRun], object] = attrgetter("setting")
+) -> Scales:
+    """Compute for each run the median final mean distance of all runs with the same key.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    key : callable
+        Returns the key of a run; by default its setting.
+
+    Returns
+    -------
+    mapping of ReportedRun to float, m
+        Without runs whose final mean distance is not known.
+    """
+    known_runs = [run for run in result.completed_runs if np.isfinite(run.final_distance)]
+    medians: dict[ReportedRun, float] = {}
+    for runs in group_by(known_runs, key).values():
+        median = float(np.median([run.final_distance for run in runs]))
+        medians |= dict.fromkeys(runs, median)
+    return medians
+
+
+def scale_distance(run: ReportedRun, scales: Scales) -> float:
+    """Return the final mean distance of a run divided by its scale; infinite if that is not known."""
+    scale = scales.get(run, 0.0)
+    if not np.isfinite(run.final_distance) or scale <= 0.0:
+        return np.inf
+    return run.final_distance / scale
+
+
+def scale_distances(runs: Iterable[ReportedRun], scales: Scales) -> Array:
+    """Return the finite values of `scale_distance` of some runs, (m,)."""
+    distances = np.array([scale_distance(run, scales) for run in runs])
+    return np.asarray(distances[np.isfinite(distances)])

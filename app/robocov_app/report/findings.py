@@ -1,0 +1,131 @@
+"""The outcome of a result in words: main findings, problems of the robots, and runs that are missing."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from robocov.errors import format_count
+from robocov_app.report.analysis.comparisons import GroupComparison
+from robocov_app.report.analysis.groups import label_runs
+from robocov_app.report.facts import format_densities
+from robocov_app.report.results.result import ReportedResult, ReportedRun
+
+_MAX_HEADLINES = 6
+"""Maximum number of comparisons among the main findings."""
+_MAX_LISTED_REASONS = 3
+
+
+def list_findings(result: ReportedResult, comparisons: Sequence[GroupComparison]) -> list[str]:
+    """List the main findings, one or a few sentences for the top of a section.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    comparisons : sequence of GroupComparison
+
+    Returns
+    -------
+    list of str
+    """
+    runs = [run for run in result.completed_runs if np.isfinite(run.final_distance)]
+    if not runs:
+        return ["No run has a result."]
+    if result.kind == "sweep":
+        return _summarize_sweep(runs, comparisons)
+    if len(runs) == 1:
+        return [_summarize_run(result, runs[0])]
+    return [_summarize_comparison(result, runs)]
+
+
+def _summarize_sweep(runs: Sequence[ReportedRun], comparisons: Sequence[GroupComparison]) -> list[str]:
+    """Return the outcomes of comparisons, or the median of all runs if there are none."""
+    paired = [comparison for comparison in comparisons if comparison.pair_count > 1]
+    if not paired:
+        median = np.median([run.final_distance for run in runs])
+        return [f"{format_count(len(runs), 'run')}, median final distance {median:.3f} m."]
+    sentences = [comparison.format_headline() for comparison in paired[:_MAX_HEADLINES]]
+    if len(paired) > _MAX_HEADLINES:
+        sentences.append(f"{format_count(len(paired) - _MAX_HEADLINES, 'more comparison')} below.")
+    return sentences
+
+
+def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
+    """Return the final mean distance of the only run, its gap, and whether it settled."""
+    gap = result.compute_gap(run)
+    gap_text = f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
+    settled_at = run.figures.get("settled_at_s")
+    settling = "not settled by the end" if settled_at is None else f"settled after {settled_at:.1f} s"
+    distance = f"{run.final_distance:.3f} m"
+    return f"At the end the nearest robot is {distance} away on average{gap_text}; {settling}."
+
+
+def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -> str:
+    """Return the final mean distances of all runs, the lowest first."""
+    lowest = min(run.final_distance for run in runs)
+    labels = label_runs(result)
+    texts = []
+    for run in sorted(runs, key=lambda run: run.final_distance):
+        text = f"{labels[run]} {run.final_distance:.3f} m"
+        if run.final_distance > lowest > 0:
+            text += f" (+{100 * (run.final_distance / lowest - 1):.0f} %)"
+        texts.append(text)
+    weighted = ", weighed by φ" if format_densities(result) else ""
+    return f"Final mean distance to the nearest robot{weighted}: {', '.join(texts)}."
+
+
+def list_missing_runs(result: ReportedResult) -> list[str]:
+    """List how many runs failed, cannot be read, or are missing, one sentence each."""
+    sentences = []
+    if result.failed_runs:
+        sentences.append(_describe_failed_runs(result))
+    if result.damaged_runs:
+        reasons = [f"{run.folder} ({run.reason})" for run in result.damaged_runs]
+        verb = "is" if len(reasons) == 1 else "are"
+        runs = format_count(len(reasons), "run")
+        sentences.append(f"{runs} cannot be read and {verb} left out: {_list_reasons(reasons)}")
+    if result.missing_count:
+        verb = "is" if result.missing_count == 1 else "are"
+        runs = format_count(result.expected_count, "run")
+        sentences.append(f"Not finished: {result.missing_count} of {runs} {verb} missing.")
+    return sentences
+
+
+def _describe_failed_runs(result: ReportedResult) -> str:
+    """Return how many runs of each controller failed, and why."""
+    run_counts = Counter(run.label for run in result.runs)
+    failure_counts = Counter(run.label for run in result.failed_runs)
+    controllers = ", ".join(
+        f"{label} {count} of {run_counts[label]}" for label, count in failure_counts.most_common()
+    )
+    reasons = _list_reasons([run.error or "" for run in result.failed_runs])
+    runs = format_count(len(result.runs), "run")
+    return f"{len(result.failed_runs)} of {runs} failed ({controllers}): {reasons}"
+
+
+def _list_reasons(reasons: Sequence[str]) -> str:
+    """Return the first different reasons, and how many more there are."""
+    different_reasons = list(dict.fromkeys(reasons))
+    text = "; ".join(different_reasons[:_MAX_LISTED_REASONS])
+    if len(different_reasons) > _MAX_LISTED_REASONS:
+        text += f"; and {len(different_reasons) - _MAX_LISTED_REASONS} more"
+    return f"{text}."
+
+
+def list_problems(result: ReportedResult) -> list[str]:
+    """List in how many runs robots had contacts or were stuck, or the team had not settled."""
+    runs = result.completed_runs
+    counts = {
+        "a robot touched a wall or another one": sum((run.figures.get("contacts") or 0) > 0 for run in runs),
+        "a robot was stuck at the end": sum((run.figures.get("stuck_robots") or 0) > 0 for run in runs),
+        "the team had not settled by the end": sum(_is_unsettled(run) for run in runs),
+    }
+    problems = {problem: count for problem, count in counts.items() if count}
+    if len(runs) == 1:
+        return [f"{problem[0].upper()}{problem[1:]}." for problem in problems]
+    return [f"In {count} of {len(runs)} runs {problem}." for problem, count in problems.items()]
+
+
+def _is_unsettled(run: ReportedRun) -> bool:
+    """Return whether a team had not settled by the end of a run."""
+    return run.has_figure("mean_distance_m") and not run.has_figure("settled_at_s")

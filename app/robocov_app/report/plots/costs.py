@@ -1,0 +1,148 @@
+"""Plots of mean distances over time, and of final mean distances."""
+
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from robocov.arrays import Array
+from robocov.errors import format_count
+from robocov_app.figures.curves import DISTANCE
+from robocov_app.figures.results import Band, Sample, compute_quartiles, plot_cost_bands, plot_final_costs
+from robocov_app.report.analysis.scaling import compute_medians, scale_distances
+from robocov_app.report.plots.plot import (
+    FINAL_DISTANCE_LABEL,
+    SCALED_DISTANCE_LABEL,
+    GroupStyles,
+    PagePlot,
+    Panel,
+    build_panel_plot,
+    list_panels,
+)
+from robocov_app.report.results.result import ReportedResult, ReportedRun
+
+_CURVE_SAMPLES = 121
+"""Number of samples of a curve over time, about one every three pixels."""
+
+
+def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> list[PagePlot]:
+    """Build the plots of mean distances over time.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    styles : mapping of str to CurveStyle
+    key : str
+        Start of the ids in the plots.
+
+    Returns
+    -------
+    list of PagePlot
+        All settings together, as fractions of the first values, then each setting. Panels without any known
+        cost are left out.
+    """
+    times, distances = _sample_histories(result)
+    plots = []
+    for panel in list_panels(result, key):
+        bands = []
+        for group in panel.groups:
+            rows = [distances[run] for run in group.runs if run in distances]
+            if panel.is_together:
+                rows = [row / row[0] for row in rows if np.isfinite(row[0]) and row[0] > 0.0]
+            if rows:
+                bands.append(Band(group.label, styles[group.label], times, np.array(rows)))
+        if bands:
+            plots.append(_build_cost_plot(panel, bands))
+    return plots
+
+
+def _sample_histories(result: ReportedResult) -> tuple[Array, dict[ReportedRun, Array]]:
+    """Return times since the start, (T,) s, and the mean distances of runs at these, (T,) m.
+
+    After the end of a run the values are nan.
+    """
+    histories = {}
+    for run in result.completed_runs:
+        history = result.read_history(run)
+        if history is not None and np.isfinite(history.mean_distance).any():
+            histories[run] = history
+    durations = [float(history.time[-1] - history.time[0]) for history in histories.values()]
+    duration = max(durations, default=0.0)
+    times = np.linspace(0.0, duration, _CURVE_SAMPLES if duration > 0.0 else 1)
+    distances = {}
+    for run, history in histories.items():
+        time_since_start = history.time - history.time[0]
+        distances[run] = np.interp(times, time_since_start, history.mean_distance, right=np.nan)
+    return times, distances
+
+
+def _build_cost_plot(panel: Panel, bands: list[Band]) -> PagePlot:
+    """Build the plot of the bands in a panel."""
+    label = "mean distance / that of the start" if panel.is_together else DISTANCE
+    unit = "" if panel.is_together else " m"
+    texts = "; ".join(_describe_band(band, unit) for band in bands)
+    description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
+    # The label of the axis has the unit, since the names of the curves have little space.
+    draw = partial(plot_cost_bands, bands, label=label, unit="")
+    return build_panel_plot(panel, description, draw)
+
+
+def _describe_band(band: Band, unit: str) -> str:
+    """Return the last values of a band as text."""
+    low, middle, high = (row[np.isfinite(row)][-1] for row in compute_quartiles(band.values))
+    text = f"{band.label}: {middle:.3f}{unit}"
+    if len(band.values) > 1:
+        runs = len(band.values)
+        text += f" at the end (median of {runs} runs, quartiles {low:.3f} to {high:.3f})"
+    return text
+
+
+def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> list[PagePlot]:
+    """Build the plots of the distributions of final mean distances.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    styles : mapping of str to CurveStyle
+    key : str
+        Start of the ids in the plots.
+
+    Returns
+    -------
+    list of PagePlot
+        All settings together, divided by their medians, then each setting. Panels in which no group has
+        several runs are left out.
+    """
+    medians = compute_medians(result)
+    meters = dict.fromkeys(result.completed_runs, 1.0)
+    plots = []
+    for panel in list_panels(result, key):
+        scales = medians if panel.is_together else meters
+        samples = []
+        for group in panel.groups:
+            distances = scale_distances(group.runs, scales)
+            if len(distances):
+                samples.append(Sample(group.label, styles[group.label], distances))
+        if max((len(sample.values) for sample in samples), default=0) > 1:
+            plots.append(_build_final_cost_plot(panel, samples))
+    return plots
+
+
+def _build_final_cost_plot(panel: Panel, samples: list[Sample]) -> PagePlot:
+    """Build the plot of the samples in a panel."""
+    label = SCALED_DISTANCE_LABEL if panel.is_together else FINAL_DISTANCE_LABEL
+    unit = "" if panel.is_together else " m"
+    texts = "; ".join(_describe_sample(sample, unit) for sample in samples)
+
+    def draw(size: tuple[int, int]) -> Figure:
+        width, _ = size
+        return plot_final_costs([("", samples)], label, width, 1.0)
+
+    return build_panel_plot(panel, f"{label}. {texts}.", draw)
+
+
+def _describe_sample(sample: Sample, unit: str) -> str:
+    """Return the median and the quartiles of a sample as text."""
+    low, middle, high = np.percentile(sample.values, [25, 50, 75])
+    text = f"{sample.label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
+    return f"{text}, {format_count(len(sample.values), 'run')}"

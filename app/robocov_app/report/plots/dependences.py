@@ -1,0 +1,248 @@
+"""Plots of final mean distances against gains and parameters of the team."""
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.controllers.gains import Value, format_value
+from robocov_app.figures.results import MAX_LEVELS, Dependence, plot_gain_grid, plot_gains
+from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
+from robocov_app.report.analysis.groups import RunGroup, find_varying_gains, group_by_controller
+from robocov_app.report.analysis.scaling import Scales, compute_medians, scale_distance
+from robocov_app.report.plots.plot import (
+    FINAL_DISTANCE_LABEL,
+    PANEL_SIZE_PX,
+    SCALED_DISTANCE_LABEL,
+    PagePlot,
+)
+from robocov_app.report.results.result import ReportedResult, ReportedRun
+from robocov_app.report.svg import inline_svg
+from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
+
+_MAX_MISSING_FRACTION = 0.5
+"""Two gains of which more combinations are missing were sampled from ranges, not tried on a grid."""
+
+
+class _Parameter(NamedTuple):
+    """A gain or a parameter of the team that varies in a result.
+
+    Attributes
+    ----------
+    name : str
+    title : str
+        Name with unit.
+    get_value : callable
+        Returns the value of a run.
+    choices : tuple of str
+        Values of a parameter that is a text.
+    """
+
+    name: str
+    title: str
+    get_value: Callable[[ReportedRun], Value]
+    choices: tuple[str, ...] = ()
+
+    def to_coordinate(self, value: Value) -> float:
+        """Return the coordinate of a value on an axis: nan for no limit, the index of a text."""
+        if value is None:
+            return np.nan
+        if isinstance(value, str):
+            return float(self.choices.index(value))
+        return float(value)
+
+    def to_value(self, coordinate: float) -> Value:
+        """Return the value at a coordinate, see `to_coordinate`."""
+        if np.isnan(coordinate):
+            return None
+        return self.choices[int(coordinate)] if self.choices else coordinate
+
+    def format_coordinate(self, coordinate: float) -> str:
+        """Return the value at a coordinate as text."""
+        return format_value(self.to_value(coordinate), digits=4)
+
+
+class _DistanceAxis(NamedTuple):
+    """An axis of final mean distances.
+
+    Attributes
+    ----------
+    label : str
+    scales : Scales
+    """
+
+    label: str
+    scales: Scales
+
+
+def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
+    """Build the plots of final mean distances against parameters.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    key : str
+        Start of the ids in the plots.
+
+    Returns
+    -------
+    list of PagePlot
+        Each gain that varies, then each parameter of the team, then grids of two gains of a controller.
+    """
+    groups = group_by_controller(result)
+    styles = choose_controller_styles(group.controller for group in groups)
+    varying_gains = find_varying_gains(result)
+    gains = {name: _describe_gain(result, name) for name in varying_gains}
+    axis = _choose_axis(result, SCALED_DISTANCE_LABEL, attrgetter("setting"))
+    plots: list[PagePlot | None] = []
+    for number, (name, controllers) in enumerate(varying_gains.items()):
+        gain_groups = [group for group in groups if group.controller in controllers]
+        plots.append(_build_plot(gains[name], gain_groups, styles, axis, key=f"{key}-{number}"))
+    # The team is a part of the setting, so that distances for it are divided by medians of maps.
+    map_axis = _choose_axis(result, "final distance / median of map", attrgetter("map"))
+    for number, parameter in enumerate(_list_team_parameters(result)):
+        if len({parameter.get_value(run) for run in result.completed_runs}) > 1:
+            plots.append(_build_plot(parameter, groups, styles, map_axis, key=f"{key}-team-{number}"))
+    grid_number = 1
+    for group in groups:
+        group_gains = [gains[name] for name, names in varying_gains.items() if group.controller in names]
+        for first, second in combinations(group_gains, 2):
+            plot = _build_grid_plot(group, first, second, axis, key=f"{key}-grid-{grid_number}")
+            if plot is not None:
+                grid_number += 1
+                plots.append(plot)
+    return [plot for plot in plots if plot is not None]
+
+
+def _choose_axis(
+    result: ReportedResult, label: str, get_part: Callable[[ReportedRun], object]
+) -> _DistanceAxis:
+    """Return an axis of distances divided by medians of parts of a result; in m if there is one part."""
+    if len({get_part(run) for run in result.completed_runs}) == 1:
+        return _DistanceAxis(FINAL_DISTANCE_LABEL, dict.fromkeys(result.completed_runs, 1.0))
+    return _DistanceAxis(label, compute_medians(result, get_part))
+
+
+def _describe_gain(result: ReportedResult, name: str) -> _Parameter:
+    """Return a gain as a parameter."""
+    unit = result.gain_units.get(name, "")
+    values = dict.fromkeys(dict(run.gains).get(name) for run in result.completed_runs)
+    return _Parameter(
+        name=name,
+        title=f"{name} ({unit})" if unit else name,
+        get_value=lambda run: dict(run.gains)[name],
+        choices=tuple(value for value in values if isinstance(value, str)),
+    )
+
+
+def _list_team_parameters(result: ReportedResult) -> list[_Parameter]:
+    """Return the number of robots, and the numbers among the team parameters that vary."""
+    parameters = [_Parameter("robots", "robots", lambda run: run.robots)]
+    if result.completed_runs:
+        names = [name for name, _ in result.completed_runs[0].team if name not in TEXT_PARAMETERS]
+        parameters += [_describe_team_parameter(name) for name in names]
+    return parameters
+
+
+def _describe_team_parameter(name: str) -> _Parameter:
+    """Return a parameter of the team."""
+    title = f"{name.replace('_', ' ')} ({UNITS[name]})"
+    return _Parameter(name, title, lambda run: dict(run.team)[name])
+
+
+def _build_plot(
+    parameter: _Parameter,
+    groups: Sequence[RunGroup],
+    styles: Mapping[str, CurveStyle],
+    axis: _DistanceAxis,
+    *,
+    key: str,
+) -> PagePlot | None:
+    """Build the plot of distances against a parameter; None if no distance is known."""
+    dependences = []
+    for group in groups:
+        dependence = _collect_dependence(parameter, group, axis.scales, styles[group.controller])
+        if len(dependence.values):
+            dependences.append(dependence)
+    if not dependences:
+        return None
+    figure = plot_gains(dependences, parameter.title, PANEL_SIZE_PX, axis.label, parameter.choices)
+    texts = "; ".join(_describe_dependence(dependence, parameter) for dependence in dependences)
+    description = f"{axis.label} against {parameter.title}. {texts}."
+    return PagePlot(parameter.title, inline_svg(figure, key, description))
+
+
+def _collect_dependence(
+    parameter: _Parameter, group: RunGroup, scales: Scales, style: CurveStyle
+) -> Dependence:
+    """Return the finite scaled distances of the runs of a group, and their coordinates."""
+    coordinates = []
+    distances = []
+    for run in group.runs:
+        distance = scale_distance(run, scales)
+        if np.isfinite(distance):
+            coordinates.append(parameter.to_coordinate(parameter.get_value(run)))
+            distances.append(distance)
+    return Dependence(group.label, style, np.array(coordinates), np.array(distances))
+
+
+def _describe_dependence(dependence: Dependence, parameter: _Parameter) -> str:
+    """Return the median at each value as text; the range if there are many values."""
+    coordinates = np.unique(dependence.gains)
+    if len(coordinates) > MAX_LEVELS:
+        low = np.nanmin(dependence.gains)
+        high = np.nanmax(dependence.gains)
+        best = parameter.format_coordinate(dependence.gains[int(np.argmin(dependence.values))])
+        runs = f"{dependence.label}, {len(dependence.values)} runs"
+        return f"{runs} from {low:.3g} to {high:.3g}, the lowest value at {best}"
+    medians = []
+    for coordinate in coordinates.tolist():
+        is_unlimited = np.isnan(coordinate)
+        has_value = np.isnan(dependence.gains) if is_unlimited else dependence.gains == coordinate
+        median = np.median(dependence.values[has_value])
+        medians.append(f"{parameter.format_coordinate(coordinate)}: {median:.3f}")
+    return f"{dependence.label}, medians at {', '.join(medians)}"
+
+
+def _build_grid_plot(
+    group: RunGroup, first: _Parameter, second: _Parameter, axis: _DistanceAxis, *, key: str
+) -> PagePlot | None:
+    """Build the plot of medians over two gains of a controller; None if they were not tried on a grid."""
+    known_runs = [run for run in group.runs if np.isfinite(scale_distance(run, axis.scales))]
+    distances = np.array([scale_distance(run, axis.scales) for run in known_runs])
+    first_values = [first.to_coordinate(first.get_value(run)) for run in known_runs]
+    second_values = [second.to_coordinate(second.get_value(run)) for run in known_runs]
+    columns, column_indices = np.unique(first_values, return_inverse=True)
+    rows, row_indices = np.unique(second_values, return_inverse=True)
+    if not (1 < len(columns) <= MAX_LEVELS and 1 < len(rows) <= MAX_LEVELS):
+        return None
+    medians = np.full((len(rows), len(columns)), np.nan)
+    for row, column in set(zip(row_indices.tolist(), column_indices.tolist(), strict=True)):
+        is_in_cell = (row_indices == row) & (column_indices == column)
+        medians[row, column] = np.median(distances[is_in_cell])
+    if np.isnan(medians).mean() > _MAX_MISSING_FRACTION:
+        return None
+    figure = plot_gain_grid(
+        PANEL_SIZE_PX,
+        [first.to_value(coordinate) for coordinate in columns],
+        [second.to_value(coordinate) for coordinate in rows],
+        medians,
+        (first.title, second.title),
+    )
+    title = f"{group.label} over {first.name} and {second.name}"
+    distance = "final distance in m" if axis.label == FINAL_DISTANCE_LABEL else SCALED_DISTANCE_LABEL
+    span = _describe_grid(medians, first, second, columns, rows)
+    return PagePlot(title, inline_svg(figure, key, f"{title}: medians of the {distance}, {span}."))
+
+
+def _describe_grid(medians: Array, first: _Parameter, second: _Parameter, columns: Array, rows: Array) -> str:
+    """Return the lowest median with its gains, and the highest, as text."""
+    row, column = np.unravel_index(int(np.nanargmin(medians)), medians.shape)
+    first_text = f"{first.title} {first.format_coordinate(columns[column])}"
+    second_text = f"{second.title} {second.format_coordinate(rows[row])}"
+    low = np.nanmin(medians)
+    high = np.nanmax(medians)
+    return f"from {low:.3g} at {first_text} and {second_text} to {high:.3g}"

@@ -1,0 +1,197 @@
+"""Plots of metrics over time, for runs and comparisons."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
+from robocov_app.figures.curves import TIME
+from robocov_app.figures.results import Band, plot_cost_bands
+from robocov_app.figures.runs import to_free_area_percent
+from robocov_app.report.embedding import ReplayRun
+from robocov_app.report.pictures import has_path
+from robocov_app.report.plots.plot import PANEL_SIZE_PX, GroupStyles, PagePlot
+from robocov_app.report.results.result import ReportedResult
+from robocov_app.report.svg import inline_svg
+
+MAX_MEASURED_RUNS = 4
+MAX_MEASURED_ROBOTS = 60
+"""Maximum number of robots in a run that is measured. Their visible areas take some time to compute."""
+_SAMPLES_PER_RUN = 30
+"""Number of times at which a run is measured, after its start."""
+
+
+class _Metric(NamedTuple):
+    """A metric that has a plot.
+
+    Attributes
+    ----------
+    title : str
+    label : str
+        Of the axis.
+    unit : str
+    get_values : callable
+        Returns the values over time.
+    """
+
+    title: str
+    label: str
+    unit: str
+    get_values: Callable[[RunMetrics], Array]
+
+
+class _MetricCurves(NamedTuple):
+    """The curves of a plot.
+
+    Attributes
+    ----------
+    title, label, unit : str
+        See `_Metric`.
+    curves : list of ((T,) array, (T,) array)
+        Times, s, and values of each run.
+    """
+
+    title: str
+    label: str
+    unit: str
+    curves: list[tuple[Array, Array]]
+
+
+def _round_to_millimeters(gaps: Array) -> Array:
+    """Return gaps rounded to 1 mm, without negative zeros. Smaller overlaps are tolerated by the solver."""
+    return np.asarray(np.round(gaps, 3) + 0.0)
+
+
+_CONNECTIVITY = _Metric(
+    title="Connectivity",
+    label="parts of the team that hear each other",
+    unit="",
+    get_values=lambda metrics: np.asarray(metrics.components, float),
+)
+_METRICS = (
+    _Metric(
+        title="Sensed",
+        label="in range and in sight (% of the free area)",
+        unit="%",
+        get_values=to_free_area_percent(lambda metrics: metrics.sensed_area),
+    ),
+    _Metric(
+        title="Seen",
+        label="in line of sight (% of the free area)",
+        unit="%",
+        get_values=to_free_area_percent(lambda metrics: metrics.visible_area),
+    ),
+    _Metric(
+        title="Energy",
+        label="work |F v| so far (J)",
+        unit="J",
+        get_values=lambda metrics: metrics.work,
+    ),
+    _Metric(
+        title="Path",
+        label="path of a robot so far, mean (m)",
+        unit="m",
+        get_values=lambda metrics: metrics.path_length,
+    ),
+    _Metric(
+        title="Clearance",
+        label="smallest gap to a wall (m)",
+        unit="m",
+        get_values=lambda metrics: _round_to_millimeters(metrics.wall_clearance),
+    ),
+    _Metric(
+        title="Distance kept",
+        label="smallest gap between robots (m)",
+        unit="m",
+        get_values=lambda metrics: _round_to_millimeters(metrics.robot_clearance),
+    ),
+)
+
+
+def build_metric_plots(
+    result: ReportedResult, runs: Sequence[ReplayRun], styles: GroupStyles, key: str
+) -> list[PagePlot]:
+    """Build a plot for each metric.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    runs : sequence of ReplayRun
+    styles : mapping of str to CurveStyle
+    key : str
+        Start of the ids in the plots.
+
+    Returns
+    -------
+    list of PagePlot
+        None for a sweep, or if there are too many runs or robots, or trajectories are not known. Mean times
+        are plotted if they are known, and connectivity if it changes.
+    """
+    if result.kind == "sweep" or not _are_measurable(runs):
+        return []
+    plots = []
+    for metric_curves in _list_metric_curves(runs):
+        bands = _build_bands(metric_curves, runs, styles)
+        if bands:
+            plots.append(_build_metric_plot(metric_curves, bands, key))
+    return plots
+
+
+def _are_measurable(runs: Sequence[ReplayRun]) -> bool:
+    """Return whether the metrics of runs can be computed quickly, from known trajectories."""
+    if not 0 < len(runs) <= MAX_MEASURED_RUNS:
+        return False
+    return all(len(run.record.team) <= MAX_MEASURED_ROBOTS and has_path(run.record) for run in runs)
+
+
+def _list_metric_curves(runs: Sequence[ReplayRun]) -> list[_MetricCurves]:
+    """Compute the metrics of runs, and list their curves."""
+    all_metrics = [_measure(run) for run in runs]
+    metric_curves = []
+    mean_times = [
+        (run.history.time, run.history.mean_time)
+        for run in runs
+        if run.history is not None and run.history.mean_time is not None
+    ]
+    if len(mean_times) == len(runs):
+        metric_curves.append(_MetricCurves("Time to come", TIME, "s", mean_times))
+    has_connectivity = any((metrics.components != metrics.components[0]).any() for metrics in all_metrics)
+    metrics_to_plot = [*_METRICS, _CONNECTIVITY] if has_connectivity else _METRICS
+    for metric in metrics_to_plot:
+        curves = [(metrics.time, metric.get_values(metrics)) for metrics in all_metrics]
+        metric_curves.append(_MetricCurves(metric.title, metric.label, metric.unit, curves))
+    return metric_curves
+
+
+def _measure(run: ReplayRun) -> RunMetrics:
+    """Compute the metrics of a run at even times."""
+    duration = float(run.record.time[-1] - run.record.time[0])
+    rate = _SAMPLES_PER_RUN / duration if duration > 0.0 else 0.0
+    return compute_run_metrics(run.record, rate)
+
+
+def _build_bands(metric_curves: _MetricCurves, runs: Sequence[ReplayRun], styles: GroupStyles) -> list[Band]:
+    """Build the bands of runs with any finite value, each a single line."""
+    bands = []
+    for run, (times, values) in zip(runs, metric_curves.curves, strict=True):
+        is_finite = np.isfinite(values)
+        if is_finite.any():
+            row = np.where(is_finite, values, np.nan)
+            bands.append(Band(run.label, styles[run.label], times - times[0], row[None]))
+    return bands
+
+
+def _build_metric_plot(metric_curves: _MetricCurves, bands: Sequence[Band], key: str) -> PagePlot:
+    """Build the plot of a metric."""
+    title, label, unit, _ = metric_curves
+    texts = []
+    for band in bands:
+        finite_values = band.values[0][np.isfinite(band.values[0])]
+        first, last = finite_values[[0, -1]]
+        texts.append(f"{band.label}: from {first:.4g} to {last:.4g} {unit}".rstrip())
+    description = f"{title}: {label} against time. {'; '.join(texts)}."
+    figure = plot_cost_bands(bands, PANEL_SIZE_PX, label, unit)
+    svg_key = f"{key}-{title.lower().replace(' ', '-')}"
+    return PagePlot(title, inline_svg(figure, svg_key, description))

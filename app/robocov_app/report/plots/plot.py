@@ -1,0 +1,105 @@
+"""A plot of a page, and the panels of several settings."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, TypeAlias
+
+from matplotlib.figure import Figure
+
+from robocov_app.look.curve_styles import CurveStyle
+from robocov_app.report.analysis.groups import (
+    RunGroup,
+    format_setting,
+    list_displayed_groups,
+    list_settings,
+)
+from robocov_app.report.results.result import ReportedResult
+from robocov_app.report.svg import inline_svg
+
+GroupStyles: TypeAlias = Mapping[str, CurveStyle]
+"""Style of each label, see `robocov_app.report.analysis.groups.choose_group_styles`."""
+
+MAX_PANELS = 24
+"""Maximum number of settings, or maps, with a panel each."""
+PANEL_SIZE_PX = (420, 290)
+"""Size of a panel. On a telephone it is displayed a little smaller."""
+WIDE_SIZE_PX = (860, 360)
+"""Size of a plot that is alone in its row, if the screen is wide enough."""
+TOGETHER_TITLE = "All maps and teams together"
+FINAL_DISTANCE_LABEL = "final mean distance (m)"
+SCALED_DISTANCE_LABEL = "final distance / median of map and team"
+
+
+class PagePlot(NamedTuple):
+    """A plot of a page.
+
+    Attributes
+    ----------
+    title : str
+        Above the plot; may be empty.
+    svg : str
+    narrow : str
+        SVG for small screens; empty if the plot fits on these.
+    """
+
+    title: str
+    svg: str
+    narrow: str = ""
+
+
+class Panel(NamedTuple):
+    """The content of a panel that shows groups.
+
+    Attributes
+    ----------
+    title : str
+        Empty if there is only one panel.
+    key : str
+        Start of the ids in its SVG.
+    groups : list of RunGroup
+        With the runs of the panel only.
+    is_together : bool
+        Whether the panel shows several settings together.
+    """
+
+    title: str
+    key: str
+    groups: list[RunGroup]
+    is_together: bool
+
+
+def list_panels(result: ReportedResult, key: str) -> list[Panel]:
+    """List the panels of a result: all settings together, then each, if there are not too many."""
+    groups = list_displayed_groups(result)
+    settings = list_settings(result)
+    panels = []
+    if len(settings) > 1:
+        panels.append(Panel(TOGETHER_TITLE, f"{key}-all", groups, is_together=True))
+    if len(settings) <= MAX_PANELS:
+        for number, setting in enumerate(settings):
+            title = format_setting(result, setting) if len(settings) > 1 else ""
+            setting_groups = [group.select(setting) for group in groups]
+            panels.append(Panel(title, f"{key}-{number}", setting_groups, is_together=False))
+    return panels
+
+
+def build_panel_plot(panel: Panel, description: str, draw: Callable[[tuple[int, int]], Figure]) -> PagePlot:
+    """Build the plot of a panel. A panel without a title is alone in its row, and gets a second, wide SVG.
+
+    Parameters
+    ----------
+    panel : Panel
+    description : str
+        For readers who cannot see the plot.
+    draw : callable
+        Draws the figure in a size, px.
+
+    Returns
+    -------
+    PagePlot
+    """
+    if panel.title:
+        svg = inline_svg(draw(PANEL_SIZE_PX), panel.key, f"{panel.title}: {description}")
+        return PagePlot(panel.title, svg)
+    wide_svg = inline_svg(draw(WIDE_SIZE_PX), panel.key, description)
+    narrow_svg = inline_svg(draw(PANEL_SIZE_PX), f"{panel.key}1", description)
+    return PagePlot(panel.title, wide_svg, narrow_svg)

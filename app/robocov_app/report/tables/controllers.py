@@ -1,0 +1,69 @@
+"""Tables of controllers with their gains."""
+
+from collections.abc import Sequence
+
+from robocov.controllers.gains import Value, format_value
+from robocov_app.report.analysis.groups import RunGroup, format_gains, list_displayed_groups, list_variants
+from robocov_app.report.results.result import ReportedResult
+from robocov_app.report.tables.table import NO_VALUE, PageTable
+
+MAX_GAIN_SETS = 200
+"""Maximum number of sets of gains that are listed."""
+
+
+def build_controllers_table(result: ReportedResult) -> PageTable:
+    """Build the table of controllers, including those all of whose runs failed."""
+    groups = list_displayed_groups(result)
+    controllers = {group.controller for group in groups}
+    for run in result.failed_runs:
+        if run.controller not in controllers:
+            controllers.add(run.controller)
+            groups.append(RunGroup(run.label, run.controller, None, (run,)))
+    return _build_gains_table("Controllers and their gains", groups, result)
+
+
+def build_gain_sets_table(result: ReportedResult) -> PageTable | None:
+    """Build the table of all sets of gains; None if controllers are shown with them, or there are many."""
+    variants = list_variants(result)
+    if len(variants) == len(list_displayed_groups(result)) or len(variants) > MAX_GAIN_SETS:
+        return None
+    return _build_gains_table("Sets of gains", variants, result)
+
+
+def _build_gains_table(caption: str, groups: Sequence[RunGroup], result: ReportedResult) -> PageTable:
+    """Build a table of groups with their gains."""
+    rows = []
+    for group in groups:
+        if group.gains is None:
+            gains = _format_gain_ranges(group, result)
+        else:
+            gains = format_gains(group.gains, result.gain_units)
+        rows.append((group.label, group.controller, gains or NO_VALUE))
+    return PageTable(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}))
+
+
+def _format_gain_ranges(group: RunGroup, result: ReportedResult) -> str:
+    """Return the gains of a group with the ranges of their values."""
+    values: dict[str, list[Value]] = {}
+    for run in group.runs:
+        for name, value in run.gains:
+            values.setdefault(name, []).append(value)
+    texts = []
+    for name, gain_values in values.items():
+        texts.append(f"{name} {_format_range(gain_values, result.gain_units.get(name, ''))}")
+    return ", ".join(texts)
+
+
+def _format_range(values: Sequence[Value], unit: str) -> str:
+    """Return the range of numbers, or the alternatives of texts."""
+    if any(isinstance(value, str) for value in values):
+        return " or ".join(dict.fromkeys(map(format_value, values)))
+    numbers = [value for value in values if isinstance(value, int | float)]
+    if not numbers:
+        return "none"
+    low, high = min(numbers), max(numbers)
+    text = f"{low:.6g}" if low == high else f"{low:.4g} to {high:.4g}"
+    text += f" {unit}".rstrip()
+    if len(numbers) < len(values):
+        text += " or none"
+    return text

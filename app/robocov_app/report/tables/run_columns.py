@@ -1,0 +1,100 @@
+"""Columns of figures in tables of runs."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov_app.report.results.result import ReportedResult, ReportedRun
+from robocov_app.report.tables.table import NO_VALUE, format_quartiles
+
+
+class RunColumn(NamedTuple):
+    """A column of figures.
+
+    Attributes
+    ----------
+    heading : str
+    format_cell : callable
+        Returns the text for one run or several ones.
+    """
+
+    heading: str
+    format_cell: Callable[[Sequence[ReportedRun]], str]
+
+
+def build_quartiles_column(heading: str, name: str, decimals: int, no_value: str = NO_VALUE) -> RunColumn:
+    """Build a column with the median and the quartiles of a figure."""
+    return RunColumn(heading, lambda runs: format_quartiles(list_figures(runs, name), decimals, no_value))
+
+
+def build_final_distance_column() -> RunColumn:
+    """Build the column of final mean distances."""
+    return build_quartiles_column("Mean distance, m", "mean_distance_m", 3)
+
+
+def build_mean_over_run_column() -> RunColumn:
+    """Build the column of mean distances over the run."""
+    return build_quartiles_column("Over the run, m", "mean_distance_over_run_m", 3)
+
+
+def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> list[RunColumn]:
+    """Build the columns of all other figures.
+
+    Parameters
+    ----------
+    result : ReportedResult
+        Its mean times are a column if robots are not equally fast.
+    unsettled : str
+        Text in the column of settling times if a team did not settle.
+
+    Returns
+    -------
+    list of RunColumn
+    """
+    columns = [
+        build_quartiles_column("Settled at, s", "settled_at_s", 1, unsettled),
+        RunColumn("Contacts", _format_contacts),
+        RunColumn("Clearance, m", _format_clearance),
+        build_quartiles_column("Path, m", "path_length_m", 2),
+        RunColumn("Stuck robots", _format_stuck_robots),
+    ]
+    if any(run.has_figure("mean_time_s") for run in result.completed_runs):
+        columns.append(build_quartiles_column("Mean time, s", "mean_time_s", 3))
+    return columns
+
+
+def list_figures(runs: Sequence[ReportedRun], name: str) -> list[float]:
+    """List the values of a figure of some runs, as far as they are known."""
+    return [float(run.figures[name] or 0.0) for run in runs if run.has_figure(name)]
+
+
+def _format_contacts(runs: Sequence[ReportedRun]) -> str:
+    """Return the number of contacts of a run, or how many of several runs had any."""
+    counts = list_figures(runs, "contacts")
+    if not counts:
+        return NO_VALUE
+    if len(runs) == 1:
+        return f"{counts[0]:.0f}"
+    return f"{sum(count > 0 for count in counts)} of {len(counts)}"
+
+
+def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:
+    """Return the number of stuck robots of a run, or the mean of several runs."""
+    counts = list_figures(runs, "stuck_robots")
+    if not counts:
+        return NO_VALUE
+    if len(runs) == 1:
+        return f"{counts[0]:.0f}"
+    return f"{np.mean(counts):.2g} per run"
+
+
+def _format_clearance(runs: Sequence[ReportedRun]) -> str:
+    """Return the smallest gap to a wall in any of the runs."""
+    gaps = list_figures(runs, "min_clearance_m")
+    if not gaps:
+        return NO_VALUE
+    text = f"{min(gaps):.3f}"
+    # A minus sign is as wide as a digit. There is none before zero.
+    minus = "\u2212" if text.strip("-0.") else ""
+    return text.replace("-", minus)
