@@ -278,7 +278,7 @@ def _read_gain_columns(content: Mapping[str, Any], study: _SweepStudy) -> dict[s
 
 
 def _number_labels(runs: Sequence[ReportedRun]) -> tuple[ReportedRun, ...]:
-    """Number the labels of different controllers with the same label: "Mine", "Mine #2", ..."""
+    """Distinguish controllers with the same label: "Mine", "Mine #2", ..."""
     labels: dict[str, str] = {}
     for run in runs:
         if run.controller in labels:
