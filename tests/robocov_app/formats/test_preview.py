@@ -16,7 +16,7 @@ from shapely import MultiPolygon, Polygon, box
 from robocov.errors import OutputError, ParameterError
 from robocov_app.figures.page import tone
 from robocov_app.formats import ForeignMap, Shaping, build_environment
-from robocov_app.formats.preview import plot_import, preview
+from robocov_app.formats.preview import plot_import, save_preview
 from robocov_app.look.theme import DARK, LIGHT
 
 HALL = box(0, 0, 12, 8)
@@ -108,13 +108,13 @@ def test_files_are_the_same_every_time(tmp_path: Path) -> None:
     read = foreign(HALL - PILLARS)
     environment, report = build_environment(read, Shaping(), "plan.svg")
     for name in ("plan.png", "plan.svg", "plan.pdf"):
-        preview(read, environment, report, tmp_path / name)
+        save_preview(read, environment, report, tmp_path / name)
         first = (tmp_path / name).read_bytes()
-        preview(read, environment, report, tmp_path / name)
+        save_preview(read, environment, report, tmp_path / name)
         assert (tmp_path / name).read_bytes() == first
     with Image.open(tmp_path / "plan.png") as picture:
         assert picture.getpixel((2, 2))[:3] == LIGHT.background
     with pytest.raises(ParameterError, match=r"expected .png, .svg or .pdf, got suffix '.bmp'"):
-        preview(read, environment, report, tmp_path / "plan.bmp")
+        save_preview(read, environment, report, tmp_path / "plan.bmp")
     with pytest.raises(OutputError, match="there is no folder"):
-        preview(read, environment, report, tmp_path / "none" / "plan.png")
+        save_preview(read, environment, report, tmp_path / "none" / "plan.png")

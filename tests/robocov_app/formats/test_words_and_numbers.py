@@ -18,7 +18,7 @@ from robocov_app.formats.geometry.map_layout import build_boundary
 from robocov_app.formats.geometry.polygons import format_decimal
 from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
 from robocov_app.formats.geometry.vectorize import trace_outline
-from robocov_app.formats.preview import _number
+from robocov_app.formats.preview.plotting import _format_number
 from robocov_app.formats.reports import format_area
 from robocov_app.formats.svg.path_data import parse_path
 from robocov_app.formats.svg.style import parse_declarations
@@ -33,7 +33,7 @@ def test_numbers_are_written_so_that_they_are_read_easily() -> None:
         "1200",
     )
     assert (_format_share(1, 100_000), _format_share(500, 1000)) == ("<0.1 %", "50 %")
-    assert (_number(1761234.5), _number(35.2789)) == ("1\u202f761\u202f234", "35.28")
+    assert (_format_number(1761234.5), _format_number(35.2789)) == ("1\u202f761\u202f234", "35.28")
     assert (format_plural(2, "empty geometry"), format_plural(2, "box")) == ("2 empty geometries", "2 boxes")
 
 

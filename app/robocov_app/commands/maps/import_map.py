@@ -70,9 +70,9 @@ def command(options: Arguments) -> None:
         save_map(environment, out)
         update(2)
         if options.preview is not None:
-            from robocov_app.formats.preview import preview
+            from robocov_app.formats.preview import save_preview
 
-            preview(foreign_map, environment, report, options.preview)
+            save_preview(foreign_map, environment, report, options.preview)
         update(3)
     files = {"out": str(out)}
     if options.preview is not None:

@@ -1,0 +1,153 @@
+"""Layout of the figure of an import: two arenas next to or above each other, captions, and lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from matplotlib.artist import Artist
+
+from robocov_app.figures.page import SMALL, TITLE, Box, Page
+from robocov_app.look.theme import Theme
+from robocov_app.render.layout import columns_for
+
+LINE_HEIGHT_PX = 17.0
+"""Height of a line of the report, at scale 1."""
+_MAX_WIDTH_PX = 1600
+_MIN_WIDTH_PX = 1040
+"""Width that the texts need."""
+_MAX_ARENAS_HEIGHT_PX = 1000
+_MIN_HEIGHT_PX = 320
+_SCALE = 1.3
+"""Scale of texts and lines."""
+_TITLE_HEIGHT_PX = 66.0
+_CAPTION_HEIGHT_PX = 34.0
+_ROW_GAP_PX = 14
+_MARGIN_BELOW_LINES_PX = 14
+_CAPTION_GAP_PX = 12
+"""All at scale 1."""
+_ARENA_COUNT = 2
+_MAX_LINES = 12
+"""Maximum number of lines of the report; more are counted."""
+_CONTINUATION_INDENT = "    "
+
+
+class Caption(NamedTuple):
+    """The text above an arena: its name, and facts in a fainter color."""
+
+    name: str
+    facts: str
+
+
+class Panel(NamedTuple):
+    """The place of an arena.
+
+    Attributes
+    ----------
+    box : (left, top, width, height), px
+    caption_width : float, px
+        Width of the space above it.
+    """
+
+    box: Box
+    caption_width: float
+
+
+class ImportPage(NamedTuple):
+    """The page of an import.
+
+    Attributes
+    ----------
+    page : Page
+    panels : list of Panel
+        The map as it was read, and as it became.
+    lines : list of str
+        Lines of the report, none wider than the page.
+    """
+
+    page: Page
+    panels: list[Panel]
+    lines: list[str]
+
+
+def lay_out_page(
+    theme: Theme, aspect: float, captions: Sequence[Caption], handles: list[Artist], lines: Sequence[str]
+) -> ImportPage:
+    """Lay out the page of an import, as large as its contents.
+
+    Parameters
+    ----------
+    theme : Theme
+    aspect : float
+        Width of an arena divided by its height.
+    captions : sequence of Caption
+        One for each arena.
+    handles : list of matplotlib artists
+        Entries of the legend.
+    lines : sequence of str
+        Lines of the report.
+
+    Returns
+    -------
+    ImportPage
+        Empty, but for its size.
+    """
+    page = Page((_MAX_WIDTH_PX, _MAX_WIDTH_PX), theme, _SCALE)
+    margin = page.margin
+    title_height = _TITLE_HEIGHT_PX * page.scale
+    caption_height = _CAPTION_HEIGHT_PX * page.scale
+    caption_width = max(
+        measure_caption_indent(page, caption.name) + page.text_width(caption.facts) for caption in captions
+    )
+    columns = columns_for(_ARENA_COUNT, aspect, (_MAX_WIDTH_PX, _MAX_ARENAS_HEIGHT_PX), caption_height)
+    rows = _ARENA_COUNT // columns
+    max_arena_height = _MAX_ARENAS_HEIGHT_PX / rows
+    max_arena_width = (_MAX_WIDTH_PX - margin) / columns - margin
+    # A map that is higher than wide needs no wide page.
+    arena_width = min(max_arena_width, max(aspect * max_arena_height, caption_width))
+    arena_height = min(arena_width / aspect, max_arena_height)
+    width = max(columns * (arena_width + margin) + margin, _MIN_WIDTH_PX)
+    slot_width = min(max(arena_height * aspect, caption_width), (width - margin) / columns - margin)
+    left = (width - columns * slot_width - (columns - 1) * margin) / 2
+    page = Page((int(width), _MAX_WIDTH_PX), theme, _SCALE)
+    lines = wrap_lines(page, lines, width - left - margin)
+    lines_height = (LINE_HEIGHT_PX * len(lines) + _MARGIN_BELOW_LINES_PX) * page.scale
+    height_below = page.footer_height(handles) + lines_height
+    gaps_height = (rows - 1) * _ROW_GAP_PX * page.scale
+    height = title_height + rows * (caption_height + arena_height) + gaps_height + height_below
+    page = Page((int(width), int(max(height, _MIN_HEIGHT_PX))), theme, _SCALE)
+    boxes = page.panels(
+        _ARENA_COUNT, columns, aspect, caption_width, caption_height, title_height, height_below
+    )
+    return ImportPage(page, [Panel(box, width) for box, width in boxes], lines)
+
+
+def measure_caption_indent(page: Page, name: str) -> float:
+    """Return the distance from the start of a caption to its facts, px."""
+    return page.text_width(name, points=TITLE, bold=True) + _CAPTION_GAP_PX * page.scale
+
+
+def wrap_lines(page: Page, lines: Sequence[str], max_width: float) -> list[str]:
+    """Return lines of the report no wider than `max_width`, px, and not too many."""
+    wrapped: list[str] = []
+    for line in lines:
+        wrapped += _wrap_line(page, line, max_width)
+    if len(wrapped) > _MAX_LINES:
+        shown = wrapped[: _MAX_LINES - 1]
+        wrapped = [*shown, f"and {len(wrapped) - len(shown)} more lines"]
+    return wrapped
+
+
+def _wrap_line(page: Page, line: str, max_width: float) -> list[str]:
+    """Return a line, or several with a part of its words each if it is too wide."""
+    if page.text_width(line, points=SMALL) <= max_width:
+        return [line]
+    wrapped: list[str] = []
+    current = ""
+    for word in line.split():
+        extended = f"{current} {word}".strip()
+        if current.strip() and page.text_width(extended, points=SMALL) > max_width:
+            wrapped.append(current)
+            extended = f"{_CONTINUATION_INDENT}{word}"
+        current = extended
+    return [*wrapped, current]

@@ -1,0 +1,257 @@
+"""The figure of an import: the map as it was read and as it became, with the differences marked."""
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.environment import Environment, Gap
+from robocov_app.figures.arena import build_map_handles, draw_map
+from robocov_app.figures.files import check_figure_path, plain_style, save_figure
+from robocov_app.figures.page import HEADING, SMALL, TITLE, Page, tone
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
+from robocov_app.formats.preview.layout import (
+    LINE_HEIGHT_PX,
+    Caption,
+    ImportPage,
+    lay_out_page,
+    measure_caption_indent,
+)
+from robocov_app.formats.reports import ImportReport
+from robocov_app.look.colors import Color
+from robocov_app.look.theme import LIGHT, Theme, get_theme
+
+_MARK_OPACITY = 0.55
+_EDGE_WIDTH_PT = 0.8
+_AREA_ORDER = 2
+"""Order in which areas are drawn: above the ground."""
+_MARK_ORDER = 5
+"""Order in which positions and the passage are drawn: above everything else."""
+_PASSAGE_RING_PT = 20.0
+"""Diameter of the ring around a passage that is too short to be seen."""
+_MIN_GROUPED_NUMBER = 9999.5
+"""Larger numbers are whole, with thin spaces between groups of digits."""
+_THIN_SPACE = "\u202f"
+
+
+def save_preview(foreign: ForeignMap, environment: Environment, report: ImportReport, path: Path) -> None:
+    """Save the figure of an import.
+
+    Parameters
+    ----------
+    foreign, environment, report
+        See `plot_import`.
+    path : Path
+        A .png, .svg or .pdf.
+
+    Raises
+    ------
+    ParameterError
+        If the path has another suffix.
+    OutputError
+        If the file cannot be written.
+    """
+    check_figure_path(path)
+    save_figure(plot_import(foreign, environment, report), path)
+
+
+def plot_import(
+    foreign: ForeignMap, environment: Environment, report: ImportReport, *, theme: Theme | str = LIGHT
+) -> Figure:
+    """Plot a map as it was read and as it became, at the same scale, with the report.
+
+    Marked are free space that is not in the map any more, solid areas that became free, and the narrowest
+    passage.
+
+    Parameters
+    ----------
+    foreign : ForeignMap
+        The map as it was read.
+    environment : Environment
+        The map as it became.
+    report : ImportReport
+    theme : Theme or str
+    """
+    theme = get_theme(theme)
+    comparison = compare_maps(foreign, environment, report)
+    low_x, low_y, high_x, high_y = comparison.bounds
+    aspect = (high_x - low_x) / (high_y - low_y)
+    free_before = _format_number(comparison.before.area)
+    free_after = _format_number(comparison.after.area)
+    captions = (
+        Caption("as read", f"{_format_number(report.vertices_read)} vertices, {free_before} m² free"),
+        Caption("as imported", f"{_format_number(report.vertices_kept)} vertices, {free_after} m² free"),
+    )
+    with plain_style():
+        handles = _build_handles(environment, theme, comparison)
+        # The first two lines of the report are in the title and the captions.
+        layout = lay_out_page(theme, aspect, captions, handles, report.format_lines()[2:])
+        _write_title(layout, environment, report)
+        for panel, caption in zip(layout.panels, captions, strict=True):
+            _write_caption(layout.page, caption, panel.box[0], panel.box[1], panel.caption_width)
+        boxes = [panel.box for panel in layout.panels]
+        before, after = (layout.page.map_axes(box, *comparison.bounds) for box in boxes)
+        _draw_before(before, comparison, report, theme)
+        draw_map(after, environment, theme)
+        _draw_area(after, comparison.opened, theme.start, theme.start, _MARK_OPACITY)
+        if comparison.gap is not None:
+            _draw_gap(after, comparison.gap, theme)
+        _, _, arena_width, _ = boxes[0]
+        layout.page.footer(handles, boxes, arena_width / (high_x - low_x))
+        _write_lines(layout)
+        return layout.page.figure
+
+
+def _get_left(layout: ImportPage) -> float:
+    """Return the left edge of the arenas, px."""
+    return min(panel.box[0] for panel in layout.panels)
+
+
+def _write_title(layout: ImportPage, environment: Environment, report: ImportReport) -> None:
+    page = layout.page
+    left = _get_left(layout)
+    max_width = page.size[0] - left - page.margin
+    page.text(environment.name, left, 24 * page.scale, points=HEADING, bold=True, room=max_width)
+    width, height = report.size
+    facts = f"{width:.4g} x {height:.4g} m, imported from {report.format}"
+    page.text(facts, left, 44 * page.scale, color=page.theme.faint, room=max_width)
+
+
+def _write_caption(page: Page, caption: Caption, left: float, top: float, width: float) -> None:
+    """Write a caption above an arena with a left and a top edge, px."""
+    y = top - 14 * page.scale
+    page.text(caption.name, left, y, points=TITLE, bold=True)
+    indent = measure_caption_indent(page, caption.name)
+    page.text(caption.facts, left + indent, y, color=page.theme.faint, room=width - indent)
+
+
+def _write_lines(layout: ImportPage) -> None:
+    """Write the lines of the report at the bottom of the page."""
+    page = layout.page
+    left = _get_left(layout)
+    for k, line in enumerate(reversed(layout.lines)):
+        y = page.size[1] - (LINE_HEIGHT_PX * k + 16) * page.scale
+        page.text(line, left, y, points=SMALL, color=page.theme.faint)
+
+
+def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport, theme: Theme) -> None:
+    """Draw the map as it was read, what was lost, and the positions of parts that were left out."""
+    outside = shapely.difference(comparison.region, comparison.before)
+    _draw_area(axes, outside, theme.obstacle, theme.obstacle_edge)
+    # Free space has an edge also where it ends at the edge of the arena.
+    rings = shapely.get_rings(shapely.get_parts(comparison.before))
+    edges = LineCollection(
+        [shapely.get_coordinates(ring) for ring in rings],
+        colors=tone(theme.obstacle_edge),
+        linewidths=_EDGE_WIDTH_PT,
+        clip_on=False,
+        zorder=_AREA_ORDER,
+    )
+    axes.add_collection(edges, autolim=False)
+    _draw_area(axes, comparison.lost, theme.trajectory, theme.trajectory, _MARK_OPACITY)
+    ink = tone(theme.ink)
+    halo = [withStroke(linewidth=3.0, foreground=tone(theme.background))]
+    for x, y in report.others:
+        axes.plot([x], [y], marker="+", markersize=8.0, color=ink, zorder=_MARK_ORDER, path_effects=halo)
+        axes.annotate(
+            f"{x:.10g} {y:.10g}",
+            (x, y),
+            (6, 6),
+            textcoords="offset points",
+            fontsize=SMALL,
+            color=ink,
+            zorder=_MARK_ORDER,
+            path_effects=halo,
+        )
+
+
+def _draw_area(axes: Axes, area: BaseGeometry, fill: Color, edge: Color, opacity: float = 1.0) -> None:
+    """Draw the polygons of a geometry, m."""
+    for part in shapely.get_parts(area):
+        if not isinstance(part, Polygon):
+            continue
+        rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
+        outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
+        patch = PathPatch(
+            outline,
+            zorder=_AREA_ORDER,
+            facecolor=(*tone(fill), opacity),
+            edgecolor=tone(edge),
+            linewidth=_EDGE_WIDTH_PT,
+        )
+        axes.add_patch(patch)
+
+
+def _draw_gap(axes: Axes, gap: Gap, theme: Theme) -> None:
+    """Draw the narrowest passage as a line, with a ring around it if the line is short."""
+    color = tone(theme.final)
+    points = np.array(gap.between)
+    halo = [withStroke(linewidth=4.2, foreground=tone(theme.background))]
+    axes.plot(
+        points[:, 0],
+        points[:, 1],
+        color=color,
+        linewidth=2.0,
+        zorder=_MARK_ORDER,
+        clip_on=False,
+        path_effects=halo,
+    )
+    points_per_pixel = 72 / axes.figure.dpi
+    start, end = axes.transData.transform(points) * points_per_pixel
+    if np.hypot(*(end - start)) >= _PASSAGE_RING_PT:
+        return
+    x, y = points.mean(axis=0)
+    axes.plot(
+        x,
+        y,
+        "o",
+        markersize=_PASSAGE_RING_PT,
+        markerfacecolor="none",
+        markeredgecolor=color,
+        markeredgewidth=1.8,
+        zorder=_MARK_ORDER,
+        clip_on=False,
+        path_effects=halo,
+    )
+
+
+def _build_handles(environment: Environment, theme: Theme, comparison: ImportComparison) -> list[Artist]:
+    """Return the entries of the legend, of marks only if there are any."""
+    handles = build_map_handles(environment, theme)
+    if not comparison.lost.is_empty:
+        area = _format_number(comparison.lost.area)
+        handles.append(_build_mark_handle(f"left out: {area} m² were free", theme.trajectory))
+    if not comparison.opened.is_empty:
+        area = _format_number(comparison.opened.area)
+        handles.append(_build_mark_handle(f"opened: {area} m² were solid", theme.start))
+    if comparison.gap is not None:
+        label = f"narrowest passage, {comparison.gap.width:.3g} m"
+        handles.append(Line2D([], [], color=tone(theme.final), linewidth=2.0, label=label))
+    return handles
+
+
+def _build_mark_handle(label: str, color: Color) -> Patch:
+    return Patch(
+        label=label,
+        facecolor=(*tone(color), _MARK_OPACITY),
+        edgecolor=tone(color),
+        linewidth=_EDGE_WIDTH_PT,
+    )
+
+
+def _format_number(value: float) -> str:
+    """Return a number with four significant digits, or whole if it is large."""
+    if abs(value) < _MIN_GROUPED_NUMBER:
+        return f"{value:.4g}"
+    return f"{value:,.0f}".replace(",", _THIN_SPACE)
