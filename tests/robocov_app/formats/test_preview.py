@@ -82,6 +82,15 @@ def test_walls_that_moved_by_the_tolerance_are_nothing_lost() -> None:
     assert not marked(figure.axes[1], LIGHT.start)
 
 
+def test_all_lines_of_a_long_note_but_the_first_are_indented() -> None:
+    figure = plotted(HALL, notes=("long note " * 60,))
+    lines = [text.get_text() for text in figure.texts if "long note" in text.get_text()]
+    assert len(lines) > 2
+    *indented, first = lines  # The last line of the report is written first.
+    assert first.startswith("note: long note")
+    assert all(line.startswith("    ") for line in indented)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "free", [HALL, box(0, 0, 60, 2), box(0, 0, 2, 60), box(5e5, 5e6, 5e5 + 30, 5e6 + 20), box(0, 0, 1, 1)],

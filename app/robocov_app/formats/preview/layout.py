@@ -139,14 +139,14 @@ def wrap_lines(page: Page, lines: Sequence[str], max_width: float) -> list[str]:
 
 
 def _wrap_line(page: Page, line: str, max_width: float) -> list[str]:
-    """Return a line, or several with a part of its words each if it is too wide."""
+    """Return a line, or several if it is too wide, all but the first one indented."""
     if page.text_width(line, points=SMALL) <= max_width:
         return [line]
     wrapped: list[str] = []
     current = ""
     for word in line.split():
-        extended = f"{current} {word}".strip()
-        if current.strip() and page.text_width(extended, points=SMALL) > max_width:
+        extended = f"{current} {word}" if current else word
+        if current and page.text_width(extended, points=SMALL) > max_width:
             wrapped.append(current)
             extended = f"{_CONTINUATION_INDENT}{word}"
         current = extended
