@@ -83,7 +83,7 @@ class Barrier(BaseController):
     """
 
     name = "barrier"
-    label = "LA, safe"
+    label = "Lloyd, barrier"
     summary = "Lloyd's algorithm with safety barrier certificates (Wang, Ames and Egerstedt 2017)"
     scanning = Scanning(rays=72, period=0.1)
     memory_type = BarrierMemory

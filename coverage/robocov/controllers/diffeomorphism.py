@@ -71,7 +71,7 @@ class Diffeomorphism(WholeMapController):
     """
 
     name = "diffeomorphism"
-    label = "LA, diffeomorphism"
+    label = "Lloyd, diffeomorphism"
     summary = "Lloyd's algorithm in a convex chart of the known map (Caicedo-Núñez and Žefran 2008)"
 
     shrink: float = gain(1e4, "1", "stiffness of obstacles relative to the free space", low=1.0, high=1e6)

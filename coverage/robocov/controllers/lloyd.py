@@ -85,7 +85,7 @@ class RangeLimited(BaseController):
     """
 
     name = "range-limited"
-    label = "LA, limited range"
+    label = "Lloyd, limited range"
     summary = "Lloyd's algorithm on cells within half the interaction range (Cortés, Martínez and Bullo 2005)"
 
     interaction_range: float | None = gain(

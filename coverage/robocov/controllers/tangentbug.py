@@ -183,7 +183,7 @@ class TangentBug(BaseController):
     """
 
     name = "tangentbug"
-    label = "LA + TangentBug"
+    label = "Lloyd + TangentBug"
     summary = "Lloyd's algorithm, with TangentBug to avoid obstacles (Breitenmoser et al. 2010)"
     scanning = Scanning(rays=120, period=0.1)
     memory_type = TangentBugMemory

@@ -64,7 +64,7 @@ def judge_all_goals(outcomes: Outcomes, times: dict[int, StepTimes] | None = Non
     return {goal.key.removeprefix("goal-"): goal for goal in found}
 
 
-UNSURE = "met; the interval reaches over the bound"
+UNSURE = "met; the interval includes the bound"
 
 
 def test_all_goals_are_met():
@@ -129,7 +129,7 @@ def test_on_maps_of_other_families_it_is_judged_once_more(changes, verdict):
     assert [criterion.measure for criterion in claim.criteria] == [
         "median of J/J_ref - 1",
         "runs with a contact",
-        "runs that come to rest",
+        "runs that settle",
         f"median of J({OURS.label}) / J({RAPF.label}) at the end",
         f"median of J({OURS.label}) / J({LLOYD.label}) at the end",
     ]

@@ -107,7 +107,7 @@ class TestVerdicts:
         )
         claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted_p_value=adjusted)
         assert (claim.verdict, claim.p_value) == (verdict, 0.5)
-        assert claim.p_value_text == ("p = 0.5" if adjusted is None else f"p = 0.5, by Holm {adjusted}")
+        assert claim.p_value_text == ("p = 0.5" if adjusted is None else f"p = 0.5, Holm-adjusted {adjusted}")
 
     def test_registered_claims_are_adjusted_together(self):
         convex = build_outcomes(rapf_shared=0.7, rpf_shared=1.0, lloyd=1.0)

@@ -16,7 +16,7 @@ def build_degradations() -> list[Degradation]:
         ("failure_rate", (0.0, 0.1)),
     ):
         for k, value in enumerate(values):
-            for name, label in (("rapf", "RAPF"), ("lloyd", "LA")):
+            for name, label in (("rapf", "RAPF"), ("lloyd", "Lloyd")):
                 ratio = Interval(1.0 + 0.2 * k, 1.0, 1.0 + 0.4 * k)
                 rows.append(Degradation(axis, value, name, label, ratio, 6))
     return rows
@@ -32,7 +32,7 @@ def test_each_disturbance_has_a_panel_and_each_controller_a_curve(theme: str) ->
         "Failure rate (1/s)",
     ]
     assert [text.get_text() for text in panels[1].get_xticklabels()] == ["no limit", "2"]
-    assert {text.get_text() for text in figure.legends[0].get_texts()} == {"RAPF", "LA"}
+    assert {text.get_text() for text in figure.legends[0].get_texts()} == {"RAPF", "Lloyd"}
     for axes in panels:
         marked = [line for line in axes.lines if line.get_marker() in ("o", "^")]
         assert len(marked) == 2

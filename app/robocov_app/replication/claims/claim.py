@@ -166,7 +166,7 @@ class Claim:
         """The p-values as text, for example "p = 0.001, by Holm 0.007"."""
         text = f"p = {format_amount(self.p_value)}"
         if self.adjusted_p_value is not None:
-            text += f", by Holm {format_amount(self.adjusted_p_value)}"
+            text += f", Holm-adjusted {format_amount(self.adjusted_p_value)}"
         return text
 
     @property

@@ -26,13 +26,13 @@ def judge_convex_final(outcomes: Outcomes) -> Claim:
     nearly_same = share(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.outcomes.maps)
     criteria = (
         Criterion(
-            "median of J(RAPF) / J(LA) at the end",
+            "median of J(RAPF) / J(Lloyd) at the end",
             pairs.ratio,
             low=1.0 - SAME_COST,
             high=1.0 + SAME_COST,
         ),
         Criterion(
-            f"runs that end within {format_amount(NEARLY_SAME, '%')} of LA",
+            f"runs that end within {format_amount(NEARLY_SAME, '%')} of Lloyd",
             nearly_same,
             low=NEARLY_ALWAYS,
             unit="%",
@@ -41,7 +41,7 @@ def judge_convex_final(outcomes: Outcomes) -> Claim:
     lowest = format_amount(pairs.ratios.min())
     highest = format_amount(pairs.ratios.max())
     explanation = (
-        f"The ratio lies between {lowest} and {highest}; LA ends in "
+        f"The ratio lies between {lowest} and {highest}; Lloyd ends in "
         f"a centroidal tessellation, of which a region has several. {describe_other_gains(outcomes)}"
     )
     return claim.judge(criteria, explanation, pairs.outcomes, runs_per_instance=2)
@@ -58,8 +58,8 @@ def judge_convex_spreading(outcomes: Outcomes) -> Claim:
             "VI-A",
         ),
         outcomes.select_starts(*CLUSTERED).compare("rapf-shared", "lloyd", "early"),
-        ratio_measure=f"median ratio, RAPF to LA, of the {measure}",
-        wins_measure=f"runs in which RAPF's {measure} is the lower one",
+        ratio_measure=f"median ratio, RAPF to Lloyd, of the {measure}",
+        wins_measure=f"runs in which RAPF's {measure} is lower",
         explain=lambda pairs: (
             f"Per start: {list_ratios_by_start(pairs)}. The paper itself concludes that “the improvement of "
             f"RAPF is negligible” in convex regions, after having called it “quite better” from close starts."

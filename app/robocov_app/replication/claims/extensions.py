@@ -47,14 +47,14 @@ def judge_density(outcomes: Outcomes) -> Claim:
         Claim(
             "density",
             EXTENSIONS,
-            "Where some places count more, RAPF that knows which ends at a clearly lower weighed cost.",
+            "With a density, RAPF ends at a clearly lower weighted cost if it knows the density.",
         ),
         outcomes.compare("known", "ignored"),
-        ratio_measure="median ratio of the mean distance by φ",
-        wins_measure="runs in which it is the lower one",
+        ratio_measure="median ratio of the mean distance weighted by φ",
+        wins_measure="runs in which it is lower",
         explain=lambda _: (
-            "Both are judged by the same φ: two Gaussians of 1 m on every map, 20 high over a floor of 1, "
-            "drawn by chance in the free space."
+            "Both are rated by the same φ: two Gaussians of 1 m on every map, 20 high on a floor of 1, "
+            "at random positions of the free space."
         ),
         max_ratio=CLEARLY_BELOW,
     )
@@ -68,16 +68,16 @@ def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
         Claim(
             f"teams-{controller}",
             EXTENSIONS,
-            f"In a mixed team {label} is at places sooner, in the mean, with cells by time than by distance.",
+            f"In a mixed team, {label} reaches points sooner on average with cells by time than by distance.",
         ),
         outcomes.compare(by_time.key, by_distance.key, "time"),
-        ratio_measure="median ratio of the mean time, by time to by distance",
-        wins_measure="runs in which it is the lower one",
+        ratio_measure="median ratio of the mean time, cells by time to cells by distance",
+        wins_measure="runs in which it is lower",
         explain=lambda pairs: (
-            f"Median of the mean time until the first robot is there: "
+            f"Median of the mean time until the first robot arrives: "
             f"{format_median(pairs.second_values, 's')} "
             f"with cells by distance, {format_median(pairs.first_values, 's')} by time. "
-            f"Two robots each of at most 1, 0.5 and 0.25 m/s."
+            f"Two robots each with a maximum of 1, 0.5 and 0.25 m/s."
         ),
     )
 
@@ -94,8 +94,7 @@ def judge_conditions(degradations: Iterable[Degradation], maps: int) -> Claim:
     claim = Claim(
         "conditions",
         EXTENSIONS,
-        f"RAPF ends within {format_amount(NEARLY_SAME, '%')} of its cost where messages get lost or are "
-        "late.",
+        f"RAPF ends within {format_amount(NEARLY_SAME, '%')} of its cost if messages are lost or late.",
     )
     rapf = [
         degradation
@@ -108,7 +107,7 @@ def judge_conditions(degradations: Iterable[Degradation], maps: int) -> Claim:
     for disturbance, description in TOLERATED:
         known = by_value.get(disturbance)
         if known is not None:
-            measure = f"final cost where {description}, by that under ideal conditions"
+            measure = f"final cost if {description}, relative to that under ideal conditions"
             criteria.append(Criterion(measure, known.ratio, high=1.0 + NEARLY_SAME))
             runs += 2 * known.runs
     if not criteria:

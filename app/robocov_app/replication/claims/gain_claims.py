@@ -33,7 +33,7 @@ def judge_gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     rapf_variation = compute_variation(rapf)
     rpf_variation = compute_variation(rpf)
     ratios = rapf_variation / np.maximum(rpf_variation, _MIN_VARIATION)
-    measure = "median standard deviation of the final cost over the gains, by its mean"
+    measure = "median standard deviation of the final cost over the gains, relative to its mean"
     criteria = (
         *build_variation_criteria(measure, rapf_variation, rpf_variation, rapf.maps, BARELY),
         Criterion(
@@ -43,8 +43,8 @@ def judge_gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     rapf_worst = format_median(compute_worst_by_best(rapf))
     rpf_worst = format_median(compute_worst_by_best(rpf))
     explanation = (
-        f"{len(rapf.gains)} sets of gains for RAPF and {len(rpf.gains)} for RPF. Worst by best set, median: "
-        f"RAPF {rapf_worst}, RPF {rpf_worst}. "
+        f"{len(rapf.gains)} sets of gains for RAPF and {len(rpf.gains)} for RPF. "
+        f"Median ratio of the worst to the best set: RAPF {rapf_worst}, RPF {rpf_worst}. "
         f"RAPF at one attraction: {_describe_attractions(rapf)}."
     )
     return claim.judge(criteria, explanation, rapf, runs_per_instance=len(rapf.gains) + len(rpf.gains))
@@ -92,14 +92,14 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     claim = Claim(
         "gains-choice",
         3,
-        "Which gains are best depends on the environment for RPF, and hardly does for RAPF.",
+        "Which gains are best depends on the environment for RPF, but hardly for RAPF.",
         "VI-B: “the best choice of the potential parameters is environment dependent”",
     )
     rapf_regrets, maps = compute_regrets(rapf)
     rpf_regrets, _ = compute_regrets(rpf)
     if not len(rapf_regrets):
         return claim
-    measure = "mean cost, in excess, of the gains that are best on other maps instead of on the same one"
+    measure = "mean excess of the cost with the best gains of other maps over that with the map's own"
     criteria = (
         Criterion(f"RPF: {measure}", bootstrap(rpf_regrets, "mean", maps), low=REGRET, unit="%"),
         Criterion("RAPF: the same", bootstrap(rapf_regrets, "mean", maps), high=REGRET, unit="%"),
@@ -107,7 +107,7 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     rapf_best = format_potential(rapf.gains[rapf.find_best()])
     rpf_best = format_potential(rpf.gains[rpf.find_best()])
     explanation = (
-        f"Both sets are judged from a start that neither was chosen on. Highest excess: RPF "
+        f"Both sets are judged from a start on which neither was chosen. Highest excess: RPF "
         f"{format_amount(rpf_regrets.max(), '%')}, RAPF {format_amount(rapf_regrets.max(), '%')}. "
         f"Best over all maps: RAPF {rapf_best}, RPF {rpf_best}."
     )

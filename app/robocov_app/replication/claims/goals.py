@@ -49,7 +49,7 @@ def _build_main_criteria(outcomes: Outcomes, key: str) -> _MainCriteria:
     return _MainCriteria(
         gap=Criterion("median of J/J_ref - 1", gap, high=MAX_GAP, unit="%"),
         contacts=Criterion("runs with a contact", contacts, high=RARELY, unit="%"),
-        rest=Criterion("runs that come to rest", rest, low=MIN_AT_REST, unit="%"),
+        rest=Criterion("runs that settle", rest, low=MIN_AT_REST, unit="%"),
     )
 
 
@@ -140,7 +140,7 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
 
 
 def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim]:
-    """Judge contacts, the fraction of runs that come to rest, and the time until rest."""
+    """Judge contacts, the fraction of runs that settle, and the time until rest."""
     label = own.label
     criteria = _build_main_criteria(known, own.key)
     has_contact = known.get_values(own.key, "contacts") > 0
@@ -163,16 +163,16 @@ def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim
         ),
         _build_goal(
             "rest",
-            f"{label} comes to rest in at least {format_amount(MIN_AT_REST, '%')} of the runs.",
+            f"{label} settles in at least {format_amount(MIN_AT_REST, '%')} of the runs.",
             criteria.rest,
             f"{(~is_at_rest).sum()} of {len(is_at_rest)} runs do not.",
             known,
         ),
         _build_goal(
             "time",
-            f"{label} is at rest within {format_amount(MAX_REST_TIME_S, 's')} in the median.",
-            Criterion("median time until rest", rest_time, high=MAX_REST_TIME_S, unit="s"),
-            "By Kaplan and Meier: runs that do not come to rest are censored.",
+            f"{label} settles within {format_amount(MAX_REST_TIME_S, 's')} in the median.",
+            Criterion("median settling time", rest_time, high=MAX_REST_TIME_S, unit="s"),
+            "Kaplan-Meier: runs that do not settle are censored.",
             known,
         ),
     ]
@@ -191,9 +191,9 @@ def _judge_step_goals(own: Contender, steps: Mapping[int, StepTimes], plan: Plan
                     GOALS,
                     f"A step of {own.label} takes at most {MAX_STEP_RATIO:g} times as long as RAPF's with "
                     f"{large.robots} robots.",
-                    criteria=(Criterion("time of a step by RAPF's", ratio, high=MAX_STEP_RATIO),),
-                    explanation="Timed in turn, over whole seconds of simulated time: plans and scans count "
-                    "by their share.",
+                    criteria=(Criterion("time of a step relative to RAPF's", ratio, high=MAX_STEP_RATIO),),
+                    explanation="Timed in alternation, over whole seconds of simulated time, "
+                    "which include plans and scans.",
                 )
             )
     huge = steps.get(plan.beyond.huge)
@@ -205,8 +205,8 @@ def _judge_step_goals(own: Contender, steps: Mapping[int, StepTimes], plan: Plan
                     "goal-real-time",
                     GOALS,
                     f"{own.label} runs in real time with {huge.robots} robots.",
-                    criteria=(Criterion("computing time by simulated time", factor, high=1.0),),
-                    explanation="One process; the physics of the world included.",
+                    criteria=(Criterion("computing time relative to simulated time", factor, high=1.0),),
+                    explanation="One process, including the physics.",
                 )
             )
     return [replace(goal, maps=1, min_maps=1) for goal in goals]
@@ -274,7 +274,7 @@ def describe_goal(goal: Claim) -> str:
     (criterion,) = goal.criteria
     text = "met" if is_goal_met(goal) else f"missed: {_describe_miss(goal)}"
     if criterion.is_met is None and math.isfinite(criterion.interval.low):
-        text += "; the interval reaches over the bound"
+        text += "; the interval includes the bound"
     return text
 
 

@@ -28,8 +28,8 @@ from robocov_app.replication.results.outcomes import Outcomes
 _MIN_STUCK_FRACTION = 0.5
 _GAP_CLAIMS = {
     "rapf-shared": ("RAPF's coverage is nearly optimal.", "VII: “to achieve an optimal coverage”"),
-    "rpf-shared": ("RPF comes to rest far from the optimum.", "IV and I: “usually far from the optimal”"),
-    "lloyd": ("Lloyd's algorithm, ignorant of obstacles, is nearly optimal all the same.", ""),
+    "rpf-shared": ("RPF settles far from the optimum.", "IV and I: “usually far from the optimal”"),
+    "lloyd": ("Lloyd's algorithm is nearly optimal although it ignores obstacles.", ""),
 }
 """The claim on the gap of each contender, and its source."""
 
@@ -64,7 +64,7 @@ def judge_against_rpf(
         ),
         outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", measure),
         ratio_measure=f"median ratio, RAPF to RPF, of {cost}",
-        wins_measure="runs in which RAPF's is the lower one",
+        wins_measure="runs in which RAPF's is lower",
         explain=lambda pairs: (
             f"Median ratio per start: {list_ratios_by_start(pairs)}. {describe_losses(pairs, 'RAPF')}"
         ),
@@ -83,9 +83,9 @@ def judge_against_lloyd(outcomes: Outcomes) -> Claim:
             "VII: “significantly outperforms other existing approaches”; the paper shows RPF only",
         ),
         outcomes.compare("rapf-shared", "lloyd"),
-        ratio_measure="median of J(RAPF) / J(LA) at the end",
-        wins_measure="runs in which RAPF's is the lower one",
-        explain=lambda _: f"LA here slides along obstacles. {describe_other_gains(outcomes)}",
+        ratio_measure="median of J(RAPF) / J(Lloyd) at the end",
+        wins_measure="runs in which RAPF's is lower",
+        explain=lambda _: f"Lloyd's robots slide here along obstacles. {describe_other_gains(outcomes)}",
         max_ratio=CLEARLY_BELOW,
     )
 
@@ -95,7 +95,7 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
     claim = Claim(
         "lloyd-stuck",
         5,
-        "Lloyd's algorithm is unusable in presence of obstacles: its robots get stuck.",
+        "Lloyd's algorithm is unusable in the presence of obstacles: its robots get stuck.",
         "I and IV",
     )
     known = outcomes.select_finite("stuck", "lloyd")
@@ -103,11 +103,13 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
         return claim
     counts = known.get_values("lloyd", "stuck")
     stuck = share(counts > 0, known.maps)
-    criteria = [Criterion("runs of LA that end with a robot stuck", stuck, low=_MIN_STUCK_FRACTION, unit="%")]
+    criteria = [
+        Criterion("Lloyd's runs that end with a stuck robot", stuck, low=_MIN_STUCK_FRACTION, unit="%")
+    ]
     with_gap = known.select_finite("gap", "lloyd")
     if with_gap.instances:
         gap = bootstrap(with_gap.get_values("lloyd", "gap"), clusters=with_gap.maps)
-        criteria.append(Criterion("LA: median of J/J_ref - 1", gap, low=FAR_FROM_OPTIMUM, unit="%"))
+        criteria.append(Criterion("Lloyd: median of J/J_ref - 1", gap, low=FAR_FROM_OPTIMUM, unit="%"))
     others = []
     for key in ("rapf-shared", "rapf-best", "rapf-default"):
         fraction = compute_positive_fraction(outcomes.get_values(key, "stuck"))
@@ -152,6 +154,6 @@ def _explain_gaps(outcomes: Outcomes, gaps: Array) -> str:
     return (
         f"{describe_middle_half(gaps).removesuffix('.')}; the worst is {format_amount(gaps.max(), '%')} "
         f"above it ({outcomes.instances[worst]}). Medians: {', '.join(medians)}. "
-        f"J_ref is the best of many descents with the whole map known; it is no bound, "
-        f"only hard to beat{better_than_reference}."
+        f"J_ref is the best of many descents with the whole map known; it is not a bound, "
+        f"but hard to beat{better_than_reference}."
     )

@@ -45,7 +45,7 @@ def judge_rivals(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
                 Claim(f"beyond-{own.key}-{other.key}", RIVALS, text),
                 outcomes.compare(own.key, other.key),
                 ratio_measure=f"median of J({own.label}) / J({other.label}) at the end",
-                wins_measure=f"runs in which {own.label}'s is the lower one",
+                wins_measure=f"runs in which {own.label}'s is lower",
                 explain=lambda pairs: describe_losses(pairs, "It"),
             )
         )
@@ -78,5 +78,7 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
         f"Medians of J/J_ref - 1 in the same runs: {format_median(own_gaps, '%')} and "
         f"{format_median(other_gaps, '%')}."
     )
-    criterion = Criterion("part of the median gap that is closed", closed, low=MIN_CLOSED_FRACTION, unit="%")
+    criterion = Criterion(
+        "fraction of the median gap that is closed", closed, low=MIN_CLOSED_FRACTION, unit="%"
+    )
     return claim.judge((criterion,), explanation, known, runs_per_instance=2)

@@ -27,7 +27,7 @@ def judge_starts_cost(outcomes: Outcomes) -> Claim:
     rpf, _ = _compute_start_variation(known, "rpf-shared")
     if not maps:
         return claim
-    measure = "median standard deviation of the final cost over the starts, by its mean"
+    measure = "median standard deviation of the final cost over the starts, relative to its mean"
     criteria = build_variation_criteria(measure, rapf, rpf, maps, BARELY_BY_START)
     ratio = np.median(rpf) / max(np.median(rapf), _MIN_VARIATION)
     others = {}
@@ -36,8 +36,8 @@ def judge_starts_cost(outcomes: Outcomes) -> Claim:
         others[key] = format_median(variation, "%")
     explanation = (
         f"Over the same map and seed, from {len(set(known.starts))} kinds of starts. RPF's varies "
-        f"{format_amount(ratio)} times as much as RAPF's. At their "
-        f"best gains: RAPF {others['rapf-best']}, RPF {others['rpf-best']}; LA {others['lloyd']}."
+        f"{format_amount(ratio)} times as much as RAPF's. With their "
+        f"best gains: RAPF {others['rapf-best']}, RPF {others['rpf-best']}; Lloyd {others['lloyd']}."
     )
     return claim.judge(criteria, explanation, known, runs_per_instance=2)
 
@@ -59,7 +59,9 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
     rapf = np.array([rapf_spreads[name] for name in maps])
     rpf = np.array([rpf_spreads[name] for name in maps])
     sides = [known.share_sides[name] for name in maps]
-    measure = "matched distance between the ends from different starts, by the side of a robot's share"
+    measure = (
+        "matched distance between the ends from different starts, relative to the side of a robot's share"
+    )
     criteria = (
         Criterion(f"RAPF: {measure}", bootstrap(rapf, clusters=maps), high=SAME_PLACEMENT, unit="%"),
         Criterion(
@@ -69,7 +71,7 @@ def judge_starts_placement(outcomes: Outcomes) -> Claim:
     explanation = (
         f"In meters: RAPF {format_median(rapf * sides, 'm')}, RPF {format_median(rpf * sides, 'm')} "
         f"(medians over maps). "
-        f"Robots are matched so that the sum of straight distances is least. "
+        f"Robots are matched so that the sum of straight-line distances is smallest. "
         f"A placement can differ while its cost does not: many are equally good."
     )
     return claim.judge(criteria, explanation, known, runs_per_instance=2)

@@ -43,7 +43,7 @@ MAX_GAP = 0.014
 MAX_MAP_GAP = 0.03
 """Maximum median on every single map."""
 NEVER_WORSE = 1.01
-"""Maximum ratio of its median on a map to that of RAPF or LA on the same map."""
+"""Maximum ratio of its median on a map to that of RAPF or Lloyd on the same map."""
 MIN_AT_REST = 0.97
 """Minimum fraction of its runs that come to rest."""
 RARELY = 0.1

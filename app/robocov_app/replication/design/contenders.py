@@ -30,7 +30,7 @@ LABELS = {
     "rapf-shared": "RAPF, shared gains",
     "rapf-best": "RAPF, its best gains",
     "rapf-default": "RAPF, robocov's default",
-    "lloyd": "LA",
+    "lloyd": "Lloyd",
     "rpf-shared": "RPF, shared gains",
     "rpf-best": "RPF, its best gains",
 }

@@ -35,7 +35,7 @@ def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     return select_plots(
         {
             "claim-1-convex": plan_pairs_plot(
-                _list_convex_rows(results.convex), "RAPF by LA, pair by pair (1: equal)", theme
+                _list_convex_rows(results.convex), "RAPF relative to Lloyd, pair by pair (1: equal)", theme
             ),
             "claim-2-nonconvex": plan_pairs_plot(
                 _list_nonconvex_rows(claims), "RAPF by the other controller, pair by pair (1: equal)", theme
@@ -65,5 +65,5 @@ def _list_nonconvex_rows(outcomes: Outcomes) -> list[PairsRow]:
         rows.append(PairsRow(f"RPF, first 60 s, {gains} gains", pairs, "rapf"))
     for gains in ("shared", "best"):
         pairs = outcomes.compare(f"rapf-{gains}", "lloyd", "final")
-        rows.append(PairsRow(f"LA, at the end, {gains} gains", pairs, "rapf"))
+        rows.append(PairsRow(f"Lloyd, at the end, {gains} gains", pairs, "rapf"))
     return rows

@@ -152,7 +152,7 @@ def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
     by_key = {contender.key: contender for contender in results.contenders}
     participants = [by_key[key] for key in LABELS if key in by_key]
     gaps = outcomes.select_finite("gap", "rapf-shared").get_values("rapf-shared", "gap")
-    others = {"rapf-best": "at its best gains", "lloyd": "LA", "rpf-shared": "RPF"}
+    others = {"rapf-best": "with its best gains", "lloyd": "Lloyd", "rpf-shared": "RPF"}
     map_count = len(set(outcomes.maps)) + len(set(results.convex.maps)) + len(plan.tuning)
     return {
         "best": by_key,
