@@ -157,7 +157,7 @@ def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
     return {
         "best": by_key,
         "maps_in_all": map_count,
-        "laws": summarize_contenders(outcomes, participants, plan.duration),
+        "summaries": summarize_contenders(outcomes, participants, plan.duration),
         "maps": _tabulate_medians(outcomes),
         "failures": _show_failures(results.worst, outcomes, "rapf-shared", others),
         "above": [float((gaps > bound).mean()) for bound in _REPORTED_GAPS],
@@ -196,7 +196,7 @@ def build_beyond_page(figure_files: Mapping[str, FigureFile], results: BeyondRes
     others = {contender.key: contender.label for contender in results.contenders if contender.key in compared}
     context: dict[str, Any] = {
         "results": results,
-        "found": claims,
+        "claims": claims,
         "goals": [claim for claim in goal_claims if claim.key != "goal-unseen"],
         "unseen": next((claim for claim in claims if claim.key == "goal-unseen"), None),
         "goal_claims": goal_claims,

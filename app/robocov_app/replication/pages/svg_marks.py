@@ -59,7 +59,7 @@ def draw_interval_bar(criterion: Criterion) -> Markup:
     start = to_x(criterion.low)
     end = to_x(criterion.high)
     parts = [
-        f'<rect class="wanted" x="{start}" y="4" width="{round(end - start, 1)}" height="26" rx="3"/>',
+        f'<rect class="expected" x="{start}" y="4" width="{round(end - start, 1)}" height="26" rx="3"/>',
         f'<path class="axis" d="M{_BAR_EDGE_PX} 30H{_BAR_WIDTH_PX - _BAR_EDGE_PX}"/>',
     ]
     are_labels_close = len(bounds) == 2 and end - start < _MIN_LABEL_GAP_PX
