@@ -24,7 +24,7 @@ _COLUMNS = {
     "clearance": "{min_clearance_m:z.3f} m",
     "path length": "{mean_path_length_m:.2f} m",
 }
-"""Titles of the table's columns, with the formats of their cells."""
+"""Titles of the table's columns, with the formats of their cells. The column of names has no title."""
 
 
 @dataclass

@@ -178,9 +178,9 @@ class ConditionOptions:
             return None
         from robocov.conditions import PARAMETERS, Conditions, Failure, Join
 
-        limits = {name: getattr(self, name) for name in PARAMETERS}
+        values = {name: getattr(self, name) for name in PARAMETERS}
         conditions = Conditions(
-            **limits,
+            **values,
             failures=_parse_events("--fail", Failure, self.fail),
             joins=_parse_events("--join", Join, self.join),
             seed=seed,

@@ -248,6 +248,7 @@ def execute_tasks(
             progress.waiting_reason = executor.waiting_reason
             progress.lost_workers = executor.lost_workers
             if progress.waiting_reason and not progress.done + progress.failed:
+                # The wait for the first worker is not part of the duration of the runs.
                 progress.start_time = time.perf_counter()
             if result is not None:
                 finished_task, outcome = result

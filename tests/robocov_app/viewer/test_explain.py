@@ -294,13 +294,13 @@ def test_a_goal_at_the_centroid_is_named():
 
 
 def test_unexplained_forces_are_described():
-    none = build_report([[4, 4]], forces=[[1.0, 0.0]])
-    assert get_line(none, UNEXPLAINED_FORCE).text == "pushed 1.0 N east by its controller"
-    some = build_report([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
+    calm = build_report([[4, 4]], forces=[[1.0, 0.0]])
+    assert get_line(calm, UNEXPLAINED_FORCE).text == "pushed 1.0 N east by its controller"
+    windy = build_report([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
     assert (
-        get_line(some, UNEXPLAINED_FORCE).text == "pushed 1.1 N south-east by other forces of its controller"
+        get_line(windy, UNEXPLAINED_FORCE).text == "pushed 1.1 N south-east by other forces of its controller"
     )
-    for report in (none, some):
+    for report in (calm, windy):
         assert_forces_sum_up(report)
 
 

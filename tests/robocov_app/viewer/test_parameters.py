@@ -1,3 +1,5 @@
+"""Gains and limits in the panel: sliders, typed values and menus."""
+
 from __future__ import annotations
 
 import math
@@ -21,15 +23,14 @@ from robocov_app.viewer.parameters import (
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 
-LAWS = [ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")]
-GAINS = [each for law in LAWS for each in list_gain_parameters(law)]
-ALL = [
-    each for each in [*GAINS, *list_limit_parameters(RobotProperties())] if isinstance(each, NumberParameter)
-]
+CONTROLLERS = [ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")]
+GAINS = [parameter for controller in CONTROLLERS for parameter in list_gain_parameters(controller)]
+LIMITS = list(list_limit_parameters(RobotProperties()))
+NUMBERS = [parameter for parameter in (*GAINS, *LIMITS) if isinstance(parameter, NumberParameter)]
 
 
-class Odd:
-    """A law with any gains."""
+class StubController:
+    """A controller with any gains, at their defaults."""
 
     def __init__(self, **gains: Gain) -> None:
         self.available_gains = gains
@@ -38,131 +39,155 @@ class Odd:
         return self.available_gains[name].default
 
 
-def odd(default, low, high, *, optional=False) -> NumberParameter:
-    (parameter,) = list_gain_parameters(Odd(k=Gain("k", default, "m", low, high, "", optional)))
+def build_parameter(
+    default: float | None, low: float, high: float, *, optional: bool = False
+) -> NumberParameter:
+    """Build the parameter of a gain with a range."""
+    gains = {"k": Gain("k", default, "m", low, high, "", optional)}
+    (parameter,) = list_gain_parameters(StubController(**gains))
     return parameter
 
 
-def test_every_gain_has_its_slider():
-    for law in LAWS:
-        assert [each.name for each in list_gain_parameters(law)] == list(law.available_gains)
-    rapf = {each.name: each for each in list_gain_parameters(ControllerChoice("rapf", {"k_rep": 0.7}))}
-    assert (rapf["k_rep"].value, rapf["k_rep"].default) == (
-        0.7,
-        ControllerChoice("rapf").available_gains["k_rep"].default,
+def get_range(parameter: NumberParameter) -> tuple[float, float]:
+    return parameter.low, parameter.high
+
+
+def test_every_gain_has_a_parameter():
+    for controller in CONTROLLERS:
+        names = [parameter.name for parameter in list_gain_parameters(controller)]
+        assert names == list(controller.available_gains)
+    parameters = list_gain_parameters(ControllerChoice("rapf", {"k_rep": 0.7}))
+    (k_rep,) = [parameter for parameter in parameters if parameter.name == "k_rep"]
+    assert k_rep.value == 0.7
+    assert k_rep.default == ControllerChoice("rapf").available_gains["k_rep"].default
+    assert k_rep.meaning
+
+
+def test_gains_with_choices_are_options():
+    parameters = list_gain_parameters(ControllerChoice("rapf", {"target": "median"}))
+    (target,) = [parameter for parameter in parameters if parameter.name == "target"]
+    assert isinstance(target, OptionParameter)
+    assert target.value == "median"
+    assert target.default == "centroid"
+    assert target.format() == "median"
+    assert target.choices == ("centroid", "sensing", "median")
+    for choice in target.choices:
+        controller = ControllerChoice("rapf").with_gain("target", choice)
+        assert controller.get_value("target") == choice
+        assert controller.gains == ({} if choice == "centroid" else {"target": choice})
+
+
+@pytest.mark.parametrize(
+    ("text", "choice"),
+    [("sensing", "sensing"), (" Median ", "median"), ("c", "centroid"), ("SENS", "sensing")],
+)
+def test_the_start_of_a_choice_can_be_typed(text, choice):
+    target = OptionParameter(
+        "target", "target", "", "centroid", "centroid", ("centroid", "sensing", "median")
     )
-    assert rapf["k_rep"].meaning
+    assert target.parse(text) == choice
 
 
-def test_gains_that_are_words_have_all_of_them():
-    (picked,) = [
-        each
-        for each in list_gain_parameters(ControllerChoice("rapf", {"target": "median"}))
-        if each.name == "target"
-    ]
-    assert isinstance(picked, OptionParameter)
-    assert (picked.value, picked.default, picked.format()) == ("median", "centroid", "median")
-    assert picked.choices == ("centroid", "sensing", "median")
-    assert [picked.parse(text) for text in ("sensing", " Median ", "c", "SENS")] == [
-        *("sensing", "median", "centroid", "sensing")
-    ]
-    for wrong in ("", "mediane", "x", "0.3"):
-        with pytest.raises(
-            ParameterError, match=r"target: expected one of centroid, sensing, median, got .*"
-        ):
-            picked.parse(wrong)
-    for word in picked.choices:
-        law = ControllerChoice("rapf").with_gain("target", word)
-        assert law.get_value("target") == word
-        assert law.gains == ({} if word == "centroid" else {"target": word})
-    near = OptionParameter("n", "n", "", "on", "on", ("on", "once"))
-    assert near.parse("on") == "on" and near.parse("onc") == "once"
+@pytest.mark.parametrize("text", ["", "mediane", "x", "0.3"])
+def test_unknown_choices_are_rejected(text):
+    target = OptionParameter(
+        "target", "target", "", "centroid", "centroid", ("centroid", "sensing", "median")
+    )
+    with pytest.raises(ParameterError, match=r"target: expected one of centroid, sensing, median, got .*"):
+        target.parse(text)
 
 
-def test_kinematics_are_a_track_width():
+def test_a_choice_may_be_the_start_of_another():
+    parameter = OptionParameter("n", "n", "", "on", "on", ("on", "once"))
+    assert parameter.parse("on") == "on"
+    assert parameter.parse("onc") == "once"
+
+
+def test_the_kinematics_set_the_track_width():
     unicycle = replace_limit(RobotProperties(radius=0.2), "team.kinematics", "unicycle")
     assert unicycle.build_team(range(1, 3)).track_width.tolist() == [pytest.approx(0.32)] * 2
-    assert [each.value for each in list_limit_parameters(unicycle) if isinstance(each, OptionParameter)] == [
-        "unicycle"
-    ]
+    options = [item for item in list_limit_parameters(unicycle) if isinstance(item, OptionParameter)]
+    assert [option.value for option in options] == ["unicycle"]
     assert replace_limit(unicycle, "kinematics", "point") == RobotProperties(radius=0.2)
 
 
-def test_every_limit_but_the_mass_has_its_slider():
-    names = [each.name for each in list_limit_parameters(RobotProperties())]
-    of_unicycles = {"track_width", "turning_rate"}  # as the kinematics have them
-    assert {name.removeprefix("team.") for name in names} == set(UNITS) - {"mass"} - of_unicycles | {
-        "kinematics"
-    }
-    for each in list_limit_parameters(RobotProperties(sensing_range=math.inf, radius=0.3)):
-        if each.name == "team.sensing_range":
-            assert (each.value, each.default, each.is_optional) == (None, 3.0, True)
-        if each.name == "team.radius":
-            assert (each.value, each.default, each.is_optional, each.unit) == (0.3, 0.1, False, "m")
-        if each.name == "team.communication_range":
-            assert (each.value, each.default) == (None, None)
+def test_every_limit_but_the_mass_has_a_parameter():
+    names = {parameter.name.removeprefix("team.") for parameter in LIMITS}
+    # The kinematics stand for the properties of unicycles.
+    assert names == set(UNITS) - {"mass", "track_width", "turning_rate"} | {"kinematics"}
 
 
-@pytest.mark.parametrize("parameter", ALL, ids=lambda each: each.name)
-def test_all_that_a_slider_gives_is_taken(parameter):
+def test_limits_have_values_and_defaults():
+    properties = RobotProperties(sensing_range=math.inf, radius=0.3)
+    limits = {parameter.name: parameter for parameter in list_limit_parameters(properties)}
+    sensing_range = limits["team.sensing_range"]
+    assert sensing_range.value is None
+    assert sensing_range.default == 3.0
+    assert sensing_range.is_optional
+    radius = limits["team.radius"]
+    assert radius.value == 0.3
+    assert radius.default == 0.1
+    assert radius.unit == "m"
+    assert not radius.is_optional
+    communication_range = limits["team.communication_range"]
+    assert communication_range.value is None
+    assert communication_range.default is None
+
+
+@pytest.mark.parametrize("parameter", NUMBERS, ids=lambda parameter: parameter.name)
+def test_all_values_of_a_slider_are_valid(parameter):
     assert parameter.low < parameter.high
-    before = -math.inf
+    previous = -math.inf
     for k in range(101):
         value = parameter.compute_value(k / 100)
+        if parameter.name.startswith("team."):
+            replace_limit(RobotProperties(), parameter.name, value).build_team(range(1, 3))
         if value is None:
             assert parameter.is_optional
             value = math.inf
         else:
             assert parameter.low <= value <= parameter.high
-        assert value >= before
-        before = value
-        if parameter.name.startswith("team."):
-            replace_limit(RobotProperties(), parameter.name, parameter.compute_value(k / 100)).build_team(
-                range(1, 3)
-            )
-    for law in LAWS:
-        if parameter in list_gain_parameters(law):
+        assert value >= previous
+        previous = value
+    for controller in CONTROLLERS:
+        if parameter in list_gain_parameters(controller):
             for k in range(11):
-                law.with_gain(parameter.name, parameter.compute_value(k / 10))
+                controller.with_gain(parameter.name, parameter.compute_value(k / 10))
 
 
-@pytest.mark.parametrize("parameter", ALL, ids=lambda each: each.name)
-@given(place=st.floats(0.0, 1.0))
-def test_there_and_back(parameter, place):
-    value = parameter.compute_value(place)
-    again = replace(parameter, value=value).compute_position()
+@pytest.mark.parametrize("parameter", NUMBERS, ids=lambda parameter: parameter.name)
+@given(position=st.floats(0.0, 1.0))
+def test_the_position_of_a_slider_is_recovered_from_its_value(parameter, position):
+    value = parameter.compute_value(position)
+    recovered = replace(parameter, value=value).compute_position()
     if value is None:
-        assert again == 1.0
+        assert recovered == 1.0
     else:
-        # three digits
-        assert again == pytest.approx(place, abs=2e-3)
-        assert replace(parameter, value=value).compute_position() == pytest.approx(again)
+        # Values are rounded to three digits.
+        assert recovered == pytest.approx(position, abs=2e-3)
 
 
-@pytest.mark.parametrize("parameter", ALL, ids=lambda each: each.name)
+@pytest.mark.parametrize("parameter", NUMBERS, ids=lambda parameter: parameter.name)
 @given(value=st.none() | st.floats(0.0, 1e9) | st.just(math.inf))
-def test_any_value_has_a_place(parameter, value):
-    place = replace(parameter, value=value).compute_position()
-    assert 0.0 <= place <= 1.0
+def test_any_value_has_a_position(parameter, value):
+    position = replace(parameter, value=value).compute_position()
+    assert 0.0 <= position <= 1.0
     if value is not None and math.isfinite(value) and parameter.is_optional:
-        # short of "no limit"
-        assert parameter.compute_value(place) is not None
+        # The right end of the slider is for no limit.
+        assert parameter.compute_value(position) is not None
 
 
-def test_a_slider_reaches_as_far_as_the_gain():
-    assert (odd(1.0, 0.0, 1e6).low, odd(1.0, 0.0, 1e6).high) == pytest.approx((1 / 30, 30.0))
-    assert (odd(1.0, 0.5, 2.0).low, odd(1.0, 0.5, 2.0).high) == (0.5, 2.0)
-    # none by default, and 1 is none of its values
-    assert (odd(None, 50.0, 100.0, optional=True).low, odd(None, 50.0, 100.0, optional=True).high) == (
-        50,
-        100,
-    )
-    assert (odd(None, 0.1, 0.5, optional=True).low, odd(None, 0.1, 0.5, optional=True).high) == pytest.approx(
-        (0.1, 0.5)
-    )
-    assert odd(0.0, 0.0, 1e6).low == pytest.approx(1 / 30)
-    assert (odd(2.0, -1e12, 1e12).low, odd(2.0, -1e12, 1e12).high) == (-60.0, 60.0)
-    assert (odd(-2.0, -5.0, -1.0).low, odd(-2.0, -5.0, -1.0).high) == (-5.0, -1.0)
+def test_the_range_of_a_slider_is_around_the_default():
+    assert get_range(build_parameter(1.0, 0.0, 1e6)) == pytest.approx((1 / 30, 30.0))
+    assert get_range(build_parameter(1.0, 0.5, 2.0)) == (0.5, 2.0)
+    assert get_range(build_parameter(-2.0, -5.0, -1.0)) == (-5.0, -1.0)
+    assert get_range(build_parameter(2.0, -1e12, 1e12)) == (-60.0, 60.0)
+    assert build_parameter(0.0, 0.0, 1e6).low == pytest.approx(1 / 30)
+
+
+def test_the_range_of_a_slider_without_default_is_that_of_the_gain():
+    assert get_range(build_parameter(None, 50.0, 100.0, optional=True)) == (50.0, 100.0)
+    assert get_range(build_parameter(None, 0.1, 0.5, optional=True)) == pytest.approx((0.1, 0.5))
 
 
 @given(
@@ -172,54 +197,54 @@ def test_a_slider_reaches_as_far_as_the_gain():
     st.booleans(),
     st.floats(0.0, 1.0),
 )
-def test_a_slider_never_leaves_the_range_of_its_gain(low, span, where, optional, place):
+def test_a_slider_stays_in_the_range_of_its_gain(low, span, fraction, optional, position):
     high = low + span
-    default = None if where is None else min(low + where * span, high)
-    parameter = odd(default, low, high, optional=optional or default is None)
-    value = parameter.compute_value(place)
+    default = None if fraction is None else min(low + fraction * span, high)
+    parameter = build_parameter(default, low, high, optional=optional or default is None)
+    value = parameter.compute_value(position)
     assert 0.0 <= parameter.compute_position() <= 1.0
     if value is not None and not (default == 0.0 or parameter.high <= parameter.low):
         assert low - 1e-9 <= value <= high + 1e-9
 
 
-def test_negative_ranges_are_even():
-    parameter = odd(2.0, -1e12, 1e12)
+def test_sliders_with_negative_values_are_linear():
+    parameter = build_parameter(2.0, -1e12, 1e12)
     assert parameter.compute_value(0.5) == 0.0
     assert replace(parameter, value=0.0).compute_position() == 0.5
     assert replace(parameter, value=-1e5).compute_position() == 0.0
 
 
-def test_what_is_shown_can_be_typed():
-    parameter = odd(0.125, 0.0, 10.0, optional=True)
+def test_displayed_values_can_be_typed():
+    parameter = build_parameter(0.125, 0.0, 10.0, optional=True)
     assert parameter.format() == "0.125"
     assert parameter.parse(parameter.format()) == 0.125
-    none = replace(parameter, value=None)
-    assert none.format() == "none"
-    assert none.parse(none.format()) is None
+    unlimited = replace(parameter, value=None)
+    assert unlimited.format() == "none"
+    assert unlimited.parse("none") is None
 
 
 @pytest.mark.parametrize("text", ["none", " None ", "null", "no limit", "inf", "∞", ""])
-def test_no_limit_is_typed_in_many_ways(text):
-    assert odd(1.0, 0.0, 9.0, optional=True).parse(text) is None
+def test_no_limit_can_be_typed_in_several_ways(text):
+    assert build_parameter(1.0, 0.0, 9.0, optional=True).parse(text) is None
 
 
 @pytest.mark.parametrize(("text", "value"), [("1.5", 1.5), (" 2 ", 2.0), ("0,25", 0.25), ("1e-3", 1e-3)])
 def test_numbers_are_typed(text, value):
-    assert odd(1.0, 0.0, 9.0).parse(text) == value
+    assert build_parameter(1.0, 0.0, 9.0).parse(text) == value
 
 
 @pytest.mark.parametrize("text", ["", "none", "many", "1.2.3", "0x10", "--1"])
-def test_what_is_no_number_is_refused(text):
+def test_invalid_numbers_are_rejected(text):
     with pytest.raises(ParameterError, match=r"^k: expected a number, got .*$"):
-        odd(1.0, 0.0, 9.0).parse(text)
+        build_parameter(1.0, 0.0, 9.0).parse(text)
 
 
-def test_with_no_limit_allowed_the_message_says_so():
+def test_the_message_for_optional_gains_names_none():
     with pytest.raises(ParameterError, match="expected a number, or none"):
-        odd(1.0, 0.0, 9.0, optional=True).parse("many")
+        build_parameter(1.0, 0.0, 9.0, optional=True).parse("many")
 
 
-def test_limits_one_by_one():
+def test_single_limits_are_replaced():
     limits = replace_limit(RobotProperties(), "team.sensing_range", None)
     assert limits == RobotProperties(sensing_range=math.inf)
     assert replace_limit(limits, "radius", 0.2) == RobotProperties(radius=0.2, sensing_range=math.inf)
@@ -227,7 +252,7 @@ def test_limits_one_by_one():
         replace_limit(limits, "radius", None).build_team(range(1, 2))
 
 
-def test_gains_of_a_law_of_ones_own():
+def test_user_controllers_have_parameters():
     @dataclass(frozen=True)
     class Mine:
         k: float = gain(1.0, "N/m", "stiffness")
@@ -237,6 +262,6 @@ def test_gains_of_a_law_of_ones_own():
             return (self.k, self.bias)
 
     assert IndividualControllerAdapter(Mine()).name == "Mine"
-    k, bias = list_gain_parameters(Odd(**get_gains(Mine)))
-    assert (k.low, k.high) == pytest.approx((1 / 30, 30.0))
-    assert (bias.low, bias.high) == (-30.0, 30.0)
+    k, bias = list_gain_parameters(StubController(**get_gains(Mine)))
+    assert get_range(k) == pytest.approx((1 / 30, 30.0))
+    assert get_range(bias) == (-30.0, 30.0)

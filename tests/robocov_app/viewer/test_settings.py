@@ -1,3 +1,5 @@
+"""Settings of the viewer: saved, loaded and merged."""
+
 from __future__ import annotations
 
 import json
@@ -19,15 +21,15 @@ from robocov_app.viewer.launch import ViewerSettings
 
 load_window_settings = partial(load_settings, ViewerSettings)
 
-OTHERS = ViewerSettings(
+CHANGED = ViewerSettings(
     theme="dark", scale=2.0, width=1600, height=900, shown=("cells", "robots"), tab="robot", fade=True
 )
 
 
-def test_what_is_saved_is_loaded(tmp_path):
+def test_saved_settings_are_loaded(tmp_path):
     file = tmp_path / "a" / "folder" / "window.json"
-    assert save_settings(OTHERS, file) == ""
-    assert load_window_settings(file) == (OTHERS, "")
+    assert save_settings(CHANGED, file) == ""
+    assert load_window_settings(file) == (CHANGED, "")
     assert [path.name for path in file.parent.iterdir()] == ["window.json"]
     assert save_settings(ViewerSettings(), file) == ""
     assert load_window_settings(file) == (ViewerSettings(), "")
@@ -45,11 +47,11 @@ def test_what_is_saved_is_loaded(tmp_path):
         fade=st.booleans(),
     )
 )
-def test_whatever_they_are_they_come_back(settings):
+def test_any_settings_are_restored_from_json(settings):
     assert ViewerSettings.model_validate_json(settings.model_dump_json()) == settings
 
 
-def test_the_first_time_there_are_none(tmp_path):
+def test_missing_settings_have_the_defaults(tmp_path):
     assert load_window_settings(tmp_path / "window.json") == (ViewerSettings(), "")
     assert load_window_settings(None) == (ViewerSettings(), "")
 
@@ -70,48 +72,48 @@ def test_the_first_time_there_are_none(tmp_path):
         "\x00",
     ],
 )
-def test_what_cannot_be_read_is_told_and_left_out(tmp_path, text):
+def test_unreadable_settings_are_reported_and_replaced(tmp_path, text):
     file = tmp_path / "window.json"
     file.write_text(text)
-    settings, words = load_window_settings(file)
+    settings, message = load_window_settings(file)
     assert settings == ViewerSettings()
-    assert words == f"{file} cannot be read; using default settings"
-    # and is put right the next time
+    assert message == f"{file} cannot be read; using default settings"
+    # The next save replaces the file.
     assert save_settings(settings, file) == ""
     assert load_window_settings(file) == (ViewerSettings(), "")
 
 
-def test_bytes_that_are_no_text(tmp_path):
+def test_files_that_are_not_text_are_ignored(tmp_path):
     file = tmp_path / "window.json"
     file.write_bytes(b'{"tab": "\xff\xfe"}')
     assert load_window_settings(file)[0] == ViewerSettings()
 
 
-def test_a_folder_in_its_place(tmp_path):
+def test_a_folder_instead_of_the_file_is_reported(tmp_path):
     (tmp_path / "window.json").mkdir()
-    settings, words = load_window_settings(tmp_path / "window.json")
+    settings, message = load_window_settings(tmp_path / "window.json")
     assert settings == ViewerSettings()
-    assert "cannot be read" in words
+    assert "cannot be read" in message
     assert save_settings(ViewerSettings(), tmp_path / "window.json").startswith("settings cannot be saved: ")
 
 
-def test_settings_of_other_versions(tmp_path):
+def test_unknown_settings_are_ignored(tmp_path):
     file = tmp_path / "window.json"
-    file.write_text(json.dumps({"theme": "dark", "of_tomorrow": [1, 2]}))
+    file.write_text(json.dumps({"theme": "dark", "unknown": [1, 2]}))
     assert load_window_settings(file) == (ViewerSettings(theme="dark"), "")
 
 
-def test_what_cannot_be_written_is_told(tmp_path):
+def test_errors_while_saving_are_reported(tmp_path):
     blocked = tmp_path / "file"
-    blocked.write_text("in the way")
-    words = save_settings(OTHERS, blocked / "window.json")
-    assert words.startswith("settings cannot be saved: ")
-    assert "\n" not in words
-    assert blocked.read_text() == "in the way"
-    assert save_settings(OTHERS, None) == ""
+    blocked.write_text("not a folder")
+    message = save_settings(CHANGED, blocked / "window.json")
+    assert message.startswith("settings cannot be saved: ")
+    assert "\n" not in message
+    assert blocked.read_text() == "not a folder"
+    assert save_settings(CHANGED, None) == ""
 
 
-def test_where_they_are_kept(tmp_path, monkeypatch):
+def test_the_file_is_in_the_folder_of_the_environment_variable_or_the_user(tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     assert find_settings_file() == tmp_path / "window.json"
     monkeypatch.setenv(FOLDER_VARIABLE, "")
@@ -125,8 +127,9 @@ def test_where_they_are_kept(tmp_path, monkeypatch):
     assert not Path(tmp_path / "config").exists()
 
 
-def test_only_what_was_changed_is_kept():
-    before, opened = ViewerSettings(width=1000), ViewerSettings(theme="dark", width=1300)
-    assert merge_changed_settings(before, opened, opened) == before
+def test_only_settings_changed_in_the_window_are_saved():
+    saved = ViewerSettings(width=1000)
+    opened = ViewerSettings(theme="dark", width=1300)
+    assert merge_changed_settings(saved, opened, opened) == saved
     closed = opened.model_copy(update={"fade": True, "width": 1400})
-    assert merge_changed_settings(before, opened, closed) == ViewerSettings(width=1400, fade=True)
+    assert merge_changed_settings(saved, opened, closed) == ViewerSettings(width=1400, fade=True)

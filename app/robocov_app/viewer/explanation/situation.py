@@ -249,7 +249,8 @@ def _build_obstacle(
         shortest = shapely.shortest_line(center, environment.free.boundary)
         if shortest is None or shortest.length > radius + MAX_CONTACT_GAP_M:
             return None
-        point = _get_vector(shapely.get_coordinates(shortest), 1) or position
+        x, y = shapely.get_coordinates(shortest)[1].tolist()
+        point = complex(x, y)
     name = _name_obstacle(environment, point)
     return NearbyObject(name, point - position, abs(point - position) - radius)
 

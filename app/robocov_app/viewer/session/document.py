@@ -214,6 +214,7 @@ class SessionDocument:
         """Return all branches, in the order of the nodes at their ends."""
         branches = []
         for node in self.nodes:
+            # If a child starts at the end of its parent, the branch goes on with the child.
             children = [child for child in self.nodes if child.parent is node]
             if all(child.branch_step < node.last_step for child in children):
                 branches.append(Branch(node, node.last_step, node.name or node.description))
