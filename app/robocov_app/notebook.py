@@ -300,7 +300,7 @@ def plot_comparison(
     return figure.axes[-1]
 
 
-def environment_html(environment: Environment) -> str:
+def render_environment_html(environment: Environment) -> str:
     """Return the HTML of a map with its properties and a scale bar, in the theme of the notebook."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     width = high_x - low_x
@@ -326,12 +326,12 @@ def environment_html(environment: Environment) -> str:
     )
 
 
-def environment_png(environment: Environment) -> bytes:
+def render_environment_png(environment: Environment) -> bytes:
     """Return the image of a map, for notebooks that display no HTML."""
     return _export_png(plot_environment(environment))
 
 
-def record_html(record: Record) -> str:
+def render_record_html(record: Record) -> str:
     """Return the HTML of a replay of a run, with its cost if that can be computed quickly."""
     run = ReplayRun(record, _compute_history(record), f"{record.label} on {record.environment.name}")
     map_width = PictureFrame(record.environment, *_MAX_REPLAY_MAP_SIZE_PX).width
@@ -342,12 +342,12 @@ def record_html(record: Record) -> str:
     )
 
 
-def record_png(record: Record) -> bytes:
+def render_record_png(record: Record) -> bytes:
     """Return the image of a run, for notebooks that display no HTML."""
     return _export_png(plot_record(record))
 
 
-def comparison_html(comparison: Comparison) -> str:
+def render_comparison_html(comparison: Comparison) -> str:
     """Return the HTML of a replay of the runs of a comparison, side by side, with their costs."""
     runs = []
     for label, record in comparison.records.items():
@@ -356,7 +356,7 @@ def comparison_html(comparison: Comparison) -> str:
     return f'<style>{_RUN_CSS}</style><div class="robocov-run">{build_replay_html(runs)}</div>'
 
 
-def comparison_png(comparison: Comparison) -> bytes:
+def render_comparison_png(comparison: Comparison) -> bytes:
     """Return the image of a comparison, for notebooks that display no HTML."""
     return _export_png(plot_comparison(comparison))
 

@@ -24,9 +24,9 @@ class DrawingBackend(Protocol):
     plot_environment, plot_record, plot_history, plot_result, plot_comparison : callable
         ``plot_...(item, axes=None, **options)`` draws an item on axes and returns them. If the axes are None,
         it draws on a page of its own, and returns the axes of that page.
-    environment_html, record_html, comparison_html : callable
+    render_environment_html, render_record_html, render_comparison_html : callable
         Return the HTML, a str, that a notebook displays for an item.
-    environment_png, record_png, comparison_png : callable
+    render_environment_png, render_record_png, render_comparison_png : callable
         Return the image, bytes, that a notebook displays if it displays no HTML.
     show : callable
         ``show(map, **options)`` returns what a notebook displays for `robocov.show`.
@@ -37,12 +37,12 @@ class DrawingBackend(Protocol):
     plot_history: Callable[..., Any]
     plot_result: Callable[..., Any]
     plot_comparison: Callable[..., Any]
-    environment_html: Callable[[Any], str]
-    environment_png: Callable[[Any], bytes]
-    record_html: Callable[[Any], str]
-    record_png: Callable[[Any], bytes]
-    comparison_html: Callable[[Any], str]
-    comparison_png: Callable[[Any], bytes]
+    render_environment_html: Callable[[Any], str]
+    render_environment_png: Callable[[Any], bytes]
+    render_record_html: Callable[[Any], str]
+    render_record_png: Callable[[Any], bytes]
+    render_comparison_html: Callable[[Any], str]
+    render_comparison_png: Callable[[Any], bytes]
     show: Callable[..., Any]
 
 
@@ -104,7 +104,7 @@ class Drawable:
             backend = load_drawing_backend()
         except RobocovError:
             return None
-        draw = getattr(backend, f"{self._drawing_name}_{form}", None)
+        draw = getattr(backend, f"render_{self._drawing_name}_{form}", None)
         return None if draw is None else draw(self)
 
 

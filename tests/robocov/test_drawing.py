@@ -30,7 +30,7 @@ class Sketches(ModuleType):
         self.asked: list[tuple[Any, ...]] = []
 
     def __getattr__(self, name: str) -> Any:
-        if not name.startswith(("plot_", "environment_", "record_", "comparison_")):
+        if not name.startswith(("plot_", "render_")):
             raise AttributeError(name)
 
         def noted(*given: Any, **options: Any) -> Any:
@@ -97,10 +97,10 @@ def test_without_matplotlib_the_first_by_name_draws(
 ) -> None:
     offering(monkeypatch, zeichnungen="nowhere", sketches="sketches")
     assert load_drawing_backend() is sketches
-    assert record._repr_html_() == "record_html of sketches"
-    assert record._repr_png_() == "record_png of sketches"
-    assert empty._repr_html_() == "environment_html of sketches"
-    assert empty._repr_png_() == "environment_png of sketches"
+    assert record._repr_html_() == "render_record_html of sketches"
+    assert record._repr_png_() == "render_record_png of sketches"
+    assert empty._repr_html_() == "render_environment_html of sketches"
+    assert empty._repr_png_() == "render_environment_png of sketches"
 
 
 def test_a_name_that_is_none_is_refused_with_the_nearest(record: Record) -> None:

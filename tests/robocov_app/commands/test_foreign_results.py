@@ -12,7 +12,7 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.notebook import record_html, record_png
+from robocov_app.notebook import render_record_html, render_record_png
 from robocov_app.replication.design.contenders import Contender
 from robocov_app.replication.design.studies import Contest
 from robocov_app.replication.results.outcome_tables import read_outcomes
@@ -140,7 +140,7 @@ def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for folder in ("run", "offered", "both/Mine", "both/planted"):
         record = Record.load(shared / folder)
         record.snapshot(3), record.cells(3), record.to_json(), repr(record)
-        record_html(record), record_png(record)
+        render_record_html(record), render_record_png(record)
     results = read_results(shared / "sweep")
     assert results.record(0).controller == results.to_pandas()["controller"][0] == "mine.py:Mine"
     contest = Contest(read_study(shared / "ours.toml"), (Contender("ours", "ours", "lloyd", {}),))
