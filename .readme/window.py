@@ -14,8 +14,8 @@ from PIL import Image
 
 from robocov.mapfile import find_map_file, load_map
 from robocov_app.editor.edits.create import add_rectangle
-from robocov_app.editor.ui.launch import editor_window
-from robocov_app.viewer.launch import HEADLESS_FPS, Launcher
+from robocov_app.editor.ui.launch import EditorLauncher
+from robocov_app.viewer.launch import HEADLESS_FPS, ViewerLauncher
 from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
@@ -39,7 +39,7 @@ def picture(theme: str, name: str) -> None:
     )
     session.playback.clock.speed = 2.0
     also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
-    launcher = Launcher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
+    launcher = ViewerLauncher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
     with launcher.window() as window:
         for frame in range(12 * HEADLESS_FPS):
             if frame == 6 * HEADLESS_FPS:
@@ -58,7 +58,8 @@ def picture(theme: str, name: str) -> None:
 def editor(theme: str, name: str) -> None:
     """Draw a show-case into a museum, and drag it until it is in line with the others."""
     path = find_map_file("museum")
-    with editor_window(path, HERE, theme=theme, size=SIZE, headless=True) as window:
+    launcher = EditorLauncher(path, HERE, theme=theme, size=SIZE, headless=True)
+    with launcher.window() as window:
         editor = window.editor
         editor.apply(add_rectangle(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
         window.panel.show_tab("object")
@@ -91,7 +92,7 @@ def film(name: str) -> None:
         *("-movflags", "+faststart", str(HERE / name)),
     ]
     session = Session(SessionScenario(load_map("rooms")))
-    launcher = Launcher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
+    launcher = ViewerLauncher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
     with launcher.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
         window.do("tour")

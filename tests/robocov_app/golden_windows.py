@@ -62,14 +62,16 @@ def played(window, frames: int) -> None:
 
 def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
-    from robocov_app.viewer.launch import Launcher
+    from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.screen_video import copy_pixels
     from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
 
     theme, play = SCENES[name]
     session = Session(SessionScenario(load_map("rooms"), robots=4))
-    opening = Launcher(session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32)
+    opening = ViewerLauncher(
+        session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32
+    )
     with opening.window() as window:
         spoil(window)
         play(window)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from robocov_app.runs.encoding import Frame
-    from robocov_app.viewer.launch import Launcher
+    from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.window import ViewerWindow
 
@@ -106,10 +106,10 @@ def command(options: Arguments) -> int:
         return _open_window(_build_launcher(options), options)
 
 
-def _build_launcher(options: Arguments) -> Launcher:
+def _build_launcher(options: Arguments) -> ViewerLauncher:
     """Load or build the session, and build the launcher of its window."""
     from robocov.controllers import list_controller_classes
-    from robocov_app.viewer.launch import Launcher
+    from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.files.session_file import SUFFIX
 
     controllers = (*list_controller_classes(), *options.controllers)
@@ -124,7 +124,7 @@ def _build_launcher(options: Arguments) -> Launcher:
         session = build_session(options)
         map_name = options.map
     shown_layers, hidden_layers = options.read_layers()
-    return Launcher(
+    return ViewerLauncher(
         session,
         map_name,
         options.folder,
@@ -200,7 +200,7 @@ def build_session(options: Arguments) -> Session:
     return session
 
 
-def _open_window(launcher: Launcher, options: Arguments) -> int:
+def _open_window(launcher: ViewerLauncher, options: Arguments) -> int:
     """Show the window until it is closed."""
     from robocov_app.web import show
 
@@ -218,7 +218,7 @@ def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
         window.do("tour")
 
 
-def _render(launcher: Launcher, options: Arguments) -> int:
+def _render(launcher: ViewerLauncher, options: Arguments) -> int:
     """Render the window to frames and a video, and return the exit status."""
     from robocov.files.result_folder import create_result
     from robocov.files.writing import resolve_target

@@ -70,10 +70,10 @@ def command(options: Arguments) -> int:
 
 def _open_editor(options: Arguments) -> None:
     """Show the editor until it is closed, or save its screenshot."""
-    from robocov_app.editor.ui.launch import editor_window
+    from robocov_app.editor.ui.launch import EditorLauncher
     from robocov_app.web import show
 
-    with editor_window(
+    launcher = EditorLauncher(
         _find_path(options.map),
         options.folder,
         background=options.background,
@@ -82,7 +82,8 @@ def _open_editor(options: Arguments) -> None:
         scale=options.scale,
         headless=options.screenshot is not None,
         served=options.serve,
-    ) as window:
+    )
+    with launcher.window() as window:
         if options.screenshot is None:
             show(window, options, options.folder)
         else:

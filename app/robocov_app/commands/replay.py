@@ -131,12 +131,12 @@ def _build_session(options: Arguments, saved_runs: Sequence[SavedRun]) -> Sessio
 
 def _open_window(options: Arguments, session: Session, file: Path | None = None) -> int:
     """Show a session in the window until it is closed."""
-    from robocov_app.viewer.launch import Launcher
+    from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.web import prepare, show
 
     prepare(options, Path())
     shown_layers, hidden_layers = options.video.read_layers()
-    launcher = Launcher(
+    launcher = ViewerLauncher(
         session,
         _find_map_name(session),
         Path(),

@@ -1,6 +1,8 @@
 """Persistent settings of a window, in a JSON file in the user's configuration folder."""
 
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -89,3 +91,23 @@ def save_settings(settings: BaseModel, file: Path | None) -> str:
     except (OSError, OutputError) as error:
         return f"settings cannot be saved: {error}"
     return ""
+
+
+@contextmanager
+def keep_changes(
+    settings: SettingsType, file: Path | None, read: Callable[[SettingsType], SettingsType]
+) -> Iterator[None]:
+    """Save the settings that are changed while the block runs; nothing if it raises.
+
+    Parameters
+    ----------
+    settings : BaseModel
+        Settings as they were loaded.
+    file : Path or None
+        None to save nothing.
+    read : callable
+        Returns the present settings of the window, given those that were loaded.
+    """
+    at_opening = read(settings)
+    yield
+    save_settings(merge_changed_settings(settings, at_opening, read(settings)), file)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from robocov.defaults import DEFAULT_LATTICE
@@ -10,9 +11,8 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.storage.autosave import find_draft_folder
 from robocov_app.storage.settings import (
     find_settings_file,
+    keep_changes,
     load_settings,
-    merge_changed_settings,
-    save_settings,
 )
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
@@ -57,7 +57,7 @@ class ViewerSettings(WindowSettings):
 
 
 @dataclass
-class Launcher:
+class ViewerLauncher:
     """Opens a window on a session.
 
     Attributes
@@ -126,11 +126,9 @@ class Launcher:
                 saver = window.run_saver
                 window.viewer.show_message(message)
                 self._offer_help(window, file)
-                at_opening = self._read_settings(window, settings)
                 try:
-                    yield window
-                    at_closing = self._read_settings(window, settings)
-                    save_settings(merge_changed_settings(settings, at_opening, at_closing), file)
+                    with keep_changes(settings, file, partial(self._read_settings, window)):
+                        yield window
                 finally:
                     window.viewer.files.workspace.close()
                     window.viewer.costs.close()

@@ -23,7 +23,7 @@ from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.map_draft import find_recoverable
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.launch import editor_window, offer_recovery
+from robocov_app.editor.ui.launch import EditorLauncher, offer_recovery
 from robocov_app.editor.ui.typed_commands import run_typed_command
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
@@ -238,7 +238,7 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def opening(folder: Path, path: Path | None = None, **more: object) -> AbstractContextManager[EditorWindow]:
-    return editor_window(path, folder, size=(900, 600), scale=1.0, **more)
+    return EditorLauncher(path, folder, size=(900, 600), scale=1.0, **more).window()
 
 
 def test_settings_are_remembered(places: Path) -> None:

@@ -18,7 +18,7 @@ from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, lo
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.display import open_display
 from robocov_app.viewer import launch as opening
-from robocov_app.viewer.launch import Launcher, ViewerSettings
+from robocov_app.viewer.launch import ViewerLauncher, ViewerSettings
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.files.workspace import SessionWorkspace, find_recoverable_drafts
 from robocov_app.viewer.status import describe_cursor, list_facts, suggest_actions
@@ -170,13 +170,13 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
         assert suggest_actions(viewer) == ""
 
 
-def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Launcher:
+def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> ViewerLauncher:
     """Return how a window opens that somebody would watch, on a display that nobody sees."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
     monkeypatch.setattr(
         opening, "open_display", lambda headless, missing_message: open_display(headless=True)
     )
-    return Launcher(start_session(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
+    return ViewerLauncher(start_session(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 
 def test_who_starts_for_the_first_time_is_offered_the_lesson_once(

@@ -21,7 +21,7 @@ from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, build_session
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
-from robocov_app.viewer.launch import NO_DISPLAY, Launcher
+from robocov_app.viewer.launch import NO_DISPLAY, ViewerLauncher
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 
 SHORT = ("--lattice", "8", "--size", "900x600")
@@ -188,7 +188,7 @@ def test_text_is_as_large_as_suits_the_screen(height: int, scale: float, monkeyp
 def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     (tmp_path / "window.json").write_text("{ nonsense")
-    with Launcher(start_session(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
+    with ViewerLauncher(start_session(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
         assert "default settings" in window.viewer.message
         window.close()
     assert '"theme": "light"' in (tmp_path / "window.json").read_text()
@@ -200,7 +200,7 @@ def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> 
     kept.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
     asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "shown_layers": frozenset({"scan"})}
     asked["hidden_layers"] = frozenset({"cells"})
-    with Launcher(start_session(), "hall", tmp_path, lattice=4, **asked).window() as window:
+    with ViewerLauncher(start_session(), "hall", tmp_path, lattice=4, **asked).window() as window:
         assert window.viewer.view.layers == {"robots", "scan"} and window.viewer.view.theme == "dark"
         assert window.viewer.session.playback.clock.budget == FRAME_BUDGET_S, "people look at it"
         window.viewer.view.layers.add("trails")
@@ -210,7 +210,7 @@ def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> 
 
 
 def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
-    asked = Launcher(
+    asked = ViewerLauncher(
         start_session(),
         "hall",
         tmp_path,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robocov.mapfile import load_map
-from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
@@ -15,7 +15,7 @@ from robocov_app.viewer.session.session import Session
 
 def words(tmp_path: Path, *laws: str) -> list[str]:
     session = Session(SessionScenario(load_map("square"), tuple(ControllerChoice(law) for law in laws)))
-    with Launcher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
+    with ViewerLauncher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
         for _ in range(10):
             window.run_frame(1 / 30)
         return [entry.text for entry in window.canvas._list_legend_entries()]

@@ -17,7 +17,7 @@ from robocov.record import Record
 from robocov.team import Team
 from robocov.voronoi import WeightedCells
 from robocov_app.runs.saved_runs import SavedRun, build_roster
-from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.missing_controller import MissingController
 from robocov_app.viewer.session.recorded import build_replay_session, get_control_period
@@ -407,7 +407,7 @@ def test_the_window_displays_a_record_without_its_controller(
     tmp_path: Path, counting: ControllerChoice
 ) -> None:
     session = build_replay_session([build_saved_run(record_run(counting))])
-    launcher = Launcher(session, "", tmp_path, size=(900, 600), headless=True, lattice=16)
+    launcher = ViewerLauncher(session, "", tmp_path, size=(900, 600), headless=True, lattice=16)
     with launcher.window() as window:
         for _ in range(40):
             window.run_frame(1 / 30)

@@ -14,7 +14,7 @@ from PIL import Image
 from sample_sessions import RAPF, start_session
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.status import describe_cursor
 
 # playing
@@ -320,7 +320,7 @@ def test_settings_are_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "settings/window.json").write_text('{"width": 1000, "height": 640}')
 
     def window():
-        return Launcher(start_session(), "hall", tmp_path, lattice=4).window()
+        return ViewerLauncher(start_session(), "hall", tmp_path, lattice=4).window()
 
     with window() as first:
         driver = Driver(first)

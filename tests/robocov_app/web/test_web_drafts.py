@@ -15,9 +15,9 @@ from sample_sessions import start_session
 from served_window import Link, served
 
 from robocov_app.editor.edits.create import add_circle
-from robocov_app.editor.ui.launch import editor_window
+from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
-from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.launch import ViewerLauncher
 
 pytest.importorskip("websockets")
 
@@ -47,13 +47,13 @@ def wait_for(condition: Callable[[], object]) -> None:
 
 
 def test_a_served_editor_offers_its_draft_at_the_next_start(tmp_path: Path) -> None:
-    with editor_window(None, tmp_path, served=True) as window:
+    with EditorLauncher(None, tmp_path, served=True).window() as window:
         editor = window.editor
         assert editor.dialogs.current is None
         editor.attempt(lambda: editor.apply(add_circle(editor.sketch, (5.0, 5.0), 1.0)))
         window.run_frame(0.1)
     assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
-    with editor_window(None, tmp_path, served=True) as window:
+    with EditorLauncher(None, tmp_path, served=True).window() as window:
         assert window.editor.dialogs.current.title == "Recover unsaved work?"
         window.editor.dialogs.current.answers[0].call()
         assert len(window.editor.sketch.obstacles) == 1
@@ -61,13 +61,15 @@ def test_a_served_editor_offers_its_draft_at_the_next_start(tmp_path: Path) -> N
 
 def test_a_served_viewer_offers_its_draft_at_the_next_start(tmp_path: Path) -> None:
     session = start_session()
-    with Launcher(session, "hall", tmp_path, lattice=4, size=(900, 600), served=True).window() as window:
+    with ViewerLauncher(
+        session, "hall", tmp_path, lattice=4, size=(900, 600), served=True
+    ).window() as window:
         assert window.dialogs.current is None
         session.fail_robot(2)
         window.run_frame(0.1)
         window.close()
     assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
-    with Launcher(
+    with ViewerLauncher(
         start_session(), "hall", tmp_path, lattice=4, size=(900, 600), served=True
     ).window() as window:
         assert window.dialogs.current.title == "Recover unsaved work?"

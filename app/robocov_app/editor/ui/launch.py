@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from robocov.errors import InputError
 from robocov_app.editor.editor import Editor
@@ -19,12 +21,12 @@ from robocov_app.editor.settings import (
 from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.file_commands import describe_opening, open_or_detect, set_reference_image
 from robocov_app.editor.ui.window import EditorWindow
+from robocov_app.formats import Importer
 from robocov_app.storage.autosave import find_draft_folder, remove_draft
 from robocov_app.storage.settings import (
     find_settings_file,
+    keep_changes,
     load_settings,
-    merge_changed_settings,
-    save_settings,
 )
 from robocov_app.toolkit.dialogs import create_recovery_question
 from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
@@ -37,106 +39,126 @@ NO_DISPLAY = (
 )
 
 
-@contextmanager
-def editor_window(
-    path: Path | None,
-    folder: Path,
-    *,
-    background: Path | None = None,
-    theme: str | None = None,
-    size: tuple[int, int] | None = None,
-    scale: float | None = None,
-    headless: bool = False,
-    served: bool = False,
-) -> Iterator[EditorWindow]:
-    """Open the editor.
+@dataclass
+class EditorLauncher:
+    """Opens the editor.
 
-    Parameters
+    Attributes
     ----------
     path : Path or None
         Map to open, or foreign file to import; None for a new map.
     folder : Path
         Folder of files without a path, and of the drafts of a `served` window.
-    background : Path, optional
+    background : Path or None
         Picture to put under the map.
-    theme : str, optional
-        Colors: "light" or "dark".
-    size : tuple of int, optional
-        Width and height of the window, px.
-    scale : float, optional
-        Size of texts and widgets.
+    theme : str or None
+        ``light`` or ``dark``; None for the one used last.
+    size : tuple of int or None
+        Width and height, px; None for those used last.
+    scale : float or None
+        Size of texts and widgets; None for the one used last.
     headless : bool
-        Draw without a display; keep neither settings nor drafts.
+        Whether to draw without a display; neither settings nor drafts are kept.
     served : bool
-        Draw without a display, but live; keep no settings.
-
-    Yields
-    ------
-    EditorWindow
-        The window.
-
-    Raises
-    ------
-    InputError
-        If there is no display, or another editor has the map open.
-    MapError
-        If the file cannot be read.
+        Whether to draw for a browser: without a display, but in real time. No settings are kept.
     """
-    has_display = not headless and not served
-    drafts = None if headless else find_draft_folder(folder if served else None)
-    if path is not None and is_open_elsewhere(drafts, path=path):
-        raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
-    # The file is read before a window appears, so that its errors are reported without one.
-    opened = Document.new(drafts) if path is None else open_or_detect(path, drafts)
-    document = opened if isinstance(opened, Document) else Document.new(drafts)
-    with ExitStack() as stack:
-        # Does nothing if the document was closed by then.
-        stack.callback(document.close, discard=False)
-        worker = stack.enter_context(closing(create_measurement_worker(direct=headless)))
-        stack.enter_context(open_display(headless=not has_display, missing_message=NO_DISPLAY))
-        file = find_settings_file(SETTINGS_FILE) if has_display else None
-        settings, settings_error = load_settings(EditorSettings, file)
-        editor = Editor(document, worker, folder, settings)
-        editor.theme = theme or settings.theme
-        if background is not None:
-            set_reference_image(editor, background)
+
+    path: Path | None
+    folder: Path
+    background: Path | None = None
+    theme: Literal["light", "dark"] | None = None
+    size: tuple[int, int] | None = None
+    scale: float | None = None
+    headless: bool = False
+    served: bool = False
+
+    @contextmanager
+    def window(self) -> Iterator[EditorWindow]:
+        """Open the window with its settings, and keep those that were changed.
+
+        Raises
+        ------
+        InputError
+            If there is no display, or another editor has the map open.
+        MapError
+            If the file cannot be read.
+        """
+        # The file is read before a window appears, so that its errors are reported without one.
+        opened = self._read_file()
+        document = opened if isinstance(opened, Document) else Document.new(self._draft_folder)
+        with ExitStack() as stack:
+            # Does nothing if the document was closed by then.
+            stack.callback(document.close, discard=False)
+            worker = stack.enter_context(closing(create_measurement_worker(direct=self.headless)))
+            stack.enter_context(open_display(headless=not self._has_display, missing_message=NO_DISPLAY))
+            file = find_settings_file(SETTINGS_FILE) if self._has_display else None
+            settings, settings_message = load_settings(EditorSettings, file)
+            editor = Editor(document, worker, self.folder, settings)
+            self._prepare_editor(editor, settings)
+            editor.show_message(settings_message or self._describe_opening(opened))
+            window = self._open_window(editor, settings)
+            if not isinstance(opened, Document) and self.path is not None:
+                window.documents.ask_import(self.path, opened)
+            is_discarded = False
+            try:
+                with keep_changes(settings, file, partial(read_settings, window)):
+                    yield window
+                is_discarded = window.documents.leaving
+            finally:
+                window.close()
+                # Unsaved changes are kept to be offered, unless the user has decided about them.
+                editor.document.close(discard=is_discarded)
+
+    @property
+    def _has_display(self) -> bool:
+        return not self.headless and not self.served
+
+    @property
+    def _draft_folder(self) -> Path | None:
+        """Folder for drafts; None if none are kept."""
+        if self.headless:
+            return None
+        return find_draft_folder(self.folder if self.served else None)
+
+    def _read_file(self) -> Document | Importer:
+        """Return the document to edit, or the importer of a foreign file."""
+        drafts = self._draft_folder
+        if self.path is None:
+            return Document.new(drafts)
+        if is_open_elsewhere(drafts, path=self.path):
+            raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")
+        return open_or_detect(self.path, drafts)
+
+    def _describe_opening(self, opened: Document | Importer) -> str:
+        if self.path is not None and isinstance(opened, Document):
+            return describe_opening(opened)
+        return ""
+
+    def _prepare_editor(self, editor: Editor, settings: EditorSettings) -> None:
+        """Apply the options to the editor."""
+        editor.theme = self.theme or settings.theme
+        if self.background is not None:
+            set_reference_image(editor, self.background)
             editor.choose_tool("picture", shows_hint=False)
-        window_size = _choose_size(size, settings, has_display=has_display)
-        window_scale = choose_scale(scale or settings.scale, has_display=has_display)
-        if settings_error:
-            editor.show_message(settings_error)
-        elif path is not None and document is opened:
-            editor.show_message(describe_opening(document))
-        window = EditorWindow(editor, window_size, window_scale, drafts, patient=headless)
+
+    def _open_window(self, editor: Editor, settings: EditorSettings) -> EditorWindow:
+        drafts = self._draft_folder
+        scale = choose_scale(self.scale or settings.scale, has_display=self._has_display)
+        window = EditorWindow(editor, self._choose_size(settings), scale, drafts, patient=self.headless)
         window.faults = FaultLog(drafts)
-        window.contains_faults = not headless
+        window.contains_faults = not self.headless
         window.panel.show_tab(settings.tab)
-        if document.path is not None:
-            window.documents.remember(document.path)
+        if editor.document.path is not None:
+            window.documents.remember(editor.document.path)
         offer_recovery(window, find_recoverable(drafts))
-        if path is not None and not isinstance(opened, Document):
-            window.documents.ask_import(path, opened)
-        first_settings = read_settings(window, settings)
-        is_discarded = False
-        try:
-            yield window
-            changed = merge_changed_settings(settings, first_settings, read_settings(window, settings))
-            save_settings(changed, file)
-            is_discarded = window.documents.leaving
-        finally:
-            window.close()
-            # Unsaved changes are kept to be offered, unless the user has decided about them.
-            editor.document.close(discard=is_discarded)
+        return window
 
-
-def _choose_size(
-    size: tuple[int, int] | None, settings: EditorSettings, *, has_display: bool
-) -> tuple[int, int]:
-    """Return the size of the window, px; that of the settings is limited to the display."""
-    if size:
-        return size
-    saved = (settings.width, settings.height)
-    return fit_to_screen(saved) if has_display else saved
+    def _choose_size(self, settings: EditorSettings) -> tuple[int, int]:
+        """Return the size of the window, px; that of the settings is limited to the display."""
+        if self.size:
+            return self.size
+        saved = (settings.width, settings.height)
+        return fit_to_screen(saved) if self._has_display else saved
 
 
 def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
@@ -162,7 +184,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
 
 
 def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:
-    """Return the present settings of a window; what it does not change is as before."""
+    """Return the present settings of a window; those that it does not change are as before."""
     editor = window.editor
     width, height = limit_window_size(window.windowed_size or window.screen.get_size())
     changes: dict[str, object] = {
