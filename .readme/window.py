@@ -38,20 +38,22 @@ def picture(theme: str, name: str) -> None:
         )
     )
     session.playback.clock.speed = 2.0
-    also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
-    launcher = ViewerLauncher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
+    layers = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
+    launcher = ViewerLauncher(
+        session, "rooms", HERE, theme=theme, size=SIZE, shown_layers=layers, headless=True
+    )
     with launcher.window() as window:
         for frame in range(12 * HEADLESS_FPS):
             if frame == 6 * HEADLESS_FPS:
                 session.fail_robot(5)
-            window.frame(1.0 / HEADLESS_FPS)
+            window.run_frame(1.0 / HEADLESS_FPS)
         viewer = window.viewer
         viewer.inspection.active_pane = 1
         viewer.inspection.selected = 4
         window.panel.show_tab("robot")
         viewer.pass_time(60.0)  # what was said is old
         for _ in range(8):
-            window.frame(0.0)
+            window.run_frame(0.0)
         keep(window, HERE / name)
 
 
@@ -63,7 +65,7 @@ def editor(theme: str, name: str) -> None:
         editor = window.editor
         editor.apply(add_rectangle(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
         window.panel.show_tab("object")
-        window.frame(0.5)
+        window.run_frame(0.5)
         to = window.canvas.to_pixel
         hand = [(16.6, 7.3), (16.8, 7.0), (17.8, 5.0), (18.03, 4.33)]
         points = [tuple(map(round, to(point))) for point in hand]
@@ -71,9 +73,9 @@ def editor(theme: str, name: str) -> None:
         for before, point in itertools.pairwise(points):
             rel = (point[0] - before[0], point[1] - before[1])
             pygame.event.post(pygame.Event(pygame.MOUSEMOTION, pos=point, rel=rel, buttons=(1, 0, 0)))
-            window.frame(0.1)
+            window.run_frame(0.1)
         for _ in range(8):
-            window.frame(0.1)
+            window.run_frame(0.1)
         keep(window, HANDBOOK / name)
 
 
@@ -100,7 +102,7 @@ def film(name: str) -> None:
         for frame in range(round(window.lesson.player.duration * HEADLESS_FPS)):
             if window.lesson.player is None:
                 break
-            window.frame(1.0 / HEADLESS_FPS)
+            window.run_frame(1.0 / HEADLESS_FPS)
             if frame % 2 == 0:
                 encoder.stdin.write(copy_pixels(window.screen).tobytes())
 

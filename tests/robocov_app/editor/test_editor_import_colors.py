@@ -52,13 +52,13 @@ def test_a_color_goes_through_its_roles_and_back(drawing: Path) -> None:
     asked = dialog(drawing)
     assert free_area(asked) == pytest.approx(ROOM - 6)
     for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
-        asked.cycle_color((224, 224, 255))
-        assert find_role(asked.entries, (224, 224, 255)) == role
+        asked.form.cycle_color((224, 224, 255))
+        assert find_role(asked.form.entries, (224, 224, 255)) == role
         assert free_area(asked) == pytest.approx(area)
         # what is left out can still be clicked
         assert asked.imported is not None and asked.imported.sheet is not None
         assert asked.imported.sheet.find_color(*RUG) == (224, 224, 255)
-    assert asked.entries == {}
+    assert asked.form.entries == {}
 
 
 def test_what_was_typed_stays_beside_what_is_clicked() -> None:
@@ -106,10 +106,10 @@ def test_colors_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
     assert found.find_color(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
     assert found.find_color(25.0, 5.0) is None and found.find_color(5.0, -0.01) is None
     asked = dialog(picture(tmp_path), "picture")
-    asked.set("cell", "0.1")
+    asked.form.set("cell", "0.1")
     split = free_area(asked)
-    asked.cycle_color((255, 0, 0))
-    assert find_role(asked.entries, (255, 0, 0)) == "free"
+    asked.form.cycle_color((255, 0, 0))
+    assert find_role(asked.form.entries, (255, 0, 0)) == "free"
     assert free_area(asked) > split + 50
 
 
@@ -162,7 +162,7 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(hands: Hands) ->
     solid = pixel(hands, after)
     hands.click(*before.tolist())
     asked, widgets = shown(hands)
-    assert asked.entries == {"free_color": "#e0e0ff"}
+    assert asked.form.entries == {"free_color": "#e0e0ff"}
     # the rows of colors are in sight, and do not move the maps
     chip = widgets["button:color:#e0e0ff"]
     assert chip.text.strip() == "free"
@@ -170,7 +170,9 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(hands: Hands) ->
     # a click into the right map still keeps a part
     hands.click(*asked.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
     asked, _ = shown(hands)
-    assert [float(word) for word in asked.entries["inside"].split()] == pytest.approx((8.0, 1.0), abs=0.1)
+    assert [float(word) for word in asked.form.entries["inside"].split()] == pytest.approx(
+        (8.0, 1.0), abs=0.1
+    )
 
 
 def test_colors_are_reached_by_the_keyboard(hands: Hands) -> None:
@@ -191,11 +193,11 @@ def test_colors_are_reached_by_the_keyboard(hands: Hands) -> None:
         hands.frames(1)
     hands.key("space")
     asked, _ = shown(hands)
-    assert asked.entries == {"free_color": "#e0e0ff"}
+    assert asked.form.entries == {"free_color": "#e0e0ff"}
     assert ui.focus is not None and ui.focus == "color:#e0e0ff"
     hands.key("space")
     asked, _ = shown(hands)
-    assert asked.entries == {"solid_color": "#e0e0ff"}
+    assert asked.form.entries == {"solid_color": "#e0e0ff"}
 
 
 def test_the_report_is_in_sight(hands: Hands) -> None:

@@ -52,43 +52,43 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
     asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
-    assert asked.build_settings() == (ReadOptions(), Shaping())
+    assert asked.form.build_settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
     given |= {"colors": "red, #00ff00", "width": "3px"}
     meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
     meant |= {"colors": ("red", "#00ff00"), "width": "3px"}
     for option in options:
-        asked.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
+        asked.form.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}
         value = (
             {"yes": True}.get(option.choices[-1], option.choices[-1])
             if option.choices
             else meant[option.kind]
         )
-        assert getattr(asked.build_settings()[option.name in shaping], option.name) == value
+        assert getattr(asked.form.build_settings()[option.name in shaping], option.name) == value
 
 
 def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
     asked = question(plan)
     assert "--cell" in asked.trouble and not asked.ready
-    asked.set("cell", "0.1")
+    asked.form.set("cell", "0.1")
     assert free(asked) == pytest.approx(80 - 1)
-    asked.set("invert", "yes")
+    asked.form.set("invert", "yes")
     assert free(asked) == pytest.approx(200 - 80 - 56)
-    asked.set("invert", "no")
-    asked.set("threshold", "0.3")
+    asked.form.set("invert", "no")
+    asked.form.set("threshold", "0.3")
     assert free(asked) == pytest.approx(80)
-    asked.set("threshold", "0.3x")
+    asked.form.set("threshold", "0.3x")
     assert asked.trouble == "threshold: expected a number, got '0.3x'"
-    asked.set("threshold", "")
-    asked.set("keep", "all")
+    asked.form.set("threshold", "")
+    asked.form.set("keep", "all")
     assert free(asked) == pytest.approx(80 + 56 - 1)
-    asked.keep_inside((15.0, 5.0))
+    asked.form.keep_inside((15.0, 5.0))
     assert free(asked) == pytest.approx(56)
-    asked.keep_inside((11.5, 5.0))
+    asked.form.keep_inside((11.5, 5.0))
     assert "is solid, expected a free position" in asked.trouble
-    asked.set("inside", "")
+    asked.form.set("inside", "")
     assert free(asked) == pytest.approx(80 - 1)
-    assert asked.entries == {"cell": "0.1"}
+    assert asked.form.entries == {"cell": "0.1"}
 
 
 def waited(asked: ImportDialog) -> None:
@@ -105,11 +105,11 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportJob", "imports", patience=0.0)
     asked = question(plan, worker)
     for text in ("0", "0.", "0.1"):
-        asked.set("cell", text)
+        asked.form.set("cell", text)
     process = worker.process
     waited(asked)
     assert free(asked) == pytest.approx(80 - 1)
-    asked.keep_inside((15.0, 5.0))
+    asked.form.keep_inside((15.0, 5.0))
     asked.accepted = True
     waited(asked)
     taken = asked.poll()
@@ -138,10 +138,10 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.key("return")
     hands.type("0.1")
     asked, _ = shown(hands)
-    assert asked.entries == {"cell": "0.1"}
+    assert asked.form.entries == {"cell": "0.1"}
     for camera, place in zip(asked.preview.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
         hands.click(*camera.to_pixels(np.array(place)).tolist())
-        x, y = (float(word) for word in asked.entries["inside"].split())
+        x, y = (float(word) for word in asked.form.entries["inside"].split())
         assert (x, y) == pytest.approx(place, abs=0.1)
     hands.click(*asked.preview.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     hands.key("return")
@@ -163,19 +163,19 @@ def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
     hands.click(*view["menu:invert"].rect.center)
     hands.key("down")
     hands.key("return")
-    assert asked.entries == {"cell": "0.1", "invert": "yes"} and not asked.accepted
+    assert asked.form.entries == {"cell": "0.1", "invert": "yes"} and not asked.accepted
     menu = shown(hands)[1]["menu:unknown"]
     seen = []
     for _ in range(4):
         hands.click(*menu.rect.center)
         hands.key("down")
         hands.key("return")
-        seen.append(asked.entries.get("unknown"))
+        seen.append(asked.form.entries.get("unknown"))
     assert seen == ["obstacle", "free", "cut", "cut"]
     hands.click(*menu.rect.center)
     hands.key("home")
     hands.key("return")
-    assert "unknown" not in asked.entries, "an option without a default can be left again"
+    assert "unknown" not in asked.form.entries, "an option without a default can be left again"
     before = hands.sketch
     hands.click(*view["button:cancel"].rect.center)
     assert hands.editor.dialogs.current is None and hands.sketch is before
@@ -223,7 +223,7 @@ def test_options_maps_and_report_keep_apart(tmp_path: Path, plan: Path, size: tu
         hands.frames(2)
         asked, view = shown(hands)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button", "area")]
-        assert len(rects) == len(asked.options) + 3
+        assert len(rects) == len(asked.form.options) + 3
         assert all(not one.colliderect(other) for k, one in enumerate(rects) for other in rects[:k])
         assert min(rect.height for rect in rects) >= 16
         hands.key("escape")

@@ -2,42 +2,36 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pygame
 from pygame import Rect, Surface
 
-from robocov.environment import Point
 from robocov.errors import RobocovError
+from robocov_app.editor.ui.import_form import ImportForm
 from robocov_app.editor.ui.import_preview import ImportPreview
 from robocov_app.editor.ui.import_sheet import (
     ColorSheet,
-    choose_next_role,
     find_role,
     list_declared_colors,
-    set_role,
 )
-from robocov_app.editor.ui.importing import Imported, ImportOption, list_options
-from robocov_app.formats import Importer, ReadOptions, Shaping
+from robocov_app.editor.ui.importing import Imported
+from robocov_app.formats import Importer
 from robocov_app.formats.colors import Color, name_color
 from robocov_app.jobs.workers import Worker
 from robocov_app.render.fonts import render_text
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 
 # Lengths in pixels at scale 1.
 OPTIONS_WIDTH_PX = 300
-OPTION_LABEL_WIDTH_PX = 126
 OPTIONS_GAP_PX = 32  # between options and maps
 REPORT_LINE_PX = 17
-MAX_ROW_PX = 28.0  # of an option
-HELP_MARGIN_PX = 40  # below the options, for the buttons
+OPTIONS_MARGIN_PX = 44  # below the options, for the buttons
+HELP_MARGIN_PX = 40  # below the help of an option
 BUTTONS_HEIGHT_PX = 30
 CHIP_WIDTH_PX = 78  # of a color with its role
 CHIP_GAP_PX = 6
@@ -45,8 +39,6 @@ SWATCH_PX = 12
 MAPS_GAP_PX = 14  # between maps and report
 
 MIN_REPORT_LINES = 7
-MAX_ENTRY_CHARACTERS = 200
-DEFAULT_TEXT = "default"
 KEEP_PART = "part"
 SET_COLOR = "color"
 HINTS = {
@@ -72,16 +64,14 @@ class ImportDialog(Dialog):
 
     Attributes
     ----------
-    options : tuple of ImportOption
-        The options of the import.
-    entries : dict of str to str
-        Typed and chosen texts by the names of options.
+    form : ImportForm
+        The options of the import, as typed and chosen.
     imported : Imported or None
         The map with the newest settings that could be imported.
     accepted : bool
         Whether the user has accepted the map, as soon as it is ready.
     click_action : str
-        What a click into a map does: keep a part, or set the role of a color.
+        Effect of a click into a map: it keeps a part, or sets the role of a color.
     """
 
     width = 10_000.0  # as wide as the window
@@ -92,33 +82,14 @@ class ImportDialog(Dialog):
         self.path = path
         self.importer = importer
         self.call = call
-        self.options = list_options(importer)
-        self.entries: dict[str, str] = {}
+        self.form = ImportForm(importer, self._request)
         self.imported: Imported | None = None
         self.accepted = False
         self.click_action = KEEP_PART
         self.preview = ImportPreview()
         self._worker = worker
         self._mistake = ""  # in the options
-        self._focused_ui: Ui | None = None  # in which the first field has got the text cursor
         self._request()
-
-    def set(self, name: str, text: str) -> None:
-        """Set an option to a typed or chosen text; an empty one sets the default."""
-        option = self._find_option(name)
-        if not text or text in (option.default, DEFAULT_TEXT):
-            self.entries.pop(name, None)
-        else:
-            self.entries[name] = text[:MAX_ENTRY_CHARACTERS]
-        self._request()
-
-    def _find_option(self, name: str) -> ImportOption:
-        return next(option for option in self.options if option.name == name)
-
-    def keep_inside(self, position: Point) -> None:
-        """Keep the part of the free space around a position, m."""
-        self.entries.pop("keep", None)
-        self.set("inside", f"{position[0]:.10g} {position[1]:.10g}")
 
     @property
     def sheet(self) -> ColorSheet | None:
@@ -132,27 +103,12 @@ class ImportDialog(Dialog):
         """The file in its own colors, if a click sets the role of a color."""
         return self.sheet if self.click_action == SET_COLOR else None
 
-    def cycle_color(self, color: Color) -> None:
-        """Give a color the next role: free, solid, ignored, and none."""
-        set_role(self.entries, color, choose_next_role(find_role(self.entries, color)))
-        self._request()
-
-    def build_settings(self) -> tuple[ReadOptions, Shaping]:
-        """Return the settings that were typed and chosen; raise RobocovError if any means nothing."""
-        reading_names = {field.name for field in fields(ReadOptions)}
-        reading: dict[str, Any] = {}
-        shaping: dict[str, Any] = {}
-        for name, text in self.entries.items():
-            values = reading if name in reading_names else shaping
-            values[name] = self._find_option(name).parse(text)
-        return ReadOptions(**reading), Shaping(**shaping)
-
     def _request(self) -> None:
         """Request an import with the present settings."""
         self.accepted = False
         self._mistake = ""
         try:
-            reading, shaping = self.build_settings()
+            reading, shaping = self.form.build_settings()
             self._worker.put((self.path, self.importer.name, reading, shaping))
         except RobocovError as error:
             self._mistake = str(error)
@@ -239,8 +195,9 @@ class ImportDialog(Dialog):
         if self.trouble:
             # The maps are those of earlier settings.
             self.preview.veil(surface, ui.theme)
-        elif "inside" in self.entries:
-            position = self._find_option("inside").parse(self.entries["inside"])
+            return
+        position = self.form.find_inside()
+        if position is not None:
             self.preview.mark(surface, position, ui.scale, ui.theme)
 
     def _click(self, pixel: tuple[int, int]) -> None:
@@ -253,14 +210,14 @@ class ImportDialog(Dialog):
             if sheet is not None and number == 0:
                 color = sheet.find_color(x, y)
                 if color is not None:
-                    self.cycle_color(color)
+                    self.form.cycle_color(color)
             else:
                 # No finer than a pixel.
                 digits = max(0, math.ceil(math.log10(camera.zoom)))
-                self.keep_inside((round(x, digits), round(y, digits)))
+                self.form.keep_inside((round(x, digits), round(y, digits)))
 
     def _draw_click_actions(self, ui: Ui) -> None:
-        """Draw what a click does, and the colors with their roles."""
+        """Draw the choice of the effect of a click, and the colors with their roles."""
         ui.row(56, 84, 84, 0, height=24, below=6)
         ui.label("A click", style="unit")
         part_tip = "A click into a map keeps that part of the free space"
@@ -277,7 +234,7 @@ class ImportDialog(Dialog):
             self.click_action = action
 
     def _draw_chips(self, ui: Ui, sheet: ColorSheet) -> None:
-        colors = list(dict.fromkeys([*list_declared_colors(self.entries), *sheet.colors]))
+        colors = list(dict.fromkeys([*list_declared_colors(self.form.entries), *sheet.colors]))
         columns = int((ui.width + CHIP_GAP_PX) // (CHIP_WIDTH_PX + CHIP_GAP_PX))
         colors = colors[: max(columns, 1)]
         ui.row(*[CHIP_WIDTH_PX] * len(colors), 0, height=24, below=8)
@@ -286,13 +243,13 @@ class ImportDialog(Dialog):
         ui.end_row()
 
     def _draw_chip(self, ui: Ui, color: Color) -> None:
-        role = find_role(self.entries, color)
+        role = find_role(self.form.entries, color)
         name = name_color(color)
         key = f"color:{name}"
         text = f"     {_ROLE_LABELS[role]}"
         tip = f"{name}: a click changes it"
         if ui.button(text, key=key, chosen=role is not None, small=True, tip=tip):
-            self.cycle_color(color)
+            self.form.cycle_color(color)
         button = ui.find("button", key)
         if ui.surface is not None and button is not None:
             side = ui.px(SWATCH_PX)
@@ -305,15 +262,8 @@ class ImportDialog(Dialog):
         ui.paragraph(f"Import {self.path.name}", size=16, bold=True)
         ui.label(self.importer.title, style="unit")
         ui.end_row()
-        if ui is not self._focused_ui:
-            self._focused_ui = ui
-            self._focus_first_field(ui)
-        row_height = min((foot - 44 - ui.y) / len(self.options), MAX_ROW_PX) - 4
-        ui.row(OPTION_LABEL_WIDTH_PX, 0, height=row_height, below=4)
-        for option in self.options:
-            self._draw_option(ui, option)
-        ui.end_row()
-        self._draw_option_help(ui, foot)
+        self.form.show(ui, foot - OPTIONS_MARGIN_PX)
+        self.form.show_help(ui, foot - HELP_MARGIN_PX)
         ui.y = foot - BUTTONS_HEIGHT_PX
         ui.row(92, 92, height=BUTTONS_HEIGHT_PX, below=0)
         if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
@@ -322,30 +272,6 @@ class ImportDialog(Dialog):
             self.is_done = True
             self.handle_cancel()
         ui.end_row()
-
-    def _focus_first_field(self, ui: Ui) -> None:
-        first = next(option.name for option in self.options if not option.choices)
-        ui.focus = first
-        ui.edit = TextEdit.select_all(self.entries.get(first, ""))
-
-    def _draw_option(self, ui: Ui, option: ImportOption) -> None:
-        name = option.name
-        present = self.entries.get(name, option.default)
-        style = "bold" if name in self.entries else ""
-        ui.label(name.replace("_", " "), tip=option.help, style=style)
-        if option.choices:
-            choices = option.choices if option.default else (DEFAULT_TEXT, *option.choices)
-            text = ui.dropdown(name, choices, present or DEFAULT_TEXT, tip=option.help)
-        else:
-            text = ui.text_field(name, present, placeholder=DEFAULT_TEXT, tip=option.help, live=True)
-        if text is not None and text != present:
-            self.set(name, text)
-
-    def _draw_option_help(self, ui: Ui, foot: float) -> None:
-        text = next((option.help for option in self.options if option.name == ui.focus), "")
-        max_lines = max(int((foot - HELP_MARGIN_PX - ui.y) / (SMALL_TEXT_PX + 5)), 0)
-        lines = wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))[:max_lines]
-        ui.paragraph(" ".join(lines), size=SMALL_TEXT_PX, color=ui.theme.faint)
 
     def _list_report_lines(self) -> list[str]:
         if self.trouble:

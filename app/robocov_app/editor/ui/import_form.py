@@ -1,0 +1,123 @@
+"""The options of an import: their texts, and the fields in which they are typed and chosen."""
+
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
+
+from robocov.environment import Point
+from robocov_app.editor.ui.import_sheet import choose_next_role, find_role, set_role
+from robocov_app.editor.ui.importing import ImportOption, list_options
+from robocov_app.formats import Importer, ReadOptions, Shaping
+from robocov_app.formats.colors import Color
+from robocov_app.toolkit.overlay import wrap_text
+from robocov_app.toolkit.text_edit import TextEdit
+from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
+
+# Lengths in pixels at scale 1.
+OPTION_LABEL_WIDTH_PX = 126
+MAX_ROW_PX = 28.0  # of an option
+
+MAX_ENTRY_CHARACTERS = 200
+DEFAULT_TEXT = "default"
+
+
+class ImportForm:
+    """The options of an import, as typed and chosen.
+
+    Parameters
+    ----------
+    importer : Importer
+        Format of the file.
+    handle_change : callable
+        Called after an option has changed.
+
+    Attributes
+    ----------
+    options : tuple of ImportOption
+        The options.
+    entries : dict of str to str
+        Typed and chosen texts by the names of options; options with their default value have none.
+    """
+
+    def __init__(self, importer: Importer, handle_change: Callable[[], object]) -> None:
+        self.options = list_options(importer)
+        self.entries: dict[str, str] = {}
+        self._handle_change = handle_change
+        self._focused_ui: Ui | None = None  # in which the first field has got the text cursor
+
+    def find_option(self, name: str) -> ImportOption:
+        """Return the option of a name."""
+        return next(option for option in self.options if option.name == name)
+
+    def set(self, name: str, text: str) -> None:
+        """Set an option to a typed or chosen text; an empty one sets the default."""
+        option = self.find_option(name)
+        if not text or text in (option.default, DEFAULT_TEXT):
+            self.entries.pop(name, None)
+        else:
+            self.entries[name] = text[:MAX_ENTRY_CHARACTERS]
+        self._handle_change()
+
+    def keep_inside(self, position: Point) -> None:
+        """Keep the part of the free space around a position, m."""
+        self.entries.pop("keep", None)
+        self.set("inside", f"{position[0]:.10g} {position[1]:.10g}")
+
+    def cycle_color(self, color: Color) -> None:
+        """Give a color the next role: free, solid, ignored, and none."""
+        set_role(self.entries, color, choose_next_role(find_role(self.entries, color)))
+        self._handle_change()
+
+    def find_inside(self) -> Point | None:
+        """Return the position around which the free space is kept, m; None if there is none."""
+        if "inside" not in self.entries:
+            return None
+        x, y = self.find_option("inside").parse(self.entries["inside"])
+        return x, y
+
+    def build_settings(self) -> tuple[ReadOptions, Shaping]:
+        """Return the settings that were typed and chosen; raise RobocovError if any means nothing."""
+        reading_names = {field.name for field in fields(ReadOptions)}
+        reading: dict[str, Any] = {}
+        shaping: dict[str, Any] = {}
+        for name, text in self.entries.items():
+            values = reading if name in reading_names else shaping
+            values[name] = self.find_option(name).parse(text)
+        return ReadOptions(**reading), Shaping(**shaping)
+
+    def show(self, ui: Ui, foot: float) -> None:
+        """Show a row for each option above a lower edge, px at scale 1."""
+        if ui is not self._focused_ui:
+            self._focused_ui = ui
+            self._focus_first_field(ui)
+        row_height = min((foot - ui.y) / len(self.options), MAX_ROW_PX) - 4
+        ui.row(OPTION_LABEL_WIDTH_PX, 0, height=row_height, below=4)
+        for option in self.options:
+            self._show_option(ui, option)
+        ui.end_row()
+
+    def show_help(self, ui: Ui, foot: float) -> None:
+        """Show the help of the focused option above a lower edge, px at scale 1."""
+        text = next((option.help for option in self.options if option.name == ui.focus), "")
+        max_lines = max(int((foot - ui.y) / (SMALL_TEXT_PX + 5)), 0)
+        lines = wrap_text(text, ui.px(SMALL_TEXT_PX), ui.px(ui.width))[:max_lines]
+        ui.paragraph(" ".join(lines), size=SMALL_TEXT_PX, color=ui.theme.faint)
+
+    def _focus_first_field(self, ui: Ui) -> None:
+        first = next(option.name for option in self.options if not option.choices)
+        ui.focus = first
+        ui.edit = TextEdit.select_all(self.entries.get(first, ""))
+
+    def _show_option(self, ui: Ui, option: ImportOption) -> None:
+        name = option.name
+        present = self.entries.get(name, option.default)
+        style = "bold" if name in self.entries else ""
+        ui.label(name.replace("_", " "), tip=option.help, style=style)
+        if option.choices:
+            choices = option.choices if option.default else (DEFAULT_TEXT, *option.choices)
+            text = ui.dropdown(name, choices, present or DEFAULT_TEXT, tip=option.help)
+        else:
+            text = ui.text_field(name, present, placeholder=DEFAULT_TEXT, tip=option.help, live=True)
+        if text is not None and text != present:
+            self.set(name, text)
