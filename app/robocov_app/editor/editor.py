@@ -1,4 +1,4 @@
-"""The editor without its window: what is open, selected and shown, and how changes are made."""
+"""The editor without its window: open map, selection, visible layers, and changes."""
 
 from collections.abc import Callable
 from functools import partial

@@ -62,7 +62,7 @@ def describe_map(editor: Editor) -> str:
 
 
 class EditorCanvas:
-    """Draws the map of an editor, and finds what is under the cursor.
+    """Draws the map of an editor, and finds problems and positions at pixels.
 
     Parameters
     ----------

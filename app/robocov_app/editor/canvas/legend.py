@@ -15,7 +15,7 @@ from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
 def build_legend_entries(
     measurement: Measurement | None, *, has_starts: bool, has_team: bool, has_hull_excess: bool
 ) -> list[LegendEntry]:
-    """Return the legend entries of what is on the sheet.
+    """Return the legend entries of the sheet.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
     Returns
     -------
     (k, 2) array
-        Positions, px. What has no position, such as the center of an infinite box, is far away.
+        Positions, px. Points without a position, such as the center of an infinite box, are far away.
     """
     coordinates = np.array(list(points), dtype=float).reshape(-1, 2)
     return np.nan_to_num(canvas.camera.to_pixels(coordinates), nan=-MAX_PIXEL)
@@ -276,7 +276,7 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
 
 
 def draw_preview(canvas: Canvas, state: EditorDrawState, cursor: Point | None) -> None:
-    """Draw what a tool is about to do; `cursor` is the position of the cursor, px."""
+    """Draw the state of a tool; `cursor` is the position of the cursor, px."""
     floor = canvas.theme.background
     accent = canvas.theme.final
     for shape in state.shapes:

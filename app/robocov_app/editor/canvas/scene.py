@@ -31,9 +31,9 @@ class Scene:
     editor : Editor
         The editor.
     state : EditorDrawState
-        What the tool shows.
+        Draw state of the tool.
     saved : Sketch
-        The map without what is being dragged.
+        The map without the present drag.
     sketch : Sketch
         The map as it is displayed.
     selection : Selection

@@ -1,4 +1,4 @@
-"""The sheet: floor, picture, grid, obstacles and boundary on one page, of which only changes are redrawn."""
+"""The sheet: floor, picture, grid, obstacles and boundary on one page; only changes are redrawn."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -26,7 +26,7 @@ from robocov_app.render.surface_cache import LatestValue
 # Lengths in pixels at scale 1.
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
 MIN_COARSE_GRID_PX = 55.0  # between the strong lines
-REDRAW_MARGIN_PX = 6  # around what has changed
+REDRAW_MARGIN_PX = 6  # around changed objects
 NAME_MARGIN_PX = 8.0  # that a name leaves free on both sides together
 
 PIXEL_BIAS = 1e-4  # shift of the camera: round coordinates would otherwise lie between two pixels
@@ -123,7 +123,7 @@ class Sheet:
         Returns
         -------
         list of Rect or None
-            What has come into sight, px; None if the page cannot be moved by whole pixels.
+            Parts that have come into sight, px; None if the page cannot be moved by whole pixels.
         """
         shift = np.array(view.camera.middle) - camera.to_pixels(np.array(view.camera.center))
         dx, dy = shift.tolist()

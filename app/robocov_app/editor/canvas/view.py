@@ -1,4 +1,4 @@
-"""The view of the sheet: camera, theme, and what is shown."""
+"""The view of the sheet: camera, theme and visible layers."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -38,7 +38,7 @@ def subtract(sketch: Sketch, selection: Selection) -> Change:
 
 
 def intersect(sketch: Sketch, selection: Selection) -> Change:
-    """Keep what the selected obstacles have in common."""
+    """Keep the common area of the selected obstacles."""
     items = _require_solid_items(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
     description = f"{format_count(len(items), 'obstacle')} intersected"

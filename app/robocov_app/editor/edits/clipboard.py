@@ -16,7 +16,7 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, to_document
 
 FORMAT = "robocov-clipboard"  # of copied text
-SOURCE = "what was copied"  # in error messages
+SOURCE = "clipboard"  # in error messages
 
 
 def copy_selection(sketch: Sketch, selection: Selection) -> str:
@@ -42,7 +42,7 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
     text : str
         The copied text.
     position : Point, optional
-        Where the center of what is pasted goes, m; by default it stays where it was.
+        New center of the pasted objects, m; by default they keep their positions.
     grid : float, optional
         The displacement is a multiple of this, m.
 

@@ -149,7 +149,7 @@ def clean_text(text: str, label: str, maximum: int = MAX_TEXT_CHARACTERS) -> str
     text : str
         The text. Halves of characters, which no file can contain, are dropped.
     label : str
-        What the text is, for the error message.
+        Name of the text for the error message.
     maximum : int
         Maximum number of characters.
     """

@@ -34,7 +34,7 @@ from robocov_app.editor.model.validation import Problem, ProblemKind, find_probl
 
 BOUNDARY_MARGIN_M = 0.5  # between everything and a boundary drawn around it
 DEFAULT_BOUNDS_M = (0.0, 0.0, 10.0, 10.0)
-FILL_OVERLAP_M = 0.002  # by which a filling overlaps what is around it
+FILL_OVERLAP_M = 0.002  # by which a filling overlaps the objects around it
 FILL_MITRE_LIMIT = 2.0
 SPARE_M = 1e-3  # by which a widened gap is wider than a robot
 START_DISTANCE_RADII = 2.01  # between the positions of two robots

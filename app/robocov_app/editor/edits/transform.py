@@ -178,7 +178,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
     sketch : Sketch
         The map.
     selection : Selection
-        What is scaled.
+        Objects to scale.
     width, height : float or None
         Size of the box, m; None for one in proportion to the other.
     """

@@ -275,7 +275,7 @@ def _build_arc(ring: Ring, index: int, cut: CornerCut) -> Array:
 def extend_wall(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     """Extend a wall from its first or last vertex to a point, m, and select the new end."""
     points = _require_wall(sketch, vertex).points
-    require(vertex.index in (0, len(points) - 1), "a wall goes on from its ends only")
+    require(vertex.index in (0, len(points) - 1), "a wall can be extended from its ends only")
     index = 0 if vertex.index == 0 else len(points)
     extended = sketch.with_rings(vertex.owner, [(*points[:index], check_point(point), *points[index:])])
     selection = Selection(vertices=frozenset({Vertex(vertex.owner, 0, index)}))

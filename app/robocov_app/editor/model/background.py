@@ -245,7 +245,7 @@ def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[s
     marks : dict of int to dict
         Marks by the index of their obstacle.
     rest : dict
-        What others have written to the key, and notes whose obstacle has gone.
+        Entries that other programs have written to the key, and notes whose obstacle has gone.
     """
     marks: MarksByIndex = {}
     rest = {key: value for key, value in content.items() if key not in _OWN_KEYS}
@@ -287,7 +287,7 @@ def _is_entry(entry: object, mark_names: tuple[str, ...]) -> bool:
 
 
 def _find_obstacle(entry: FreeKeys, names: Names) -> int | None:
-    """Return the index of the obstacle of an entry: by index and name, else by a name that is unique."""
+    """Return the index of the obstacle of an entry: by index and name, or by a name that is unique."""
     index = entry["obstacle"]
     name = entry.get("name")
     exists = 0 <= index < len(names)

@@ -1,6 +1,6 @@
 """Typed coordinates, lengths and angles: ``3.2 1.5``, ``+0.5 0``, ``120cm``, ``@2<45``.
 
-A comma between digits is a decimal comma, except beside a blank and among decimal points (``3.2,1.5``).
+A comma between digits is a decimal comma, except next to a blank and among decimal points (``3.2,1.5``).
 """
 
 import math
@@ -33,7 +33,7 @@ def parse_length(text: str, *, now: float | None = None) -> float:
     Parameters
     ----------
     text : str
-        What was typed.
+        The typed text.
     now : float, optional
         The present length, m, for relative ones: ``+0.5``, ``/2``, ``50%``.
 
@@ -65,7 +65,7 @@ def parse_point(text: str, *, last: Point | None = None) -> Point:
     Parameters
     ----------
     text : str
-        What was typed.
+        The typed text.
     last : Point, optional
         The previous point, m, for relative positions: ``@2<45``, ``+0.5 0``.
 
@@ -98,7 +98,7 @@ def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Po
     Parameters
     ----------
     text : str
-        What was typed: a position as in `parse_point`, a length towards the cursor, or ``<45`` for the
+        The typed text: a position as in `parse_point`, a length towards the cursor, or ``<45`` for the
         cursor's distance at an angle.
     last : Point or None
         The previous point of the line, m.

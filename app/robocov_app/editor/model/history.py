@@ -161,5 +161,5 @@ class History:
 
     @property
     def has_unsaved_changes(self) -> bool:
-        """Whether something would be lost; false again after undoing back to the saved state."""
+        """Whether changes would be lost; false again after undoing back to the saved state."""
         return self.saved is not self.sketch and self.saved != self.sketch

@@ -232,7 +232,7 @@ class MeasurementWire(Wire):
 
 
 class SketchMeasurer:
-    """Measures sketches, of which it receives only the changes."""
+    """Measures sketches; it receives only their changes."""
 
     failure_message = "the map could not be measured"
 

@@ -70,7 +70,7 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
 
 
 def build_sketch(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
-    """Build a sketch from a parsed document, whatever rules of maps it breaks.
+    """Build a sketch from a parsed document, which may break the rules of maps.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class _Reader:
         return tuple([self.read_ring(ring, (*path, k)) for k, ring in enumerate(rings)])
 
     def read_repeat(self, value: Any, path: JsonPath) -> env.Repeat:
-        """Return the way in which a moving obstacle repeats its path."""
+        """Return the mode in which a moving obstacle repeats its path."""
         if value not in env.REPEATS:
             self.fail(path, f"expected one of {', '.join(env.REPEATS)}, got {quote_json(value)}")
         return value  # type: ignore[no-any-return]

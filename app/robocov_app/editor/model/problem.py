@@ -36,7 +36,7 @@ class Problem:
     Attributes
     ----------
     message : str
-        A sentence for people. Checks of single objects leave out the name at its start: their messages begin
+        A sentence for the user. Checks of single objects leave out the name: their messages begin
         with a colon or a blank.
     geometry : shapely.Geometry or None
         Where it is on the map, m; None where it is nowhere.

@@ -147,7 +147,7 @@ class Change:
     selection : Selection
         The selection after the edit.
     description : str
-        What has happened, for the history: "3 obstacles moved".
+        Description for the history: "3 obstacles moved".
     """
 
     sketch: Sketch

@@ -1,4 +1,4 @@
-"""Checks of names and shapes by the rules of map files, with messages for people."""
+"""Checks of names and shapes by the rules of map files, with messages for the user."""
 
 import re
 from collections.abc import Callable, Iterator

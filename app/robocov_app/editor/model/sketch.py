@@ -1,4 +1,4 @@
-"""A map that is being edited, valid or not. It is immutable; edits share what they do not change."""
+"""A map that is being edited, valid or not. It is immutable; edits share unchanged objects."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from robocov_app.editor.model.geometry import Box, to_array
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
 _LINES = {env.WallObstacle: "points", env.PointsStart: "positions"}
 _SHARED = ("name", "description", "schema", "density")  # fields that sketches have as environments do
-BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
+BOUNDARY: Final = -1  # of the boundary, where obstacles have their keys
 Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start
 
 
@@ -73,7 +73,7 @@ class Sketch:
     Attributes
     ----------
     name, description : str
-        Texts for people.
+        Texts for the user.
     boundary : Ring or None
         The boundary, m; None while there is none.
     obstacles : tuple of Item
@@ -156,7 +156,7 @@ class Sketch:
         return BOUNDARY, *self.index_by_key, *dict(self.starts)
 
     def display_name(self, owner: Owner) -> str:
-        """Return the name of an object for people: "polygon “desk”", "start “corner”", "boundary"."""
+        """Return the name of an object for the user: "polygon “desk”", "start “corner”", "boundary"."""
         if isinstance(owner, str):
             return to_one_line(f"start “{owner}”")
         shape = None if owner == BOUNDARY else self.get_item(owner).shape

@@ -57,7 +57,7 @@ class DensityTool(EditorTool):
         return self.pressed is not None or self.chosen is not None
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Choose what is under the pointer."""
+        """Choose the feature under the pointer."""
         super().press(context, event)
         self._hit = _find_feature(density.list_features(context.sketch), event)
         if self._hit.feature is not None and self._hit.corner is None:
@@ -69,7 +69,7 @@ class DensityTool(EditorTool):
             self.change = self._build_change(context, self.pressed.point, event.point)
 
     def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """Apply what was dragged; a click chooses a feature."""
+        """Apply the drag; a click chooses a feature."""
         pressed = self.pressed
         change = self.change
         self.pressed = None
@@ -84,7 +84,7 @@ class DensityTool(EditorTool):
             return
         self.chosen = self._hit.feature if self._hit.corner is None else None
         if self.chosen is not None:
-            context.show_message("type what it weighs, then Enter; Backspace takes it away")
+            context.show_message("type its weight, then Enter; Backspace removes it")
 
     def finish(self, context: EditorContext) -> None:
         """Choose nothing."""
@@ -100,7 +100,7 @@ class DensityTool(EditorTool):
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop what is dragged, and choose nothing."""
+        """Drop the drag, and choose nothing."""
         was_busy = super().cancel(context)
         self.chosen = None
         return was_busy
@@ -170,7 +170,7 @@ class DensityTool(EditorTool):
 
 
 def _find_feature(features: tuple[density.Feature, ...], event: EditorPointerEvent) -> _Hit:
-    """Return what is under the pointer: centers before rims and corners, then the inside of areas."""
+    """Return the feature under the pointer: centers before rims and corners, then the inside of areas."""
     centers = [(distance(_find_center(feature), event.raw), k) for k, feature in enumerate(features)]
     if centers and min(centers)[0] < event.reach:
         return _Hit(min(centers)[1])

@@ -33,7 +33,7 @@ class Drag:
     context : EditorContext
         The editor.
     selection : Selection
-        What is dragged.
+        Objects and vertices that are dragged.
     start : Point
         Position at which the drag started, m.
 
@@ -73,7 +73,7 @@ class Drag:
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def build_draw_state(self) -> EditorDrawState:
-        """Return what the drag shows on the sheet."""
+        """Return the marks of the drag on the sheet."""
         return EditorDrawState(label=self.label, carried=self.carried, shows_handles=True)
 
     def end(self) -> None:
@@ -82,7 +82,7 @@ class Drag:
             self.context.apply(self.change)
 
     def _snap(self, event: EditorPointerEvent, position: Point, origin: Point | None = None) -> Point:
-        """Snap a position to anything but what is dragged, unless Ctrl is held down."""
+        """Snap a position to anything that is not dragged, unless Ctrl is held down."""
         snap = Snap(position)
         if not event.ctrl:
             dragged = self.selection.vertices or self.selection.owners
@@ -310,7 +310,7 @@ def _limit_factor(factor: float, length: float) -> float:
 
 
 class BoxDrag(Drag):
-    """Selects what lies in a box; drawn to the left, also what the box touches."""
+    """Selects the objects in a box; drawn to the left, also those that the box touches."""
 
     def __init__(self, context: EditorContext, start: Point, *, adds: bool) -> None:
         super().__init__(context, Selection(), start)
@@ -326,7 +326,7 @@ class BoxDrag(Drag):
         self._end = event.raw
 
     def find_selection(self) -> Selection:
-        """Return what is in the box: objects, or vertices if it contains some of those shown."""
+        """Return the selection in the box: objects, or vertices if it contains some of those shown."""
         sketch = self.context.sketch
         owners = self.context.vertex_owners
         inside = find_in_box(sketch, self._start, self._end, touched=self._selects_touched)
@@ -340,7 +340,7 @@ class BoxDrag(Drag):
         return inside
 
     def end(self) -> None:
-        """Select what is in the box."""
+        """Select the objects or vertices in the box."""
         if self._start != self._end:
             self.context.select(self._previous.union(self.find_selection()))
 

@@ -46,11 +46,11 @@ class DrawTool(EditorTool):
         self.outline = DrawnOutline(self.min_points, self.max_points, self.closes, self.drags)
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
-        """Return the change that adds what was drawn with these points, m."""
+        """Return the change that adds the object with these points, m."""
         raise NotImplementedError
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
-        """Return what is shown while drawing; the last of the points, m, is the cursor."""
+        """Return the unfinished drawing; the last of the points, m, is the cursor."""
         is_closed = self.closes and len(points) > 2
         label = format_bearing(points[-2], points[-1])
         if is_closed:
@@ -141,7 +141,7 @@ class DrawTool(EditorTool):
         self.outline.is_dragging = False
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return what is shown while drawing."""
+        """Return the unfinished drawing."""
         if not self.points:
             return EditorDrawState()
         return self.build_preview(context, (*self.points, self.outline.cursor))

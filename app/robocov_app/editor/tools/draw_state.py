@@ -1,4 +1,4 @@
-"""What the tools of the editor show on the sheet; all lengths in meters."""
+"""Draw states of the editor's tools: their marks on the sheet; all lengths in meters."""
 
 from dataclasses import dataclass
 
@@ -46,13 +46,13 @@ class EditorDrawState(DrawState):
     box : tuple of Point or None
         Opposite corners of a selection box, m.
     box_selects_touched : bool
-        Whether the box selects what it touches, not only what lies inside.
+        Whether the box selects objects that it touches, not only those inside.
     rings : tuple of Ring
         Outlines, m.
     dots : tuple of Point
         Marks, m.
     chosen : int or None
-        Index of the ring or dot that stands out.
+        Index of the ring or dot that is highlighted.
     pending : Sketch or None
         The map with a density or paths that are being changed.
     background : Background or None

@@ -28,7 +28,7 @@ class Handle:
     Attributes
     ----------
     kind : {"vertex", "scale", "turn"}
-        What dragging it does.
+        Effect of dragging it.
     at : Point
         Its position, m.
     vertex : Vertex or None

@@ -142,7 +142,7 @@ class MotionPathTool(EditorTool):
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop what is dragged."""
+        """Drop the drag."""
         was_dragging = self._dragged is not None
         self._subject = _Subject()
         self._dragged = None

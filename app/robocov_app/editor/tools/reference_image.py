@@ -27,7 +27,7 @@ class ReferenceImageTool(EditorTool):
     name = "picture"
     title = "Picture"
     key = "i"
-    hint = "click two points; type how far apart they are, or Enter to make their line level; drag moves it"
+    hint = "click two points; type their distance, or Enter to make their line level; drag moves it"
     snaps = False
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class ReferenceImageTool(EditorTool):
         context.apply(set_background(context.sketch, background))
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop what is dragged, and the points."""
+        """Drop the drag, and the points."""
         self.moved = None
         return super().cancel(context)
 
@@ -102,5 +102,5 @@ class ReferenceImageTool(EditorTool):
         line = (*self.clicked, self.cursor)[:2]
         label = f"now {format_length(distance(*line))}"
         if len(self.clicked) == 2:
-            label += "; type how far apart they are, or Enter makes them level"
+            label += "; type their distance, or Enter makes them level"
         return EditorDrawState(background=self.moved, line=line, label=label)

@@ -61,7 +61,7 @@ class SelectTool(EditorTool):
         return self.drag is not None
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Select what is under the pointer."""
+        """Select the handle's vertex or the object under the pointer."""
         self.pressed = event
         self.drag = None
         self._narrows = False
@@ -96,7 +96,7 @@ class SelectTool(EditorTool):
             self._narrows = True
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Find what is under the pointer, or drag."""
+        """Find the handle or object under the pointer, or drag."""
         if self.pressed is None:
             self.near = self._find_handle(context, event)
             self.hovered = None
@@ -171,7 +171,7 @@ class SelectTool(EditorTool):
         drag.end()
 
     def cancel(self, context: EditorContext) -> bool:
-        """Drop a drag, else select owners instead of vertices, else select nothing."""
+        """Drop a drag; without one select owners instead of vertices, or nothing."""
         had_something = bool(self.drag or context.selection)
         if self.drag is not None:
             self._stop()
@@ -186,7 +186,7 @@ class SelectTool(EditorTool):
         self.guides = ()
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return what is dragged, or what is under the cursor."""
+        """Return the state of the drag, or the handle and object under the cursor."""
         if self.drag is not None:
             return replace(self.drag.build_draw_state(), near=self.near)
         return EditorDrawState(hovered=self.hovered, near=self.near, shows_handles=True, labels_cursor=False)

@@ -93,7 +93,7 @@ class SnapTargets:
         self._trees = {
             kind: (cKDTree(points), points) for kind, points in points_by_kind.items() if len(points)
         }
-        # Walls and circles are found by the outlines that people see, too.
+        # Walls and circles are found by their visible outlines, too.
         outline_starts, outline_ends = _list_outline_edges([*collector.walls, *collector.circles])
         self.starts = np.concatenate([starts, outline_starts])
         self.ends = np.concatenate([ends, outline_ends])

@@ -41,7 +41,7 @@ class SnapMode(NamedTuple):
     title : str
         Its label.
     kinds : frozenset of str
-        Kinds of `SnapSettings.kinds` that it stands for.
+        Kinds of `SnapSettings.kinds` that it switches.
     """
 
     title: str
@@ -123,9 +123,9 @@ def snap_point(
     point : Point
         Position of the pointer, m.
     targets : SnapTargets
-        What it can snap to.
+        Points and edges to which it can snap.
     settings : SnapSettings
-        What is switched on.
+        Reach, grid, and kinds of snaps that are on.
     origin : Point, optional
         Point from which angles count, m.
 
@@ -149,9 +149,9 @@ def snap_move(
     dx, dy : float
         Displacement, m.
     targets : SnapTargets
-        What they can snap to.
+        Points and edges to which they can snap.
     settings : SnapSettings
-        What is switched on.
+        Reach, grid, and kinds of snaps that are on.
 
     Returns
     -------
@@ -206,7 +206,7 @@ class _SnapLine:
     length: float = math.inf
 
     def project(self, point: Point) -> float:
-        """Return how far along the line the foot of a point is, m."""
+        """Return the distance from the origin to the foot of a point along the line, m."""
         dx = point[0] - self.origin[0]
         dy = point[1] - self.origin[1]
         return dx * self.direction[0] + dy * self.direction[1]

@@ -57,7 +57,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is half done."""
+        """Whether an action is half done."""
         return self.pressed is not None or bool(self.clicked)
 
     @property
@@ -87,7 +87,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         """Handle the release of the button; `clicked` if the pointer has not moved since the press."""
 
     def finish(self, context: EditorContext) -> None:
-        """Complete what is half done: Enter, or a right click."""
+        """Complete the action: Enter, or a right click."""
 
     def remove_last(self, context: EditorContext) -> bool:
         """Remove the last point, as Backspace does; return whether there was one."""
@@ -97,7 +97,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         return True
 
     def cancel(self, context: EditorContext) -> bool:
-        """Give up what is half done; return whether there was anything."""
+        """Give up the action; return whether there was one."""
         was_busy = self.is_busy
         self.pressed = None
         self.change = None
@@ -109,5 +109,5 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
-        """Return what the tool shows on the sheet."""
+        """Return the marks of the tool on the sheet."""
         return EditorDrawState()

@@ -54,7 +54,7 @@ def show_motion(editor: Editor) -> str:
 
 
 def remove_last(editor: Editor) -> None:
-    """Remove the last point of what is drawn, or delete the selection."""
+    """Remove the last point of a drawing, or delete the selection."""
     has_removed = editor.tool.remove_last(editor)
     if not has_removed and not editor.tool.is_busy and editor.selection:
         delete(editor)
@@ -106,7 +106,7 @@ def level(editor: Editor) -> None:
 def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
     """Move the selection by grid steps in a direction."""
     selection = require(
-        editor.selection, "nothing is selected: arrows move what is; Ctrl and arrows move the sheet"
+        editor.selection, "nothing is selected: arrows move the selection; Ctrl and arrows move the sheet"
     )
     length = steps * editor.grid
     change = move(editor, x * length, y * length, prefer_vertices(selection))
@@ -120,7 +120,7 @@ def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
 
 
 def cancel(editor: Editor) -> None:
-    """Drop the typed value, what the tool does, or the tool."""
+    """Drop the typed value; without one cancel the tool's action, or choose the selection tool."""
     if editor.typed:
         editor.typed = ""
         return

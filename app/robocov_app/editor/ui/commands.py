@@ -230,7 +230,7 @@ def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("Combine", editor)
     group.add_edit("unite", "Unite", boolean.unite, "alt+u")
     group.add_edit("subtract", "Subtract the upper ones", boolean.subtract, "alt+s")
-    group.add_edit("intersect", "Keep what they have in common", boolean.intersect, "alt+i")
+    group.add_edit("intersect", "Keep their common area", boolean.intersect, "alt+i")
     group.add_edit("divide", "Cut along each other", boolean.divide, "alt+d")
     group.add("clip", "Cut off outside the boundary", clip, "alt+b")
     group.add_edit("join", "Join walls end to end", vertices.join_walls, "alt+j")

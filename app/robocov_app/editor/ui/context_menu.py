@@ -1,4 +1,4 @@
-"""The commands of the context menu, by what is selected."""
+"""The commands of the context menu, by the kind of the selection."""
 
 from robocov.environment import PolygonObstacle, WallObstacle
 from robocov_app.editor.editor import Editor

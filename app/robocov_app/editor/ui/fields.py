@@ -1,4 +1,4 @@
-"""Fields of the panel: what each shows, and how it takes what was typed."""
+"""Fields of the panel: the value that each shows, and how it applies a typed value."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ class Field:
     read : callable
         Returns the text for an editor; raises MapError or LookupError if there is no value.
     write : callable
-        Gets the editor and what was typed; raises MapError if that means nothing.
+        Gets the editor and the typed text; raises MapError if that means nothing.
     tip : str
         Tool tip.
     """
@@ -200,16 +200,16 @@ def _build_length_field(attribute: str, word: str, tip: str) -> Field:
 
 
 FIELDS: dict[str, Field] = {
-    "title": Field(_read_title, _write_title, "The map's name, for people"),
+    "title": Field(_read_title, _write_title, "The map's name"),
     "description": Field(_read_description, _write_description, "A sentence about the map"),
-    "radius": _build_setting_field("radius", "Radius of a robot: what is too narrow for it is hatched"),
+    "radius": _build_setting_field("radius", "Radius of a robot: passages too narrow for it are hatched"),
     "robots": _build_setting_field(
         "robots", "Robots of the team that is shown at a start, and tried with F5"
     ),
     "grid": _build_setting_field("grid", "Distance of the grid's lines; arrows move by it"),
     "angle": _build_setting_field("angle", "Lines snap to multiples of this"),
-    "name": Field(_read_name, actions.rename, "What people call it"),
-    "note": Field(_read_note, TYPED_COMMANDS["note"].action, "Whatever is worth remembering of it"),
+    "name": Field(_read_name, actions.rename, "Its name"),
+    "note": Field(_read_note, TYPED_COMMANDS["note"].action, "A note on it"),
     "x": Field(_read_x, _write_x, "From the left; +0.5 moves by half a meter"),
     "y": Field(_read_y, _write_y, "From below; +0.5 moves by half a meter"),
     "wide": Field(_read_width, _write_width, "Also *2, 50% or +0.3"),

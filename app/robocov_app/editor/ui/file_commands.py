@@ -31,7 +31,7 @@ Action: TypeAlias = Callable[[], object]
 IMPORT_PATIENCE_S = 2.0  # after which an import whose settings have changed is abandoned
 MIN_BACKGROUND_WIDTH_M = 1.0
 MAX_PARENT_FOLDERS = 1  # in the path of a picture relative to its map
-HEADER_BYTES = 4096  # of a file, in which the format of a map stands
+HEADER_BYTES = 4096  # of a file, which name the format of a map
 OPEN_SUFFIXES = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 _CANCEL = ("Cancel", "c", lambda: None)
@@ -198,7 +198,7 @@ class FileCommands:
 
     def remember(self, path: Path) -> None:
         """Put a path at the top of the recent maps."""
-        # Links are not resolved, so that people recognize the path.
+        # Links are not resolved, so that the user recognizes the path.
         name = os.path.abspath(path)  # noqa: PTH100
         others = [recent for recent in self.editor.recent if recent != name]
         self.editor.recent = [name, *others][:MAX_RECENT]
@@ -330,7 +330,7 @@ def set_reference_image(editor: Editor, path: Path) -> None:
 
 
 def _describe_picture_path(path: Path, map_path: Path | None) -> str:
-    """Return the path of a picture as in a map: relative to the map if it is near, else absolute."""
+    """Return the path of a picture as in a map: relative to the map if it is near, otherwise absolute."""
     path = path.resolve()
     if map_path is not None:
         try:
@@ -376,7 +376,7 @@ def open_or_detect(path: Path, drafts: Path | None) -> Document | Importer:
     try:
         return detect_format(path)
     except MapError:
-        # The error of a foreign file says what it is; that of a broken map, what is wrong with it.
+        # The error of a foreign file names its format; that of a broken map names the mistake.
         if has_map_suffix or _is_map(path):
             raise map_error from None
         raise

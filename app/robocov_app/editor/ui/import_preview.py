@@ -165,7 +165,7 @@ def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) ->
 def _draw_comparison(
     size: tuple[int, int], comparison: ImportComparison, cameras: list[Camera], scale: float, theme: Theme
 ) -> Surface:
-    """Draw the free space before and after on a transparent picture of a size, px, with what has changed."""
+    """Draw the free space before and after on a transparent picture of a size, px, with the differences."""
     picture = Surface(size, pygame.SRCALPHA)
     before, after = cameras
     _draw_map(picture, before, comparison, comparison.before, theme)

@@ -1,9 +1,10 @@
 """Options of an import, and the job that imports in another process."""
 
+import ast
 import inspect
-import re
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
 
@@ -29,7 +30,6 @@ ImportRequest: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
 
 ON = "yes"  # value of a switch that is on
 OFF = "no"
-_DOCUMENTED_FIELD = re.compile(r'^    (\w+): [^\n]*\n    """(.*?)"""', re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ImportOption:
     default : str
         Text that is shown where nothing was typed.
     help : str
-        What it does.
+        Its effect.
     """
 
     name: str
@@ -90,10 +90,23 @@ def list_options(importer: Importer) -> tuple[ImportOption, ...]:
 
 def _list_fields(settings: ImportSettings) -> Iterator[ImportOption]:
     hints = get_type_hints(settings)
-    docstrings = dict(_DOCUMENTED_FIELD.findall(inspect.getsource(settings)))
+    docstrings = _read_field_docstrings(settings)
     for field in fields(settings):
         text = " ".join(docstrings.get(field.name, "").split())
         yield _build_option(field, hints[field.name], text)
+
+
+def _read_field_docstrings(settings: ImportSettings) -> dict[str, str]:
+    """Return the texts below the fields of a dataclass in its source, by the names of the fields."""
+    texts: dict[str, str] = {}
+    (definition,) = ast.parse(inspect.getsource(settings)).body
+    assert isinstance(definition, ast.ClassDef)
+    for statement, following in pairwise(definition.body):
+        if not isinstance(statement, ast.AnnAssign) or not isinstance(statement.target, ast.Name):
+            continue
+        if isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
+            texts[statement.target.id] = str(following.value.value)
+    return texts
 
 
 def _build_option(field: Field[Any], hint: Any, help_text: str) -> ImportOption:
@@ -131,7 +144,7 @@ class Imported:
     environment : Environment
         The map.
     report : ImportReport
-        What was read, changed and left out.
+        Objects that were read, changed and left out.
     comparison : ImportComparison
         The free space before and after.
     sheet : ColorSheet or None

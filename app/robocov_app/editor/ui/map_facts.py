@@ -19,7 +19,7 @@ class Fact(NamedTuple):
     Attributes
     ----------
     label : str
-        What it is about.
+        Its name.
     text : str
         The fact; "…" while the map is being measured.
     tip : str

@@ -40,7 +40,7 @@ MAX_PROBLEMS = 200  # that are listed
 MAX_PROBLEM_COUNT = 99  # in the title of their page
 NOTHING_SELECTED = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
-    "Tab goes on to the next; Ctrl A takes all."
+    "Tab selects the next; Ctrl A selects all."
 )
 
 
@@ -159,7 +159,7 @@ OBJECT_BUTTONS: dict[str, tuple[tuple[PanelButton, ...], ...]] = {
         ),
     ),
 }
-"""Rows of buttons of the page "object", by what is selected."""
+"""Rows of buttons of the page "object", by the kind of the selection."""
 
 _NAMED_KINDS = ("polygon", "circle", "wall", "disc", "start")
 _NOTED_KINDS = ("polygon", "circle", "wall", "several")
@@ -443,7 +443,7 @@ class EditorPanel(CommandPanel):
                     self._select(Selection(vertices=frozenset({vertex})), previous)
 
     def _select(self, clicked: Selection, previous: Selection) -> None:
-        """Select what was clicked; with Shift, add it to the previous selection or remove it."""
+        """Select the clicked object; with Shift, add it to the previous selection or remove it."""
         has_shift = pygame.key.get_mods() & pygame.KMOD_SHIFT
         self.editor.select(previous.toggle(clicked) if has_shift else clicked)
 

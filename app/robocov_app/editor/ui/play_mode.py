@@ -1,4 +1,4 @@
-"""The viewer on the map that is being edited, in the same window; and the way back."""
+"""The viewer on the map that is being edited, in the same window, and the return to the editor."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -69,7 +69,7 @@ class PlayPresenter(Presenter):
 
 
 class TrialDrafts:
-    """Keeps drafts of a map with what is changed in the viewer, about once a second.
+    """Keeps drafts of a map with the changes made in the viewer, about once a second.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class PlayWindow(ViewerWindow):
             super().handle_event(event)
 
     def keep_draft(self, *, at_once: bool = False) -> None:
-        """Keep a draft of the map with what is changed here, unless another map was opened."""
+        """Keep a draft of the map with the changes made here, unless another map was opened."""
         if not self.viewer.files.has_left_tried_map:
             self.drafts.update(self.viewer.session.displayed.environment, at_once=at_once)
 
@@ -170,7 +170,7 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
     scale : float
         Size of texts and widgets.
     patient : bool
-        Whether to wait for everything that is computed beside the window.
+        Whether to wait for everything that is computed in the background.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
 
 
 def build_trial_change(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
-    """Return what was drawn, moved and deleted in the viewer as one change.
+    """Return the obstacles drawn, moved and deleted in the viewer as one change.
 
     Parameters
     ----------
@@ -231,5 +231,5 @@ def build_trial_change(sketch: Sketch, before: Environment, after: Environment) 
             items.append(Item(key, shape))
             key += 1
     new = frozenset(item.key for item in items if item.key not in sketch.index_by_key)
-    description = "what was changed while trying it, taken over"
+    description = "changes made while trying it"
     return Change(replace(sketch, obstacles=tuple(items)), Selection(items=new), description)

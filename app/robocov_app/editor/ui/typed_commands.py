@@ -223,10 +223,10 @@ _ROWS = (
     TypedCommand("robots", "8: of the team", _set_robots),
     TypedCommand("seed", "3: of the team's places", _set_seed),
     TypedCommand("wall", "0.1: width of walls that are drawn", _set_wall_width),
-    TypedCommand("move", "1 0.5: what is selected", _move),
+    TypedCommand("move", "1 0.5: the selection", _move),
     TypedCommand("place", "2 3: lower left corner", _place),
     TypedCommand("rotate", "30: by degrees", _rotate),
-    TypedCommand("scale", "150%: what is selected", _scale),
+    TypedCommand("scale", "150%: the selection", _scale),
     TypedCommand("size", "3 x 2: width and height", _resize),
     TypedCommand("width", "0.2: of walls", _set_width),
     TypedCommand("circle", "0.5: radius of circles", _set_circle_radius),
@@ -239,8 +239,8 @@ _ROWS = (
     TypedCommand("speed", "0.5: along a path, m/s", _set_speed),
     TypedCommand("offset", "0.2: grow, or shrink with -", _offset),
     TypedCommand("array", "3 x 2 1.5 1.5: columns, rows, distances", _copy_to_grid),
-    TypedCommand("name", "pillar: of what is selected", actions.rename),
-    TypedCommand("note", "words: on what is selected", _set_note),
+    TypedCommand("name", "pillar: of the selection", actions.rename),
+    TypedCommand("note", "words: on the selection", _set_note),
     TypedCommand("title", "Hall: of the map", _set_title),
 )
 TYPED_COMMANDS = {row.word: row for row in _ROWS}

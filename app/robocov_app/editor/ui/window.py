@@ -48,7 +48,7 @@ class EditorWindow(CommandWindow):
     drafts : Path or None
         Folder of drafts; None to keep none.
     patient : bool
-        Whether to wait for everything that is computed beside the window.
+        Whether to wait for everything that is computed in the background.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class EditorWindow(CommandWindow):
             try:
                 editor.tool.cancel(editor)
             except Exception:
-                # Choosing the tool again makes it forget what it was doing.
+                # Choosing the tool again makes it forget its action.
                 editor.toolbox.current = editor.toolbox.selector
                 raise
             finally:
@@ -140,7 +140,7 @@ class EditorWindow(CommandWindow):
         self.canvas.fit()
 
     def close(self) -> None:
-        """End the trial, and everything that is computed beside the window."""
+        """End the trial, and everything that is computed in the background."""
         if self.trial is not None:
             self.trial.keep_draft(at_once=True)
             self.trial.close()
@@ -281,7 +281,7 @@ class EditorWindow(CommandWindow):
         self.panel.ui.set_focus("name" if has_object else "title")
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
-        """Open the context menu, and select what is under a pixel unless it is selected."""
+        """Open the context menu, and select the object under a pixel unless it is selected."""
         editor = self.editor
         if self.canvas.contains(pixel) and not editor.selection.vertices:
             reach = 0.5 * REACH_PX * editor.pixel
@@ -294,7 +294,7 @@ class EditorWindow(CommandWindow):
     def try_it(self) -> None:
         """Open the viewer on the map in this window."""
         if self.editor.toolbox.selector.is_busy:
-            # A drag ends, but what is half drawn stays.
+            # A drag ends, but an unfinished drawing stays.
             self.editor.toolbox.selector.cancel(self.editor)
         trial = start_trial(self.editor, self.screen, self.scale, patient=self._patient)
         trial.windowed_size = self.windowed_size
@@ -313,7 +313,7 @@ class EditorWindow(CommandWindow):
             trial.keep_draft()
 
     def _end_trial(self, trial: PlayWindow) -> None:
-        """Return to the editor with what was changed in the viewer."""
+        """Return to the editor with the changes made in the viewer."""
         trial.close()
         trial.run_saver.finish()
         self.trial = None
