@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.benchmark import suite
-from robocov_app.figures.statistics import Interval, bootstrap, median_time
+from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time
 
 NO_VALUE = "–"
 
@@ -109,7 +109,7 @@ class Rating:
         if not rest_times:
             return fraction, None
         censored = [suite.TRACKS[self.track].duration] * (len(self.rows) - len(rest_times))
-        median = median_time(rest_times, censored)
+        median = estimate_median_time(rest_times, censored)
         return fraction, median if np.isfinite(median) else None
 
     def compute_rate(self, figure: str) -> float:

@@ -1,54 +1,90 @@
-"""Bootstrap intervals over runs, clustered by map.
+"""Estimates with intervals over runs, which are clustered by map.
 
-Runs on one map are alike: resampling them one by one would make the intervals too narrow. Where `clusters`
-are given, whole clusters are drawn (Field and Welsh, 2007); intervals are percentiles.
+Runs on one map are alike: if they were resampled one by one, intervals would be too narrow. Therefore whole
+clusters are resampled (Field and Welsh, 2007). The limits of intervals are percentiles.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from robocov.arrays import Array, IntArray
 
-LEVEL = 0.95  # of all intervals
-RESAMPLES = 4000  # bootstrap samples: the ends of a 95 % interval then vary by about a fortieth of its width
+CONFIDENCE_LEVEL = 0.95
+"""Of all intervals."""
+RESAMPLES = 4000
+"""Number of bootstrap samples. The limits of an interval then vary by about a fortieth of its width."""
 MIN_BOOTSTRAP_MAPS = 5
 """Number of maps from which a bootstrap has enough different resamples, 126, for a 95 % interval."""
-_AT_ONCE = 1_000_000  # values that are looked at together
+_MAX_BATCH_VALUES = 1_000_000
+"""Maximum number of values that are resampled at a time."""
 
 _Item = TypeVar("_Item")
 _Key = TypeVar("_Key")
+_BatchStatistic: TypeAlias = Callable[[IntArray], ArrayLike]
+"""Returns the values of a statistic, (r,), for samples given as row numbers, (r, m)."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate with its 95 % interval; `low` and `high` are nan where there is none."""
+    """An estimate with its 95 % interval.
+
+    Attributes
+    ----------
+    estimate : float
+    low, high : float
+        Limits of the interval; nan if there is none.
+    resampled_values : (r,) array or None
+        Values of the statistic in the resamples of a bootstrap.
+    trials : int
+        Number of independent trials of a fraction; 0 for other estimates.
+    """
 
     estimate: float
     low: float
     high: float
-    resampled: Array | None = field(default=None, compare=False, repr=False)  # its values in the resamples
-    counted: int = field(default=0, compare=False, repr=False)  # clusters, of a share
+    resampled_values: Array | None = field(default=None, compare=False, repr=False)
+    trials: int = field(default=0, compare=False, repr=False)
 
-    def p_value(self, low: float, high: float) -> float:
-        """Return the p-value of the truth lying outside `low` to `high`; 1 where there is no interval.
+    def compute_p_value(self, low: float, high: float) -> float:
+        """Compute the p-value of the hypothesis that the true value is outside some bounds.
 
-        It is the share of resamples outside; that of a share is binomial.
+        Parameters
+        ----------
+        low, high : float
+            The bounds; may be infinite.
+
+        Returns
+        -------
+        float
+            From a binomial test of a fraction, otherwise the fraction of resamples that are outside. 1 if
+            there is no interval.
         """
-        if self.counted:
-            from scipy.special import betainc
+        if self.trials:
+            return self._compute_binomial_p_value(low, high)
+        values = np.empty(0) if self.resampled_values is None else self.resampled_values
+        is_outside = ~((low <= values) & (values <= high))
+        return float(1 + np.count_nonzero(is_outside)) / (1 + values.size)
 
-            there = self.estimate * self.counted
-            below = betainc(there, self.counted - there + 1.0, low) if there and low > 0.0 else low > 0.0
-            beside = self.counted - there
-            above = betainc(beside, there + 1.0, 1.0 - high) if beside and high < 1.0 else high < 1.0
-            return float(max(below, above))
-        drawn = np.empty(0) if self.resampled is None else self.resampled
-        return float(1 + np.count_nonzero(~((low <= drawn) & (drawn <= high)))) / (1 + drawn.size)
+    def _compute_binomial_p_value(self, low: float, high: float) -> float:
+        """Return the larger p-value of the one-sided binomial tests against the bounds."""
+        from scipy.special import betainc
+
+        successes = self.estimate * self.trials
+        failures = self.trials - successes
+        if successes and low > 0.0:
+            p_below = float(betainc(successes, failures + 1.0, low))
+        else:
+            p_below = float(low > 0.0)
+        if failures and high < 1.0:
+            p_above = float(betainc(failures, successes + 1.0, 1.0 - high))
+        else:
+            p_above = float(high < 1.0)
+        return max(p_below, p_above)
 
 
 def bootstrap(
@@ -58,81 +94,191 @@ def bootstrap(
     *,
     resamples: int = RESAMPLES,
 ) -> Interval:
-    """Return the median or mean of (m,) finite values; those of one of m `clusters` are drawn together."""
+    """Estimate the median or the mean of values with a bootstrap interval.
+
+    Parameters
+    ----------
+    values : (m,) array_like
+        Finite values.
+    statistic : {"median", "mean"}
+    clusters : sequence of object, optional
+        Cluster of each value; by default each value is a cluster.
+    resamples : int
+
+    Returns
+    -------
+    Interval
+        Without limits if there are fewer than two clusters. The same values give the same interval.
+    """
     sample = np.asarray(values, dtype=float)
     labels = range(len(sample)) if clusters is None else clusters
-    of: Callable[..., Any] = np.median if statistic == "median" else np.mean
-    return _interval(lambda rows: of(sample[rows], axis=1), labels, resamples)
+    if statistic == "median":
+        return _bootstrap(lambda rows: np.median(sample[rows], axis=1), labels, resamples)
+    return _bootstrap(lambda rows: np.mean(sample[rows], axis=1), labels, resamples)
 
 
-def bootstrap_by(
+def bootstrap_statistic(
     statistic: Callable[[IntArray], float], clusters: Sequence[object], *, resamples: int = 1000
 ) -> Interval:
-    """Return any statistic of row numbers, some drawn several times, one label of `clusters` a row."""
-    return _interval(lambda drawn: [statistic(rows) for rows in drawn], clusters, resamples)
+    """Estimate any statistic of rows of data with a bootstrap interval.
+
+    Parameters
+    ----------
+    statistic : callable
+        Returns the value for row numbers, some of which may be repeated; nan if there is none.
+    clusters : sequence of object
+        Cluster of each row.
+    resamples : int
+
+    Returns
+    -------
+    Interval
+        Without limits if there are fewer than two clusters.
+    """
+    return _bootstrap(lambda samples: [statistic(rows) for rows in samples], clusters, resamples)
 
 
-def _interval(of: Callable[[IntArray], ArrayLike], clusters: Sequence[object], resamples: int) -> Interval:
-    """Return a statistic of (r, m) row numbers, one for each row, with its percentiles over resamples."""
-    rows: dict[object, list[int]] = {}
-    for row, label in enumerate(clusters):
-        rows.setdefault(label, []).append(row)
-    members = [np.array(own) for own in rows.values()]
-    estimate = float(np.asarray(of(np.arange(len(clusters))[None]))[0])
+def _bootstrap(statistic: _BatchStatistic, clusters: Sequence[object], resamples: int) -> Interval:
+    """Return the value of a statistic with its percentiles over resampled clusters."""
+    rows_by_cluster: dict[object, list[int]] = {}
+    for row, cluster in enumerate(clusters):
+        rows_by_cluster.setdefault(cluster, []).append(row)
+    members = [np.array(rows) for rows in rows_by_cluster.values()]
+    all_rows = np.arange(len(clusters))
+    estimate = float(np.asarray(statistic(all_rows[None]))[0])
     if len(members) < 2:
         return Interval(estimate, float("nan"), float("nan"))
-    drawn = np.random.default_rng(0).integers(0, len(members), (resamples, len(members)))
-    if len({len(own) for own in members}) == 1:
-        together = np.array(members)
-        parts = np.array_split(drawn, 1 + len(clusters) * resamples // _AT_ONCE)
-        several = [of(together[part].reshape(len(part), -1)) for part in parts]
+    values = _resample(statistic, members, resamples)
+    # Some resamples may have no value. The percentiles are those of the others.
+    low, high = _compute_limits(values[~np.isnan(values)])
+    return Interval(estimate, low, high, values)
+
+
+def _resample(statistic: _BatchStatistic, members: Sequence[IntArray], resamples: int) -> Array:
+    """Return the values of a statistic for samples of whole clusters, (resamples,).
+
+    Parameters
+    ----------
+    statistic : callable
+    members : sequence of int array
+        Row numbers of each cluster.
+    resamples : int
+    """
+    count = len(members)
+    choices = np.random.default_rng(0).integers(0, count, (resamples, count))
+    sizes = {len(rows) for rows in members}
+    if len(sizes) == 1:
+        table = np.array(members)
+        batches = np.array_split(choices, 1 + table.size * resamples // _MAX_BATCH_VALUES)
+        values = [statistic(table[batch].reshape(len(batch), -1)) for batch in batches]
     else:
-        several = [of(np.concatenate([members[k] for k in each])[None]) for each in drawn]
-    found = np.concatenate([np.asarray(each) for each in several])
-    # a resample may have no value of the statistic: its percentiles are those of the others
-    known, tail = found[~np.isnan(found)], (1.0 - LEVEL) / 2.0
-    how: Any = "linear" if np.isfinite(known).all() else "inverted_cdf"  # between a number and inf is nothing
-    low, high = np.quantile(known, [tail, 1.0 - tail], method=how).tolist() if len(known) else (np.nan,) * 2
-    return Interval(estimate, low, high, found)
+        samples = [np.concatenate([members[cluster] for cluster in choice]) for choice in choices]
+        values = [statistic(rows[None]) for rows in samples]
+    return np.concatenate([np.asarray(batch_values) for batch_values in values])
 
 
-def share(there: ArrayLike, clusters: Sequence[object]) -> Interval:
-    """Return the mean of (m,) values from 0 to 1, such as how often something is so.
+def _compute_limits(values: Array) -> tuple[float, float]:
+    """Return the percentiles of values that are the limits of an interval; nan if there are no values."""
+    if not len(values):
+        return np.nan, np.nan
+    tail = (1.0 - CONFIDENCE_LEVEL) / 2.0
+    # One cannot interpolate between a number and infinity.
+    method: Literal["linear", "inverted_cdf"] = "linear" if np.isfinite(values).all() else "inverted_cdf"
+    low, high = np.quantile(values, [tail, 1.0 - tail], method=method).tolist()
+    return low, high
 
-    The interval is that of Clopper and Pearson (1934) for as many trials as there are clusters, since runs of
-    one may be alike: exact, and one-sided where all are 0 or all are 1. None of 33 maps is at most 8.7 %.
+
+def estimate_fraction(values: ArrayLike, clusters: Sequence[object]) -> Interval:
+    """Estimate a fraction, such as that of the runs in which an event happens.
+
+    Parameters
+    ----------
+    values : (m,) array_like
+        From 0 to 1.
+    clusters : sequence of object
+        Cluster of each value.
+
+    Returns
+    -------
+    Interval
+        The mean with the exact interval of Clopper and Pearson (1934), for as many trials as there are
+        clusters, since runs of one cluster may be alike. It is one-sided if the fraction is 0 or 1: if none
+        of 33 maps has an event, the fraction is at most 8.7 %.
     """
     from scipy.special import betaincinv
 
-    estimate, several = float(np.asarray(there, dtype=float).mean()), len(set(clusters))
-    count, beside = estimate * several, (1.0 - estimate) * several
-    tail = (1.0 - LEVEL) / (2.0 if count and beside else 1.0)
-    low = float(betaincinv(count, beside + 1.0, tail)) if count else 0.0
-    high = float(betaincinv(count + 1.0, beside, 1.0 - tail)) if beside else 1.0
-    return Interval(estimate, low, high, counted=several)
+    estimate = float(np.asarray(values, dtype=float).mean())
+    trials = len(set(clusters))
+    successes = estimate * trials
+    failures = (1.0 - estimate) * trials
+    sides = 2.0 if successes and failures else 1.0
+    tail = (1.0 - CONFIDENCE_LEVEL) / sides
+    low, high = 0.0, 1.0
+    if successes:
+        low = float(betaincinv(successes, failures + 1.0, tail))
+    if failures:
+        high = float(betaincinv(successes + 1.0, failures, 1.0 - tail))
+    return Interval(estimate, low, high, trials=trials)
 
 
-def holm(p_values: Mapping[str, float]) -> dict[str, float]:
-    """Return p-values by name, adjusted for their number by Holm (1979), from the lowest on."""
-    ranked = sorted(p_values, key=p_values.__getitem__)
-    raised = (p_values[name] * (len(ranked) - k) for k, name in enumerate(ranked))
-    return {name: min(p, 1.0) for name, p in zip(ranked, accumulate(raised, max), strict=True)}
+def adjust_p_values(p_values: Mapping[str, float]) -> dict[str, float]:
+    """Adjust p-values for their number by the method of Holm (1979).
+
+    Parameters
+    ----------
+    p_values : mapping of str to float
+
+    Returns
+    -------
+    dict of str to float
+        Sorted by the p-value.
+
+    Examples
+    --------
+    >>> adjust_p_values({"a": 0.04, "b": 0.01})
+    {'b': 0.02, 'a': 0.04}
+    """
+    names = sorted(p_values, key=p_values.__getitem__)
+    products = [p_values[name] * (len(names) - rank) for rank, name in enumerate(names)]
+    return {name: min(p, 1.0) for name, p in zip(names, accumulate(products, max), strict=True)}
 
 
-def median_time(ended: Sequence[float] | Array, censored: Sequence[float] | Array) -> float:
-    """Return the median by Kaplan and Meier (1958) of times to an event; inf where most have not ended.
+def estimate_median_time(ended: Sequence[float] | Array, censored: Sequence[float] | Array) -> float:
+    """Compute the median time to an event by the estimator of Kaplan and Meier (1958).
 
-    Times are in s, of what has `ended` and of what was `censored`: looked at for so long in vain.
+    Parameters
+    ----------
+    ended : sequence of float, s
+        Times of the events.
+    censored : sequence of float, s
+        Times until which there was no event.
+
+    Returns
+    -------
+    float, s
+        Infinite if most runs have no event.
     """
     from scipy.stats import CensoredData, ecdf
 
-    curve = ecdf(CensoredData(uncensored=ended, right=censored)).sf
-    below = np.flatnonzero(curve.probabilities <= 0.5)
-    return float(curve.quantiles[below[0]]) if len(below) else np.inf
+    survival = ecdf(CensoredData(uncensored=ended, right=censored)).sf
+    below_half = np.flatnonzero(survival.probabilities <= 0.5)
+    if not len(below_half):
+        return np.inf
+    return float(survival.quantiles[below_half[0]])
 
 
-def mean_with_t_interval(values: ArrayLike) -> Interval:
-    """Return the mean of (m,) values with Student's t interval; equal values say no more than one."""
+def estimate_mean(values: ArrayLike) -> Interval:
+    """Estimate the mean of values with Student's t interval.
+
+    Parameters
+    ----------
+    values : (m,) array_like
+
+    Returns
+    -------
+    Interval
+        Without limits if all values are equal: they may then be the same value several times.
+    """
     sample = np.asarray(values, dtype=float)
     mean = float(sample.mean())
     if len(np.unique(sample)) < 2:
@@ -140,12 +286,12 @@ def mean_with_t_interval(values: ArrayLike) -> Interval:
     from scipy.special import stdtrit
 
     error = float(sample.std(ddof=1)) / np.sqrt(len(sample))
-    half = float(stdtrit(len(sample) - 1, 0.5 + LEVEL / 2) * error)
-    return Interval(mean, mean - half, mean + half)
+    half_width = float(stdtrit(len(sample) - 1, 0.5 + CONFIDENCE_LEVEL / 2) * error)
+    return Interval(mean, mean - half_width, mean + half_width)
 
 
-def spread(values: ArrayLike) -> float:
-    """Return the coefficient of variation: the deviation (of a sample) by the mean, of two or more values."""
+def compute_coefficient_of_variation(values: ArrayLike) -> float:
+    """Compute the coefficient of variation: the standard deviation of a sample divided by its mean."""
     sample = np.asarray(values, dtype=float)
     return float(sample.std(ddof=1)) / float(sample.mean())
 

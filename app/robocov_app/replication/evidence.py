@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
 from robocov.controllers.gains import format_value
-from robocov_app.figures.statistics import Interval, bootstrap, group_by, median_time
+from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time, group_by
 from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.claims.explanations import compute_positive_fraction
 from robocov_app.replication.design.contenders import OWN, Contender
@@ -165,7 +165,7 @@ def summarize_contenders(
                 contact_fraction=compute_positive_fraction(known.get_values(contender.key, "contacts")),
                 stuck_fraction=compute_positive_fraction(known.get_values(contender.key, "stuck")),
                 rest_fraction=len(rest_times) / len(settled),
-                rest_time=median_time(rest_times, censored),
+                rest_time=estimate_median_time(rest_times, censored),
                 medians=medians,
             )
         )

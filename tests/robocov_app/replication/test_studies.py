@@ -9,7 +9,7 @@ from robocov.controllers import CONTROLLERS, get_gain_values, get_gains, make_co
 from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
 from robocov.errors import StartError
 from robocov.mapfile import list_bundled_maps, load_map
-from robocov_app.figures.statistics import share
+from robocov_app.figures.statistics import estimate_fraction
 from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS, NEARLY_ALWAYS, REGISTERED
 from robocov_app.replication.design import studies, study_maps
 from robocov_app.replication.design.contenders import (
@@ -136,7 +136,7 @@ class TestMaps:
         for count in (len(FULL.bundled + FULL.generated), len(CONVEX) + len(FULL.convex_generated)):
             lows, p_values = [], []
             for others in range(6):
-                there = share(np.arange(count) >= others, range(count))
+                there = estimate_fraction(np.arange(count) >= others, range(count))
                 lows.append(there.low)
                 p_values.append(len(REGISTERED) * there.p_value(NEARLY_ALWAYS, np.inf))
             assert [low >= NEARLY_ALWAYS for low in lows] == [True] * 5 + [False]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from reported_results import build_result, build_run
 
-from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
+from robocov_app.figures.statistics import Interval, bootstrap, estimate_mean
 from robocov_app.report.analysis.comparisons import GroupComparison, compare_groups
 from robocov_app.report.analysis.tuning import choose_compared_groups
 from robocov_app.report.document import load_template
@@ -102,7 +102,7 @@ def test_the_interval_on_one_map_is_over_its_seeds() -> None:
     (comparison,) = compare(build_pairs({"rooms": 0.8}, seeds=6))
     (pairs,) = comparison.maps
     effects = np.log(pairs.first_distances / pairs.second_distances)
-    check_limits(pairs.ratio, mean_with_t_interval(effects))
+    check_limits(pairs.ratio, estimate_mean(effects))
     assert comparison.ratio == pairs.ratio
     headline = comparison.format_headline()
     assert headline.startswith("RAPF against RPF: better, ratio 0.8")

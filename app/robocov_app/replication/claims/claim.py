@@ -62,7 +62,7 @@ class Criterion:
     @property
     def p_value(self) -> float:
         """The p-value of the true value being outside the range."""
-        return self.interval.p_value(self.low, self.high)
+        return self.interval.compute_p_value(self.low, self.high)
 
     @property
     def range_text(self) -> str:

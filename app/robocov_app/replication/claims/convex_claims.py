@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocov_app.figures.statistics import share
+from robocov_app.figures.statistics import estimate_fraction
 from robocov_app.replication.claims.claim import Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import list_ratios_by_start
 from robocov_app.replication.claims.thresholds import CLUSTERED, NEARLY_ALWAYS, NEARLY_SAME, SAME_COST
@@ -23,7 +23,7 @@ def judge_convex_final(outcomes: Outcomes) -> Claim:
     pairs = outcomes.compare("rapf-shared", "lloyd")
     if pairs is None:
         return claim
-    nearly_same = share(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.outcomes.maps)
+    nearly_same = estimate_fraction(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.outcomes.maps)
     criteria = (
         Criterion(
             "median of J(RAPF) / J(Lloyd) at the end",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.figures.statistics import bootstrap, spread
+from robocov_app.figures.statistics import bootstrap, compute_coefficient_of_variation
 from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.thresholds import BARELY, REGRET
 from robocov_app.replication.design.contenders import format_potential
@@ -116,7 +116,7 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
 
 def compute_variation(grid: GainOutcomes) -> Array:
     """Return the standard deviation of the cost over the gains relative to its mean, by instance, (m,)."""
-    return np.array([spread(column) for column in grid.excess.T])
+    return np.array([compute_coefficient_of_variation(column) for column in grid.excess.T])
 
 
 def compute_worst_by_best(grid: GainOutcomes) -> Array:

@@ -12,7 +12,13 @@ from typing import Any
 import numpy as np
 
 from robocov.arrays import IntArray
-from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by, median_time, share
+from robocov_app.figures.statistics import (
+    Interval,
+    bootstrap,
+    bootstrap_statistic,
+    estimate_fraction,
+    estimate_median_time,
+)
 from robocov_app.replication.claims.claim import GOALS, Claim, Criterion
 from robocov_app.replication.claims.explanations import describe_middle_half
 from robocov_app.replication.claims.thresholds import (
@@ -44,8 +50,8 @@ class _MainCriteria:
 
 def _build_main_criteria(outcomes: Outcomes, key: str) -> _MainCriteria:
     gap = bootstrap(outcomes.get_values(key, "gap"), clusters=outcomes.maps)
-    contacts = share(outcomes.get_values(key, "contacts") > 0, outcomes.maps)
-    rest = share(np.isfinite(outcomes.get_values(key, "settled")), outcomes.maps)
+    contacts = estimate_fraction(outcomes.get_values(key, "contacts") > 0, outcomes.maps)
+    rest = estimate_fraction(np.isfinite(outcomes.get_values(key, "settled")), outcomes.maps)
     return _MainCriteria(
         gap=Criterion("median of J/J_ref - 1", gap, high=MAX_GAP, unit="%"),
         contacts=Criterion("runs with a contact", contacts, high=RARELY, unit="%"),
@@ -150,9 +156,9 @@ def _judge_rest_goals(known: Outcomes, own: Contender, plan: Plan) -> list[Claim
 
     def compute_median_time(rows: IntArray) -> float:
         at_rest = is_at_rest[rows]
-        return median_time(settled[rows][at_rest], censored[rows][~at_rest])
+        return estimate_median_time(settled[rows][at_rest], censored[rows][~at_rest])
 
-    rest_time = bootstrap_by(compute_median_time, known.maps)
+    rest_time = bootstrap_statistic(compute_median_time, known.maps)
     return [
         _build_goal(
             "contacts",

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.figures.statistics import bootstrap, share
+from robocov_app.figures.statistics import bootstrap, estimate_fraction
 from robocov_app.replication.claims.claim import Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.convex_claims import describe_other_gains
 from robocov_app.replication.claims.explanations import (
@@ -102,7 +102,7 @@ def judge_lloyd_stuck(outcomes: Outcomes) -> Claim:
     if not known.instances:
         return claim
     counts = known.get_values("lloyd", "stuck")
-    stuck = share(counts > 0, known.maps)
+    stuck = estimate_fraction(counts > 0, known.maps)
     criteria = [
         Criterion("Lloyd's runs that end with a stuck robot", stuck, low=_MIN_STUCK_FRACTION, unit="%")
     ]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from robocov_app.figures.statistics import holm
+from robocov_app.figures.statistics import adjust_p_values
 from robocov_app.replication.claims.claim import Claim
 from robocov_app.replication.claims.convex_claims import judge_convex_final, judge_convex_spreading
 from robocov_app.replication.claims.gain_claims import (
@@ -56,5 +56,5 @@ def judge_paper_claims(
         judge_gap(nonconvex, "rpf-shared"),
         judge_gap(nonconvex, "lloyd"),
     ]
-    adjusted = holm({claim.key: claim.p_value for claim in claims if claim.key in REGISTERED})
+    adjusted = adjust_p_values({claim.key: claim.p_value for claim in claims if claim.key in REGISTERED})
     return [replace(claim, adjusted_p_value=adjusted.get(claim.key)) for claim in claims]

@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.arrays import IntArray
 from robocov.controllers import get_information, load_controller_class
-from robocov_app.figures.statistics import bootstrap_by
+from robocov_app.figures.statistics import bootstrap_statistic
 from robocov_app.replication.claims.claim import RIVALS, Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import describe_losses
 from robocov_app.replication.claims.thresholds import MIN_CLOSED_FRACTION
@@ -73,7 +73,7 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
 
     if math.isnan(compute_closed_fraction(np.arange(len(own_gaps)))):
         return replace(claim, explanation=f"{other.label} leaves no gap that could be closed.")
-    closed = bootstrap_by(compute_closed_fraction, known.maps)
+    closed = bootstrap_statistic(compute_closed_fraction, known.maps)
     explanation = (
         f"Medians of J/J_ref - 1 in the same runs: {format_median(own_gaps, '%')} and "
         f"{format_median(other_gaps, '%')}."

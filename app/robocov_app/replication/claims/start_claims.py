@@ -3,7 +3,7 @@
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.figures.statistics import bootstrap, group_by, spread
+from robocov_app.figures.statistics import bootstrap, compute_coefficient_of_variation, group_by
 from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.gain_claims import build_variation_criteria
 from robocov_app.replication.claims.thresholds import BARELY_BY_START, SAME_PLACEMENT
@@ -85,6 +85,6 @@ def _compute_start_variation(outcomes: Outcomes, key: str) -> tuple[Array, list[
     maps = []
     for (name, _), pairs in groups.items():
         if len(pairs) > 1:
-            variations.append(spread([final for _, final in pairs]))
+            variations.append(compute_coefficient_of_variation([final for _, final in pairs]))
             maps.append(name)
     return np.array(variations), maps

@@ -16,7 +16,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import Value
 from robocov.metrics import CostHistory
-from robocov_app.figures.statistics import Interval, bootstrap, share
+from robocov_app.figures.statistics import Interval, bootstrap, estimate_fraction
 
 
 class ProblemInstance(NamedTuple):
@@ -151,7 +151,7 @@ class PairedComparison:
         """Fraction of the pairs in which the first value is lower. Ties count half."""
         is_lower = self.first_values < self.second_values
         is_tie = self.first_values == self.second_values
-        return share(is_lower + 0.5 * is_tie, self.outcomes.maps)
+        return estimate_fraction(is_lower + 0.5 * is_tie, self.outcomes.maps)
 
 
 def merge_outcomes(parts: Sequence[Outcomes]) -> Outcomes:

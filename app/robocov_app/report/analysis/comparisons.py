@@ -12,8 +12,8 @@ from robocov_app.figures.statistics import (
     MIN_BOOTSTRAP_MAPS,
     Interval,
     bootstrap,
+    estimate_mean,
     group_by,
-    mean_with_t_interval,
 )
 from robocov_app.report.analysis.groups import RunGroup
 from robocov_app.report.results.result import ReportedRun
@@ -186,7 +186,7 @@ def _estimate_ratio(runs: Sequence[ReportedRun], ratios: Array) -> Interval:
     for run, effect in zip(runs, np.log(ratios).tolist(), strict=True):
         effects.setdefault((run.start, run.seed), []).append(effect)
     means = [float(np.mean(values)) for values in effects.values()]
-    return _exponentiate(mean_with_t_interval(means))
+    return _exponentiate(estimate_mean(means))
 
 
 def _exponentiate(effect: Interval) -> Interval:
