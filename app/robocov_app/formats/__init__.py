@@ -1,16 +1,18 @@
-"""Foreign map formats: one module for each, named as the format.
+"""Foreign map formats: one module or package for each, with the name of the format.
 
-`registry` lists them. Reading gives a `ForeignMap`: the free space in the file. `geometry` turns it into an
-`Environment`, in the same way for all formats.
+They are in `vector` (SVG, DXF, well-known text, HouseExpo, rings), `raster` (ROS, pictures, Tiled, MovingAI),
+`geodata` (GeoJSON, OpenStreetMap, IMDF) and `simulators` (ARGoS, IR-SIM, Stage); `registry` lists them.
+Reading a file gives a `ForeignMap`: its free space. `geometry` converts it to an `Environment`, in the same
+way for all formats.
 
-Shared parts are `files` (limits, JSON, YAML, XML), `geometry` (shapes, grids, polygons), `colors`,
-`georeference` (degrees to meters) and `building_floor` (rooms, walls and doors). `options` and `reports` are
-what a user gives and gets, `preview` draws an import, and `unsupported` names files that no format reads.
+`files` reads files safely, and `colors` gives colors of pictures and drawings a role. `options` are given by
+users, and `reports` are shown to them; `preview` plots an import, and `unsupported` names files that no
+format reads.
 """
 
 from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.geometry.conversion import build_environment
-from robocov_app.formats.geometry.shaping import Shaping
+from robocov_app.formats.geometry.conversion.environment import build_environment
+from robocov_app.formats.geometry.conversion.shaping import Shaping
 from robocov_app.formats.interface import Exporter, Importer
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.registry import (

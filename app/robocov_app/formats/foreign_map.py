@@ -49,7 +49,7 @@ class Thumbnail:
 
 @dataclass(frozen=True, eq=False)
 class ForeignMap:
-    """The content of a foreign file as it was read; `robocov_app.formats.geometry.conversion` cleans it.
+    """The content of a foreign file as it was read; `geometry.conversion` cleans it.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class ForeignMap:
     specks : float, m²
         Smaller obstacles are noise of the way in which such maps are made.
     cut_corners : bool
-        Whether corners are cut by a step or two of a grid; `geometry.corners` completes them.
+        Whether corners are cut by a step or two of a grid; `geometry.cells.corners` completes them.
     primitives : tuple of Primitive
         Obstacles that the file draws as such, not in `free`. They are kept instead of the polygons that they
         cover if nothing contradicts it.

@@ -5,31 +5,18 @@ from pathlib import Path
 
 from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError, describe_unknown_name, format_count, to_one_line
-from robocov_app.formats import (
-    argos,
-    dxf,
-    geojson,
-    houseexpo,
-    imdf,
-    irsim,
-    movingai,
-    osm,
-    picture,
-    rings,
-    ros,
-    stage,
-    svg,
-    tmx,
-    wkt,
-)
 from robocov_app.formats.files import read_head
 from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.geometry.conversion import build_environment
-from robocov_app.formats.geometry.shaping import Shaping
+from robocov_app.formats.geodata import geojson, imdf, osm
+from robocov_app.formats.geometry.conversion.environment import build_environment
+from robocov_app.formats.geometry.conversion.shaping import Shaping
 from robocov_app.formats.interface import Exporter, Importer
 from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.raster import movingai, picture, ros, tmx
 from robocov_app.formats.reports import ExportReport, ImportReport
+from robocov_app.formats.simulators import argos, irsim, stage
 from robocov_app.formats.unsupported import describe_head, describe_unsupported_file
+from robocov_app.formats.vector import dxf, houseexpo, rings, svg, wkt
 
 _DRAWING_OPTIONS = frozenset(
     {"thickness", "pillar", "outlines", "boundary", "around", "snap", "only", "skip"}

@@ -46,7 +46,7 @@ _KINDS = [
     (r"\x93NUMPY", "an array of numpy", "save it as a picture"),
     (r"version https://git-lfs", "a pointer of Git LFS, not the file itself", "git lfs pull"),
     (_XML + r"html\b", "a web page, not the file itself", "download the raw file"),
-    # except for IMDF, which `robocov_app.formats.imdf` reads
+    # except for IMDF, which `robocov_app.formats.geodata.imdf` reads
     (r"PK\x03\x04(?!.*?(?:unit|level|opening|venue)\.geojson)", "a zip archive", _UNPACK),
     (r"\x1f\x8b|BZh\d|\xfd7zXZ|7z\xbc\xaf|\x28\xb5\x2f\xfd|.{257}ustar", "a packed file", _UNPACK),
 ]  # fmt: skip

@@ -13,11 +13,11 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.geometry.conversion import build_environment
-from robocov_app.formats.geometry.map_layout import build_boundary
+from robocov_app.formats.geometry.conversion.environment import build_environment
+from robocov_app.formats.geometry.conversion.map_layout import build_boundary
+from robocov_app.formats.geometry.conversion.shaping import Shaping
+from robocov_app.formats.geometry.conversion.starts import find_roomiest_point
 from robocov_app.formats.geometry.polygons import round_polygons
-from robocov_app.formats.geometry.shaping import Shaping
-from robocov_app.formats.geometry.starts import find_roomiest_point
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
 CLOSET = box(20, 0, 23, 3)
@@ -346,7 +346,7 @@ def test_a_map_of_many_vertices_says_what_that_means() -> None:
 def test_a_map_that_takes_too_long_is_refused(
     monkeypatch: pytest.MonkeyPatch, most: str, wanted: str
 ) -> None:
-    monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.{most}", 0)
+    monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.environment.{most}", 0)
     with pytest.raises(MapError, match=rf"plan: expected at most 0, got \d+ {wanted}: --specks AREA"):
         build_environment(foreign(ROOM), Shaping(), "plan")
 

@@ -19,8 +19,8 @@ from shapely import affinity, box
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format
-from robocov_app.formats.dxf.curves import flatten_polyline
-from robocov_app.formats.dxf.reading import UNITS
+from robocov_app.formats.vector.dxf.curves import flatten_polyline
+from robocov_app.formats.vector.dxf.reading import UNITS
 
 METERS = 6
 Draw = Callable[[Any, Any], Any]

@@ -14,7 +14,7 @@ from vector_files import square
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ReadOptions
 from robocov_app.formats.files import MAX_VERTICES
-from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry, WallLine
+from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry, WallLine
 
 HALL = square(0, 0, 20, 10)
 

@@ -25,7 +25,7 @@ from robocov_app.formats import (
     export_map,
     import_map,
 )
-from robocov_app.formats.geometry.starts import find_rooms
+from robocov_app.formats.geometry.conversion.starts import find_rooms
 
 ROOM = Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)))
 

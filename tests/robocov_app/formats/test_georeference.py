@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions
-from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
-from robocov_app.formats.georeference import convert_to_meters
+from robocov_app.formats.geodata.georeference import convert_to_meters
+from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
 
 PLAIN = ReadOptions()
 _GLOBE = pyproj.Geod(ellps="WGS84")

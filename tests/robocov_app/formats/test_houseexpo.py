@@ -14,7 +14,7 @@ from robocov.environment import DiscStart, Environment, PolygonObstacle, Uniform
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, load_map, save_map, to_json
 from robocov_app.formats import Shaping, detect_format, import_map
-from robocov_app.formats.geometry.corners import sharpen_corners
+from robocov_app.formats.geometry.cells.corners import sharpen_corners
 from robocov_app.formats.reports import ImportReport
 
 # two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m, with corners cut by 1 cm as in such plans

@@ -13,7 +13,7 @@ from PIL import Image, PngImagePlugin
 from raster_files import chunk, pgm, raw_png
 
 from robocov.errors import MapError
-from robocov_app.formats.picture import Brightness, is_picture, read_picture
+from robocov_app.formats.raster.picture import Brightness, is_picture, read_picture
 
 GRAY = np.array([[0, 17, 34, 255], [255, 204, 119, 0], [136, 0, 255, 51]], dtype=np.uint8)
 """Multiples of 17: as exact in 4 bits as in 8."""

@@ -11,7 +11,7 @@ from raster_files import pgm
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
-from robocov_app.formats.picture import GEOREFERENCE_CHUNK
+from robocov_app.formats.raster.picture import GEOREFERENCE_CHUNK
 
 IMPORTER = IMPORTERS["picture"]
 

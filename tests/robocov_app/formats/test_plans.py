@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw, ImageOps
 
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ImportReport, ReadOptions, Shaping, import_map
-from robocov_app.formats.geometry.strokes import remove_thin_strokes
+from robocov_app.formats.geometry.cells.strokes import remove_thin_strokes
 
 
 def paper(width: int = 200, height: int = 120) -> tuple[Image.Image, ImageDraw.ImageDraw]:
@@ -113,7 +113,7 @@ def test_an_opening_tells_widths_apart_to_a_cell(width: int) -> None:
 def test_an_opening_does_not_depend_on_strips(monkeypatch: pytest.MonkeyPatch) -> None:
     solid = np.random.default_rng(1).random((200, 60)) > 0.15
     whole = [remove_thin_strokes(solid, width) for width in (2, 3, 6)]
-    monkeypatch.setattr("robocov_app.formats.geometry.strokes._STRIP_CELLS", 60 * 20)
+    monkeypatch.setattr("robocov_app.formats.geometry.cells.strokes._STRIP_CELLS", 60 * 20)
     strips = [remove_thin_strokes(solid, width) for width in (2, 3, 6)]
     assert all((one == other).all() for one, other in zip(whole, strips, strict=True))
 

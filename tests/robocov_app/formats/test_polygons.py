@@ -16,8 +16,8 @@ from robocov_app.formats.geometry.crossings import (
     extract_edges,
     extract_sides,
 )
-from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
+from robocov_app.formats.geometry.shapes.enclosed_area import find_enclosed_area
 
 _RING = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=3, max_size=9)
 

@@ -14,8 +14,8 @@ from shapely import MultiPolygon, Polygon
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import ParameterError
 from robocov_app.formats import ReadOptions, Shaping, WriteOptions, export_map, import_map
-from robocov_app.formats.geometry import rasterize
-from robocov_app.formats.geometry.rasterize import (
+from robocov_app.formats.geometry.cells import rasterize
+from robocov_app.formats.geometry.cells.rasterize import (
     CellGrid,
     build_grid,
     describe_lost_passages,

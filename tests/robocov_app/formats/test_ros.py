@@ -15,8 +15,8 @@ from shapely import MultiPolygon
 
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, import_map
-from robocov_app.formats.picture import Brightness
-from robocov_app.formats.ros.classification import classify_raw, classify_scale, classify_trinary
+from robocov_app.formats.raster.picture import Brightness
+from robocov_app.formats.raster.ros.classification import classify_raw, classify_scale, classify_trinary
 
 IMPORTER = IMPORTERS["ros"]
 

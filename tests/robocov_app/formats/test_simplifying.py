@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
-from robocov_app.formats.geometry.narrow_gaps import find_closed_gaps
-from robocov_app.formats.geometry.original_outline import OriginalOutline
-from robocov_app.formats.geometry.simplification_check import MAX_OUTLINE_CHANGE
-from robocov_app.formats.geometry.simplify import simplify_free_space
-from robocov_app.formats.geometry.starts import find_rooms
-from robocov_app.formats.geometry.vectorize import trace_outline
+from robocov_app.formats.geometry.cells.vectorize import trace_outline
+from robocov_app.formats.geometry.conversion.starts import find_rooms
+from robocov_app.formats.geometry.simplification.checks import MAX_OUTLINE_CHANGE
+from robocov_app.formats.geometry.simplification.narrow_gaps import find_closed_gaps
+from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline
+from robocov_app.formats.geometry.simplification.simplify import simplify_free_space
 
 CELL = 0.05
 

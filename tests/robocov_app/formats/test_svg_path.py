@@ -8,9 +8,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from robocov_app.formats.geometry.frames import transform_points
-from robocov_app.formats.svg.numbers import parse_length, parse_numbers
-from robocov_app.formats.svg.path_data import parse_path
-from robocov_app.formats.svg.transforms import (
+from robocov_app.formats.vector.svg.numbers import parse_length, parse_numbers
+from robocov_app.formats.vector.svg.path_data import parse_path
+from robocov_app.formats.vector.svg.transforms import (
     build_affine,
     compose,
     compute_stretch,

@@ -4,7 +4,7 @@ import pytest
 
 from robocov.errors import MapError
 from robocov_app.formats.files.xml_tree import Element
-from robocov_app.formats.svg.style import (
+from robocov_app.formats.vector.svg.style import (
     INHERITED,
     MAX_RULE_CHECKS,
     MAX_SHEET_CHARACTERS,

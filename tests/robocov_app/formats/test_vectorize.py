@@ -13,7 +13,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError
 from robocov_app.formats.files import limits
-from robocov_app.formats.geometry.vectorize import NECK, trace_outline
+from robocov_app.formats.geometry.cells.vectorize import NECK, trace_outline
 
 grids = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.booleans())
 
@@ -40,7 +40,7 @@ def expected(free: np.ndarray) -> shapely.Geometry:
 @settings(deadline=None, max_examples=200)
 @given(grids, st.integers(1, 10))
 def test_it_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
-    with mock.patch("robocov_app.formats.geometry.vectorize._STRIP", strip):
+    with mock.patch("robocov_app.formats.geometry.cells.vectorize._STRIP", strip):
         outline = trace_outline(free, "grid")
     assert outline.is_valid
     assert shapely.equals(outline, expected(free)) if free.any() else outline.is_empty

@@ -12,8 +12,8 @@ from vector_files import read
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
-from robocov_app.formats.geometry.shapes import Shapes
-from robocov_app.formats.wkt.parser import WktParser
+from robocov_app.formats.geometry.shapes.collection import Shapes
+from robocov_app.formats.vector.wkt.parser import WktParser
 
 HALL = "POLYGON ((0 0, 10 0, 10 5, 0 5, 0 0), (1 1, 2 1, 2 2, 1 2, 1 1))"
 

@@ -9,20 +9,20 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov_app.formats.files import parse_yaml
-from robocov_app.formats.geometry.corners import sharpen_corners
+from robocov_app.formats.geometry.cells.corners import sharpen_corners
+from robocov_app.formats.geometry.cells.grid_map import _format_share
+from robocov_app.formats.geometry.cells.rasterize import _iterate_smaller_sizes
+from robocov_app.formats.geometry.cells.vectorize import trace_outline
+from robocov_app.formats.geometry.conversion.map_layout import build_boundary
 from robocov_app.formats.geometry.curves import flatten_beziers
-from robocov_app.formats.geometry.enclosed_area import Rule, find_enclosed_area
-from robocov_app.formats.geometry.grid_map import _format_share
-from robocov_app.formats.geometry.import_tally import format_plural
-from robocov_app.formats.geometry.map_layout import build_boundary
 from robocov_app.formats.geometry.polygons import format_decimal
-from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
-from robocov_app.formats.geometry.vectorize import trace_outline
+from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
+from robocov_app.formats.geometry.shapes.import_tally import format_plural
 from robocov_app.formats.preview.plotting import _format_number
 from robocov_app.formats.reports import format_area
-from robocov_app.formats.svg.path_data import parse_path
-from robocov_app.formats.svg.style import parse_declarations
 from robocov_app.formats.unsupported import describe_unsupported_file
+from robocov_app.formats.vector.svg.path_data import parse_path
+from robocov_app.formats.vector.svg.style import parse_declarations
 
 
 def test_numbers_are_written_so_that_they_are_read_easily() -> None:

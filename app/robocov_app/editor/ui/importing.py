@@ -20,7 +20,7 @@ from robocov_app.formats import (
     build_environment,
     read_map,
 )
-from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
+from robocov_app.formats.geometry.conversion.comparison import ImportComparison, compare_maps
 from robocov_app.jobs.messages import Channel
 
 OptionKind = Literal["number", "place", "words", "colors", "width", "text", "choice"]

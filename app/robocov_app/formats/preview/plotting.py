@@ -20,7 +20,7 @@ from robocov_app.figures.arena import build_map_handles, draw_map
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TITLE, Page, tone
 from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
+from robocov_app.formats.geometry.conversion.comparison import ImportComparison, compare_maps
 from robocov_app.formats.preview.layout import (
     LINE_HEIGHT_PX,
     Caption,

@@ -1,0 +1,192 @@
+"""Conversion of coordinates on the globe to meters in a local plane, the unit of maps."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.environment import Point
+from robocov.errors import MapError, RobocovError, quote
+from robocov.mapfile.models import MAX_SIZE_M
+from robocov.optional_imports import import_optional
+from robocov_app.formats.files import require_shapes
+from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
+
+DEGREES = "OGC:CRS84"
+"""Longitude and latitude on WGS 84, the system of all GeoJSON (RFC 7946, section 4)."""
+_SYSTEMS_IN_DEGREES = (DEGREES, "EPSG:4326")
+_WAY_OUT = "--units meters takes coordinates as they are"
+_AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
+_URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
+_ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
+_DIGITS = 6
+"""Decimals of meters: free space is known to a micrometer."""
+_EARTH_RADIUS_M = 6_371_000.0
+"""Mean radius, to distinguish degrees from meters; nothing else is computed with it."""
+_MAX_DEGREES = (360.0, 90.0)
+"""Largest longitude and latitude: some files continue beyond the antimeridian."""
+
+
+def convert_to_meters(
+    geometries: list[SourceGeometry],
+    shapes: Shapes,
+    crs: str | None,
+    *,
+    may_be_degrees: bool = False,
+    origin: Point | None = None,
+) -> list[SourceGeometry]:
+    """Return geometries with coordinates in meters; the notes of `shapes` say what was done to them.
+
+    The option ``units`` overrules the file; ``scale`` is the size of a unit in meters if the file has none.
+
+    Parameters
+    ----------
+    geometries : list of SourceGeometry
+    shapes : Shapes
+        Gives the options and takes the notes.
+    crs : str or None
+        Reference system that the file names, as ``EPSG:25832`` or an OGC URN.
+    may_be_degrees : bool
+        Whether coordinates without a reference system are degrees if that makes a map of at most 10 km.
+    origin : (longitude, latitude), degrees
+        Point that becomes [0, 0] m. By default the middle of the geometries.
+
+    Raises
+    ------
+    MapError
+        If the reference system is unknown, pyproj is missing, or a point cannot be projected.
+    """
+    if not geometries:
+        return geometries
+    where = shapes.where
+    scale = shapes.options.scale
+    units = shapes.options.units
+    require_shapes(sum(geometry.kind != "point" for geometry in geometries), where)
+    if units == "degrees":
+        return _project(geometries, DEGREES, shapes, origin)
+    if units is None and crs is not None:
+        return _project(geometries, _parse_reference_system(crs, where), shapes, origin)
+    if units is None and may_be_degrees and _are_degrees(geometries):
+        return _project(geometries, DEGREES, shapes, origin)
+    if scale not in (None, 1.0):
+        shapes.notes.append(f"a unit is {scale:g} m")
+    if may_be_degrees and units is None:
+        shapes.notes.append("coordinates taken as meters: as degrees the map would be larger than 10 km")
+    if crs is not None:
+        shapes.notes.append(f"coordinates of {crs} taken as they are")
+    meters_per_unit = 1.0 if scale is None else scale
+    return _replace_points(geometries, _join_points(geometries) * meters_per_unit)
+
+
+def _join_points(geometries: Sequence[SourceGeometry]) -> Array:
+    return np.concatenate([ring for geometry in geometries for ring in geometry.rings])
+
+
+def _replace_points(geometries: Sequence[SourceGeometry], points: Array) -> list[SourceGeometry]:
+    """Return geometries with other points, given as by `_join_points`."""
+    lengths = [len(ring) for geometry in geometries for ring in geometry.rings]
+    rings = iter(np.split(points, np.cumsum(lengths)[:-1]))
+    replaced = []
+    for geometry in geometries:
+        new_rings = tuple(islice(rings, len(geometry.rings)))
+        replaced.append(replace(geometry, rings=new_rings))
+    return replaced
+
+
+def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
+    """Return whether coordinates are degrees of a site, not meters of a plan: a plan is meters wide."""
+    points = _join_points(geometries)
+    if not (np.abs(points) <= _MAX_DEGREES).all():
+        return False
+    width, height = np.ptp(_unwrap_longitudes(points, points[0, 0]), axis=0)
+    shrinkage = math.cos(math.radians(float(np.abs(points[:, 1]).max())))
+    size_rad = max(width * shrinkage, height) * math.radians(1.0)
+    return bool(size_rad * _EARTH_RADIUS_M <= MAX_SIZE_M)
+
+
+def _unwrap_longitudes(points: Array, center: float) -> Array:
+    """Return longitudes and latitudes without a jump at the antimeridian: all within 180 degrees of one."""
+    longitudes = center + (points[:, 0] - center + 180.0) % 360.0 - 180.0
+    return np.column_stack([longitudes, points[:, 1]])
+
+
+def _parse_reference_system(crs: str, where: str) -> str:
+    """Return a name as AUTHORITY:CODE. Only codes are looked up, because full definitions may name files."""
+    match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
+    if match is None or match[1].upper() not in _AUTHORITIES:
+        expected = f"expected a code as EPSG:25832 ({_WAY_OUT})"
+        raise MapError(f"{where}: {expected}, got reference system {quote(crs)}")
+    return f"{match[1].upper()}:{match[2].upper()}"
+
+
+def _project(
+    geometries: Sequence[SourceGeometry], system: str, shapes: Shapes, origin: Point | None
+) -> list[SourceGeometry]:
+    """Return geometries in meters east and north of an origin, by the azimuthal equidistant projection."""
+    pyproj = _import_pyproj(system, shapes.where)
+    points = _join_points(geometries)
+    if system not in _SYSTEMS_IN_DEGREES:
+        points = _transform_to_degrees(pyproj, points, system, shapes.where)
+    is_on_globe = (np.abs(points) <= _MAX_DEGREES).all(axis=1)  # what cannot be projected is inf
+    if not is_on_globe.all():
+        x, y = _join_points(geometries)[int(np.argmin(is_on_globe))].tolist()
+        expected = f"coordinates of {system}"
+        if system in _SYSTEMS_IN_DEGREES:
+            expected = "longitude and latitude in degrees"
+        raise MapError(f"{shapes.where}: expected {expected}, got a point at [{x:g}, {y:g}] ({_WAY_OUT})")
+    points = _unwrap_longitudes(points, points[0, 0])
+    if origin is None:
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        origin = (float(middle[0]), float(middle[1]))
+    longitude, latitude = origin
+    points = LocalPlane(pyproj, longitude, latitude).to_meters(points)
+    longitude = (longitude + 180.0) % 360.0 - 180.0
+    about = f"about longitude {longitude:.5f}, latitude {latitude:.5f} (azimuthal equidistant)"
+    label = "degrees" if system in _SYSTEMS_IN_DEGREES else system
+    shapes.notes.append(f"{label} projected to meters {about}")
+    return _replace_points(geometries, points)
+
+
+def _import_pyproj(system: str, where: str) -> Any:
+    try:
+        return import_optional("pyproj", "geo")
+    except RobocovError as error:
+        label = "degrees" if system == DEGREES else system
+        raise MapError(f"{where}: coordinates in {label}: {error} ({_WAY_OUT})") from None
+
+
+def _transform_to_degrees(pyproj: Any, points: Array, system: str, where: str) -> Array:
+    """Return points of a reference system as longitudes and latitudes, inf where that is impossible."""
+    try:
+        source = pyproj.CRS.from_authority(*system.split(":"))
+        transformer = pyproj.Transformer.from_crs(source, DEGREES, always_xy=True)
+    except pyproj.exceptions.ProjError:
+        raise MapError(f"{where}: reference system {system} is unknown ({_WAY_OUT})") from None
+    return np.column_stack(transformer.transform(*points.T))
+
+
+class LocalPlane:
+    """Conversion between degrees and meters east and north of an origin on the globe.
+
+    Azimuthal equidistant on the ellipsoid of WGS 84 (Snyder 1987, Map Projections: A Working Manual,
+    section 25): within 5 km of the origin lengths are true to better than a millimeter.
+    """
+
+    def __init__(self, pyproj: Any, longitude: float, latitude: float) -> None:
+        self._longitude = longitude
+        self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
+
+    def to_meters(self, coordinates: Array) -> Array:
+        """Return longitudes and latitudes, (n, 2), as meters, rounded so that touching walls still touch."""
+        return np.round(np.column_stack(self._project(*coordinates.T)), _DIGITS)
+
+    def to_degrees(self, coordinates: Array) -> Array:
+        """Return meters, (n, 2), as longitudes, within 180 degrees of the origin, and latitudes."""
+        return _unwrap_longitudes(
+            np.column_stack(self._project(*coordinates.T, inverse=True)), self._longitude
+        )

@@ -1,0 +1,47 @@
+"""Geometries of elements of OpenStreetMap, in degrees."""
+
+import re
+
+import shapely
+
+from robocov_app.formats.geodata.osm.data import OsmData, OsmElement
+from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
+
+_WIDTH = re.compile(r"(\d{1,3}(?:\.\d+)?)\s*m?")
+
+
+def to_point(data: OsmData, node: OsmElement) -> SourceGeometry:
+    """Return a node as a point."""
+    return SourceGeometry("point", (data.get_point(node)[None],), node.labels, node.place)
+
+
+def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | None:
+    """Return a way as a line, or None, counted as left out, if nodes are missing."""
+    lines = data.get_lines(way)
+    if lines is None:
+        shapes.leave_out("way", "of which the file does not have all")
+        return None
+    return SourceGeometry("line", (lines[0],), way.labels, way.place, width=parse_width(way.tags))
+
+
+def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeometry | None:
+    """Return the area of a way or relation, or None, counted as left out, if it has none."""
+    lines = data.get_lines(element)
+    if lines is None:
+        shapes.leave_out(element.kind, "of which the file does not have all")
+        return None
+    merged = shapely.line_merge(shapely.MultiLineString([shapely.LineString(line) for line in lines]))
+    rings = [shapely.get_coordinates(part) for part in shapely.get_parts(merged)]
+    if not rings:  # all nodes have the same position
+        shapes.leave_out(element.kind, "without an area")
+        return None
+    if not all((ring[0] == ring[-1]).all() for ring in rings):
+        shapes.leave_out(element.kind, "that does not close")
+        return None
+    return SourceGeometry("polygon", tuple(rings), element.labels, element.place, rule="evenodd")
+
+
+def parse_width(tags: dict[str, str]) -> float | None:
+    """Return the tag ``width`` in meters, or None."""
+    match = _WIDTH.fullmatch(tags.get("width", "").strip())
+    return float(match[1]) if match else None

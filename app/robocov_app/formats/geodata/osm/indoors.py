@@ -1,0 +1,187 @@
+"""Floors of buildings: rooms, corridors, walls and doors, as of Simple Indoor Tagging."""
+
+import re
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.formats.geodata.building_floor import DEFAULT_DOOR_WIDTH_M, MAX_FLOORS, FloorElement, Role
+from robocov_app.formats.geodata.georeference import DEGREES, convert_to_meters
+from robocov_app.formats.geodata.osm.data import OsmData, OsmElement
+from robocov_app.formats.geodata.osm.geometries import parse_width, to_line, to_point, to_polygon
+from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
+
+_SPACES: dict[str, Role] = {"room": "walled", "corridor": "open", "area": "open"}
+_STAIRS = {"stairs", "elevator", "escalator", "steps"}
+"""Values of tags of areas that robots cannot drive on."""
+_MIN_INDOOR_FRACTION = 0.5
+"""Fraction of the area of buildings above which an extract shows their inside."""
+_LEVEL_RANGE = re.compile(r"(-?\d{1,3}(?:\.\d+)?)(?:-(-?\d{1,3}(?:\.\d+)?))?")
+_MIN_LENGTH_M = 1e-9
+
+
+def _parse_levels(tags: dict[str, str]) -> set[float]:
+    """Return the levels that an element is on, from its tags ``level`` and ``repeat_on``.
+
+    Values are numbers, lists of them (``0;1``) and ranges (``-1-2``). An element without a level is on level
+    0.
+    """
+    levels: set[float] = set()
+    text = f"{tags.get('level', '')};{tags.get('repeat_on', '')}"
+    for word in re.split(r"[;,]", text):
+        match = _LEVEL_RANGE.fullmatch(word.strip())
+        if match is None:
+            continue
+        low = float(match[1])
+        high = low if match[2] is None else float(match[2])
+        if low <= high < low + MAX_FLOORS:
+            levels |= {low + step for step in range(int(high - low) + 1)}
+    return levels or {0.0}
+
+
+def _is_stairs(tags: dict[str, str]) -> bool:
+    kinds = {tags.get("room"), tags.get("highway"), tags.get("indoor")}
+    return bool(_STAIRS & kinds) or tags.get("stairs") == "yes"
+
+
+def _choose_role(element: OsmElement) -> Role | None:
+    """Return the role of an element on a floor, or None if it has none."""
+    tags = element.tags
+    indoor = tags.get("indoor", "")
+    if element.kind == "node":
+        if {"door", "entrance"} & tags.keys() or indoor == "door":
+            return "opening"
+        return "post" if indoor in ("column", "pillar") else None
+    if _is_stairs(tags) and indoor not in ("", "no"):
+        return "solid"
+    if indoor in ("column", "pillar") or (indoor == "wall" and tags.get("area") == "yes"):
+        return "solid"
+    if indoor == "wall":
+        return "wall" if element.kind == "way" else "solid"
+    return _SPACES.get(indoor)
+
+
+def measure_floors(data: OsmData) -> dict[float, float]:
+    """Return the area of the spaces on each level that has any, in square degrees of the equator."""
+    floors: dict[float, float] = {}
+    for element in data.elements:
+        if _choose_role(element) not in ("open", "walled"):
+            continue
+        area = _measure_area(data, element)
+        for level in _parse_levels(element.tags):
+            floors[level] = floors.get(level, 0.0) + area
+    return {level: area for level, area in floors.items() if area > 0.0}
+
+
+def _measure_area(data: OsmData, element: OsmElement) -> float:
+    """Return the area inside the ways of an element, exact for a single closed way, in square degrees."""
+    area = 0.0
+    for line in data.get_lines(element) or []:
+        x, y = (line - line[0]).T
+        area += abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
+    return area
+
+
+def is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
+    """Return whether an extract shows mostly the inside of buildings.
+
+    Parameters
+    ----------
+    data : OsmData
+    floors : dict of float to float
+        Area of the spaces on each level, as of `measure_floors`.
+    """
+    buildings = [element for element in data.elements if element.is_building and element.kind != "node"]
+    building_area = sum(_measure_area(data, building) for building in buildings)
+    return max(floors.values()) >= _MIN_INDOOR_FRACTION * building_area
+
+
+def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[FloorElement]:
+    """Return the elements of a level, in meters; those that are left out are counted in `shapes`."""
+    roles: list[Role] = []
+    geometries: list[SourceGeometry] = []
+    doors: list[OsmElement] = []
+    walls: list[OsmElement] = []
+    stairs = 0
+    for element in data.elements:
+        role = _choose_role(element)
+        if role is None or floor not in _parse_levels(element.tags):
+            continue
+        if role == "opening":
+            doors.append(element)
+            continue
+        if role in ("walled", "wall"):
+            walls.append(element)
+        if role == "solid" and _is_stairs(element.tags):
+            stairs += 1
+        geometry = _build_geometry(data, element, role, shapes)
+        if geometry is not None:
+            roles.append(role)
+            geometries.append(geometry)
+    if stairs:
+        shapes.notes.append(f"stairs and lifts taken as solid: {stairs}")
+    door_lines = _find_doors(data, doors, walls)
+    lost_doors = len(doors) - len(door_lines)
+    if lost_doors:
+        shapes.leave_out("door", "in no wall of this level", lost_doors)
+    projected = convert_to_meters([*geometries, *door_lines], shapes, DEGREES)
+    elements = [FloorElement(role, geometry) for role, geometry in zip(roles, projected, strict=False)]
+    openings = [_build_opening(door_line) for door_line in projected[len(geometries) :]]
+    return elements + [FloorElement("opening", opening) for opening in openings]
+
+
+def _build_geometry(data: OsmData, element: OsmElement, role: Role, shapes: Shapes) -> SourceGeometry | None:
+    if role == "post":
+        return to_point(data, element)
+    if role == "wall":
+        return to_line(data, element, shapes)
+    return to_polygon(data, element, shapes)
+
+
+def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[SourceGeometry]:
+    """Return doors as lines of three points, in degrees: the node before in its wall, its own, the next."""
+    neighbors = _find_neighbors({door.number for door in doors}, data, walls)
+    lines = []
+    for door in doors:
+        if door.number not in neighbors:
+            continue
+        before, after = neighbors[door.number]
+        line = data.get_lines(OsmElement("way", door.number, members=[before, door.number, after]))
+        if line is not None:
+            width = parse_width(door.tags)
+            lines.append(SourceGeometry("line", (line[0],), ("door",), door.place, width=width))
+    return lines
+
+
+def _find_neighbors(doors: set[int], data: OsmData, walls: list[OsmElement]) -> dict[int, tuple[int, int]]:
+    """Return the nodes before and after each door in the first wall that contains it."""
+    neighbors: dict[int, tuple[int, int]] = {}
+    for wall in walls:
+        for way in data.get_ways(wall):
+            nodes = [] if way is None else way.members
+            for k, number in enumerate(nodes):
+                if number in doors and number not in neighbors:
+                    neighbors[number] = _get_adjacent_nodes(nodes, k)
+    return neighbors
+
+
+def _get_adjacent_nodes(nodes: list[int], k: int) -> tuple[int, int]:
+    """Return the nodes before and after node `k` of a way; at an open end, the node itself."""
+    before = k - 1
+    after = k + 1
+    is_closed = len(nodes) > 2 and nodes[0] == nodes[-1]
+    if before < 0:
+        before = len(nodes) - 2 if is_closed else k
+    if after == len(nodes):
+        after = 1 if is_closed else k
+    return nodes[before], nodes[after]
+
+
+def _build_opening(door: SourceGeometry) -> SourceGeometry:
+    """Return the line across an opening, in meters, of a door as of `_find_doors`."""
+    before, middle, after = door.rings[0]
+    direction = after - before if (after != before).any() else after - middle
+    length = float(np.hypot(*direction))
+    width = door.width or DEFAULT_DOOR_WIDTH_M
+    half: Array = direction * (width / 2 / max(length, _MIN_LENGTH_M))
+    return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.at)

@@ -1,0 +1,238 @@
+"""Reading the data of OpenStreetMap from XML or from the JSON of Overpass.
+
+XML is what openstreetmap.org, JOSM and osmium write: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is
+what Overpass answers to ``[out:json]``, also with ``out geom``, and what the API writes as ``map.json``:
+https://wiki.openstreetmap.org/wiki/OSM_JSON.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+from xml.parsers import expat
+
+from robocov.errors import JsonPath, MapError, quote, to_one_line
+from robocov_app.formats import files
+from robocov_app.formats.files import JsonFile, is_number
+from robocov_app.formats.geodata.osm.data import USED_TAGS, OsmData, OsmElement
+
+XML_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
+_JSON_ELEMENTS = re.compile(rb'"elements"\s*:\s*\[')
+_JSON_SOURCE = re.compile(rb'"osm3s"\s*:|"generator"\s*:\s*"[^"]*(?:Overpass|OpenStreetMap|CGImap)')
+
+
+def is_osm(head: bytes) -> bool:
+    """Return whether a file that starts with `head` contains data of OpenStreetMap."""
+    if XML_ROOT.match(head):
+        return True
+    is_json = files.starts_with(head, b"{") and _JSON_ELEMENTS.search(head) is not None
+    return is_json and _JSON_SOURCE.search(head) is not None
+
+
+def read_osm(path: Path) -> OsmData:
+    """Read the data in a file.
+
+    Raises
+    ------
+    MapError
+        If the file is neither XML nor JSON of OpenStreetMap, or too large.
+    """
+    if files.starts_with(files.read_head(path), b"{"):
+        return _read_json(path)
+    content = files.read_content(path, files.MAX_TEXT_BYTES)
+    return _XmlReader(to_one_line(path), content).data
+
+
+class _XmlReader:
+    """Handlers for expat that fill `data`."""
+
+    def __init__(self, where: str, content: bytes) -> None:
+        self.where = where
+        self.data = OsmData(where)
+        # Counting takes a moment, parsing seconds.
+        files.require_vertices(content.count(b"<node"), where)
+        files.require_vertices(content.count(b"<nd"), where)
+        files.require_vertices(content.count(b"<tag") // 2, where)
+        self.element: OsmElement | None = None
+        self.depth = 0
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self._start_element
+        self.parser.EndElementHandler = self._end_element
+        self.parser.StartDoctypeDeclHandler = lambda *_: self._refuse("expected no document type")
+        try:
+            self.parser.Parse(content, True)
+        except (expat.ExpatError, ValueError, LookupError) as error:
+            line = self.parser.ErrorLineNumber
+            raise MapError(f"{where}:{line}: not XML: {to_one_line(error)[:80]}") from None
+
+    def _start_element(self, name: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        if self.depth == 1 and name != "osm":
+            self._refuse(f"expected <osm>, got <{to_one_line(name)[:40]}>")
+        try:
+            self._add(name, attributes)
+        except KeyError as error:
+            self._refuse(f"<{name}>: no {error.args[0]}")
+        except ValueError as error:
+            self._refuse(f"<{name}>: {to_one_line(error)[:80]}")
+
+    def _add(self, name: str, attributes: dict[str, str]) -> None:
+        """Add what an XML element says; raise KeyError or ValueError if an attribute is missing or wrong."""
+        if name == "bounds":
+            self.data.bounds.append(_parse_bounds(attributes))
+        elif self.depth == 2 and name in ("node", "way", "relation"):
+            self._add_osm_element(name, attributes)
+        elif self.element is None:
+            return
+        elif name == "nd" or (name == "member" and attributes["type"] == "way"):
+            self.element.members.append(int(attributes["ref"]))
+        elif name == "tag" and attributes["k"] in USED_TAGS:
+            self.element.tags[attributes["k"]] = attributes["v"]
+
+    def _add_osm_element(self, kind: str, attributes: dict[str, str]) -> None:
+        number = int(attributes["id"])
+        if attributes.get("action") == "delete" or attributes.get("visible") == "false":
+            return
+        self.element = OsmElement(kind, number)
+        if kind == "node":
+            longitude = _parse_degrees(attributes, "lon")
+            latitude = _parse_degrees(attributes, "lat")
+            self.data.add_node(number, longitude, latitude)
+
+    def _end_element(self, name: str) -> None:
+        self.depth -= 1
+        if self.depth == 1 and self.element is not None:
+            self.data.add_element(self.element)
+            self.element = None
+
+    def _refuse(self, problem: str) -> NoReturn:
+        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {problem}")
+
+
+def _read_json(path: Path) -> OsmData:
+    file = JsonFile(path)
+    data = OsmData(file.where)
+    document = file.document
+    elements = document.get("elements") if isinstance(document, dict) else None
+    if not isinstance(elements, list):
+        raise file.build_error(("elements",), elements, "a list of elements")
+    bounds = document.get("bounds")
+    if isinstance(bounds, dict):
+        try:
+            data.bounds.append(_parse_bounds(bounds))
+        except (KeyError, ValueError, TypeError):
+            expected = "minlat, minlon, maxlat and maxlon in degrees"
+            raise file.build_error(("bounds",), bounds, expected) from None
+    remark = document.get("remark")
+    if isinstance(remark, str):
+        data.notes.append(f"Overpass says: {to_one_line(remark)[:200]}")
+    for k, element in enumerate(elements):
+        _add_json_element(data, file, element, ("elements", k))
+    return data
+
+
+def _add_json_element(data: OsmData, file: JsonFile, value: Any, at: JsonPath) -> None:
+    if not isinstance(value, dict):
+        raise file.build_error(at, value, "an element of OpenStreetMap")
+    kind = value.get("type")
+    if kind not in ("node", "way", "relation"):  # areas and counts of Overpass
+        return
+    number = value.get("id")
+    if type(number) is not int:
+        raise file.build_error((*at, "id"), number, "a whole number")
+    if value.get("action") == "delete" or value.get("visible") is False:
+        return
+    element = OsmElement(kind, number, _parse_json_tags(file, value, at))
+    if kind == "node":
+        longitude, latitude = _parse_json_point(file, value, at)
+        data.add_node(number, longitude, latitude)
+    elif kind == "way":
+        element.members = _parse_json_nodes(data, file, value, at)
+    else:
+        element.members = _parse_json_ways(data, file, value, at)
+    data.add_element(element)
+
+
+def _parse_json_tags(file: JsonFile, value: dict[str, Any], at: JsonPath) -> dict[str, str]:
+    tags = value.get("tags", {})
+    if not isinstance(tags, dict):
+        raise file.build_error((*at, "tags"), tags, "an object")
+    return {key: text for key, text in tags.items() if key in USED_TAGS and isinstance(text, str)}
+
+
+def _parse_json_point(file: JsonFile, value: Any, at: JsonPath) -> tuple[float, float]:
+    if not isinstance(value, dict):
+        raise file.build_error(at, value, "lat and lon")
+    for key, limit in (("lon", 360.0), ("lat", 90.0)):
+        degrees = value.get(key)
+        if not is_number(degrees) or not abs(degrees) <= limit:  # type: ignore[arg-type]
+            raise file.build_error((*at, key), degrees, "degrees")
+    return float(value["lon"]), float(value["lat"])
+
+
+def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], at: JsonPath) -> list[int]:
+    """Return the numbers of the nodes of a way, which may contain their positions (``out geom``)."""
+    numbers = value.get("nodes", [])
+    if not isinstance(numbers, list) or not all(type(number) is int for number in numbers):
+        raise file.build_error((*at, "nodes"), numbers, "a list of whole numbers")
+    if "geometry" not in value:
+        return numbers
+    line = _parse_json_line(file, value["geometry"], (*at, "geometry"))
+    if len(line) != len(numbers):
+        return data.add_line(line)
+    for number, point in zip(numbers, line, strict=True):
+        if point is not None and not data.has_node(number):
+            longitude, latitude = point
+            data.add_node(number, longitude, latitude)
+    return numbers
+
+
+def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], at: JsonPath) -> list[int]:
+    """Return the numbers of the ways of a relation, and add those that it contains itself (``out geom``)."""
+    members = value.get("members", [])
+    if not isinstance(members, list):
+        raise file.build_error((*at, "members"), members, "a list of members")
+    numbers = []
+    for k, member in enumerate(members):
+        place = (*at, "members", k)
+        if not isinstance(member, dict):
+            raise file.build_error(place, member, "a member of a relation")
+        if member.get("type") != "way":
+            continue
+        number = member.get("ref")
+        if type(number) is not int:
+            raise file.build_error((*place, "ref"), number, "a whole number")
+        numbers.append(number)
+        if "geometry" in member and number not in data.ways:
+            line = _parse_json_line(file, member["geometry"], (*place, "geometry"))
+            data.add_element(OsmElement("way", number, members=data.add_line(line)))
+    return numbers
+
+
+def _parse_json_line(file: JsonFile, value: Any, at: JsonPath) -> list[tuple[float, float] | None]:
+    """Return the points of a line; points beyond the box of a query are null, hence None."""
+    if not isinstance(value, list):
+        raise file.build_error(at, value, "a list of lat and lon")
+    line: list[tuple[float, float] | None] = []
+    for k, point in enumerate(value):
+        line.append(None if point is None else _parse_json_point(file, point, (*at, k)))
+    return line
+
+
+def _parse_bounds(value: Mapping[str, Any]) -> tuple[float, float, float, float]:
+    west = _parse_degrees(value, "minlon")
+    south = _parse_degrees(value, "minlat")
+    east = _parse_degrees(value, "maxlon")
+    north = _parse_degrees(value, "maxlat")
+    return west, south, east, north
+
+
+def _parse_degrees(value: Mapping[str, Any], key: str) -> float:
+    """Return a longitude or latitude; raise ValueError if it is wrong, KeyError if it is missing."""
+    degrees = float(value[key])
+    limit = 90.0 if key.endswith("lat") else 360.0
+    if not abs(degrees) <= limit:
+        raise ValueError(f"{key}: expected degrees, got {quote(value[key])}")
+    return degrees

@@ -1,0 +1,1 @@
+"""Cells of grids: as free space (`grid_map`, `vectorize`), and the free space as cells (`rasterize`)."""

@@ -1,0 +1,181 @@
+"""Grids of free, blocked and unknown cells as foreign maps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely import Polygon
+
+from robocov.arrays import Array, BoolArray
+from robocov.environment import Point
+from robocov.errors import MapError
+from robocov_app.formats.files import require_coordinate
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.cells.vectorize import count_polygon_vertices, outline_cells
+from robocov_app.formats.reports import format_area
+
+Cells: TypeAlias = NDArray[np.uint8]
+"""`FREE`, `BLOCKED` or `UNKNOWN`, (rows, columns), the top row first."""
+Meaning: TypeAlias = Literal["obstacle", "free", "cut"]
+"""What unknown cells are; with "cut" the map ends around the known ones."""
+FREE = 0
+BLOCKED = 1
+UNKNOWN = 2
+RIM = 2
+"""Thickness, in cells, of the solid rim around the known cells if a map is cut to them."""
+_WITH_CORNERS = np.ones((3, 3), dtype=bool)
+"""Known cells that touch at a corner are connected."""
+
+
+@dataclass(frozen=True)
+class GridFrame:
+    """The position of a grid on the map.
+
+    Attributes
+    ----------
+    cell : float, m
+        Side of a cell.
+    origin : (x, y), m
+        Lower left corner of the grid.
+    yaw : float, rad
+        Angle by which the grid is turned around that corner.
+    """
+
+    cell: float
+    origin: Point = (0.0, 0.0)
+    yaw: float = 0.0
+
+    def place(self, points: Array) -> Array:
+        """Return positions in the grid, (n, 2) in cells from its lower left corner, on the map, m."""
+        x, y = (points * self.cell).T
+        if self.yaw:
+            cos = math.cos(self.yaw)
+            sin = math.sin(self.yaw)
+            x, y = x * cos - y * sin, x * sin + y * cos
+        return np.column_stack([x + self.origin[0], y + self.origin[1]])
+
+
+def build_grid_map(
+    cells: Cells,
+    frame: GridFrame,
+    where: str,
+    *,
+    name: str,
+    description: str,
+    unknown: Meaning = "obstacle",
+    unknown_name: str = "unknown",
+    noise_cells: float = 0.0,
+    repaired: tuple[str, ...] = (),
+    notes: tuple[str, ...] = (),
+) -> ForeignMap:
+    """Build a map from the cells of a grid.
+
+    Parameters
+    ----------
+    cells : (rows, columns) array
+    frame : GridFrame
+    where : str
+        The file, for messages.
+    name, description : str
+    unknown : "obstacle", "free" or "cut"
+        What unknown cells are; with "cut" the map ends around the known ones.
+    unknown_name : str
+        What the report calls unknown cells.
+    noise_cells : float
+        Obstacles of fewer cells are noise.
+    repaired, notes : tuple of str
+        Lines for the import report.
+
+    Raises
+    ------
+    MapError
+        If no cell is free, if the outline has too many vertices, or if a coordinate is out of range.
+    """
+    _require_coordinates(cells, frame, where)
+    # Rows from the bottom, as the y axis.
+    upward = cells[::-1]
+    free = upward == FREE
+    if unknown == "free":
+        free |= upward == UNKNOWN
+    has_unknown_cells = bool((cells == UNKNOWN).any())
+    if not free.any():
+        hint = f" (--unknown free takes {unknown_name} cells as free)" if has_unknown_cells else ""
+        raise MapError(f"{where}: no cell is free{hint}")
+    boundary = None
+    dropped: tuple[str, ...] = ()
+    if unknown == "cut" and has_unknown_cells:
+        main = _find_main_island(upward != UNKNOWN, free)
+        dropped = _describe_lost_cells(free & ~main, frame.cell)
+        free &= main
+        boundary = _build_rim(main, frame, where)
+    outline = outline_cells(free, frame.place, where)
+    return ForeignMap(
+        name=name,
+        description=description,
+        free=outline,
+        boundary=boundary,
+        vertices_read=count_polygon_vertices(outline),
+        cell=frame.cell,
+        specks=noise_cells * frame.cell * frame.cell,
+        repaired=repaired,
+        dropped=dropped,
+        notes=(*notes, _describe_cells(cells, frame.cell, unknown, unknown_name)),
+    )
+
+
+def _require_coordinates(cells: Cells, frame: GridFrame, where: str) -> None:
+    """Raise MapError if a corner of the grid is too far away for a map."""
+    rows, columns = cells.shape
+    corners = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float)
+    for value in frame.place(corners).ravel().tolist():
+        require_coordinate(value, f"{where}: a corner of the grid")
+
+
+def _describe_cells(cells: Cells, cell: float, unknown: Meaning, unknown_name: str) -> str:
+    """Return the line of the import report about the cells."""
+    rows, columns = cells.shape
+    free = _format_share(int(np.count_nonzero(cells == FREE)), cells.size)
+    blocked = _format_share(int(np.count_nonzero(cells == BLOCKED)), cells.size)
+    line = f"{columns} x {rows} cells of {cell:.6g} m: {free} free, {blocked} blocked"
+    unknown_count = int(np.count_nonzero(cells == UNKNOWN))
+    if not unknown_count:
+        return line
+    meaning = {"obstacle": "taken as obstacles", "free": "taken as free", "cut": "cut away"}[unknown]
+    return f"{line}, {_format_share(unknown_count, cells.size)} {unknown_name}, {meaning}"
+
+
+def _format_share(number: int, total: int) -> str:
+    """Return a share of the cells in percent, never rounded to none or all."""
+    share = 100 * number / total
+    if 0.0 < share < 0.1:
+        return "<0.1 %"
+    if 99.9 < share < 100.0:
+        return ">99.9 %"
+    return f"{share:.3g} %"
+
+
+def _find_main_island(known: BoolArray, free: BoolArray) -> BoolArray:
+    """Return the connected known cells with the most free ones."""
+    island, count = ndimage.label(known, structure=_WITH_CORNERS)
+    free_counts = np.bincount(island[free], minlength=count + 1)
+    return np.asarray(island == int(free_counts.argmax()))
+
+
+def _describe_lost_cells(lost: BoolArray, cell: float) -> tuple[str, ...]:
+    """Return the line of the import report about free cells that are not in the map, if there are any."""
+    count = int(np.count_nonzero(lost))
+    if not count:
+        return ()
+    return (f"{format_area(count * cell * cell, 3)} of free space on other islands of known cells",)
+
+
+def _build_rim(known: BoolArray, frame: GridFrame, where: str) -> Polygon:
+    """Return the outline of known cells and a rim around them, without holes, m."""
+    wide = ndimage.binary_dilation(np.pad(known, RIM), structure=_WITH_CORNERS, iterations=RIM)
+    outline = outline_cells(wide, lambda points: frame.place(points - RIM), where)
+    return Polygon(outline.geoms[0].exterior)

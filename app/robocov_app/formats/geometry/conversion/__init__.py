@@ -1,0 +1,1 @@
+"""Conversion of foreign maps to an `environment`: cleaning, boundary and obstacles, starts."""

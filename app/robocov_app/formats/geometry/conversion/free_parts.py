@@ -1,0 +1,246 @@
+"""The connected parts of a free space: which of them stay, and which obstacles in them are noise."""
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
+
+from robocov.arrays import BoolArray
+from robocov.errors import MapError, format_count
+from robocov_app.formats.geometry.conversion.shaping import Conversion
+from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2
+from robocov_app.formats.geometry.crossings import extract_sides
+from robocov_app.formats.reports import format_area
+
+MAX_FILE_ROBOTS = 1000
+"""Number of robots of a file that are considered."""
+_TINY_AREA_M2 = 0.01
+_MANY_TINY_OBSTACLES = 10
+"""As many obstacles smaller than `_TINY_AREA_M2` are probably noise, which the report mentions."""
+_MIN_KEPT_SHARE = 0.5
+"""If less of the free area stays, the report offers other parts."""
+_LARGE_PART_SHARE = 0.1
+"""If a dropped part has more of the free area, the report offers it, too."""
+_MAX_OFFERED_PARTS = 3
+_MIN_PAGE_EDGE_SHARE = 0.2
+"""The largest part may be the paper around a plan if it runs along as much of the edge of the page."""
+_MIN_PLAN_SHARE = 0.05
+"""A plan is at least as large, as a fraction of the paper; a smaller part is the inside of an obstacle."""
+_HOLLOW_SHARE = 0.1
+"""Fraction of the page of the bounding box of an obstacle that may be the walls of a plan."""
+_MAX_HOLLOW_FILL = 0.5
+"""Such an obstacle fills at most this fraction of its bounding box."""
+
+
+class PartSelection(NamedTuple):
+    """The parts of a free space that stay.
+
+    Attributes
+    ----------
+    parts : list of Polygon, m
+    others : tuple of (x, y), m
+        A position in each large part that was dropped, as the option ``inside`` takes it.
+    is_enclosed : bool
+        Whether an enclosed part stays instead of the largest one, which is the paper around a plan.
+    """
+
+    parts: list[Polygon]
+    others: tuple[tuple[float, float], ...] = ()
+    is_enclosed: bool = False
+
+
+def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
+    """Select the parts of a free space that stay, and report the others.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+        The largest part first.
+    conversion : Conversion
+
+    Returns
+    -------
+    PartSelection
+
+    Raises
+    ------
+    MapError
+        If the position of the option ``inside`` is solid, or if no part is large enough.
+    """
+    parts = np.array(free.geoms, dtype=object)
+    area = shapely.area(parts)
+    is_enclosed = False
+    if conversion.shaping.keep == "all":
+        min_area = max(conversion.min_obstacle_area, min(MAX_CRUMB_M2, area[0]))
+        stays = area >= min_area
+    elif conversion.shaping.inside is not None:
+        stays = np.arange(len(parts)) == _find_part_at(conversion.shaping.inside, parts, conversion.where)
+    else:
+        index = _find_enclosed_part(parts, conversion)
+        is_enclosed = index is not None
+        if index is None:
+            index = _find_main_part(parts, conversion)
+        stays = np.arange(len(parts)) == index
+    kept: list[Polygon] = parts[stays].tolist()
+    if not kept:
+        largest = f"no part of the free space is larger than {area[0]:.3g} m²"
+        min_size = f"{conversion.min_obstacle_area:g} m²"
+        raise MapError(f"{conversion.where}: {largest}, expected one of at least {min_size}")
+    others = _report_dropped_parts(parts, stays, conversion)
+    if len(kept) > 1:
+        conversion.notes.append(
+            f"the free space is of {len(kept)} separate parts: robots cannot pass between them"
+        )
+    return PartSelection(kept, others, is_enclosed)
+
+
+def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
+    """Fill the holes of parts that are too small to be obstacles, and report them."""
+    cell = conversion.foreign.cell
+    min_area = conversion.min_obstacle_area
+    max_crumb = MAX_CRUMB_M2 if cell is None else min(MAX_CRUMB_M2, cell * cell / 2)
+    result = []
+    specks: list[Polygon] = []
+    crumbs: list[Polygon] = []
+    tiny_count = 0
+    for part in parts:
+        holes = np.array([Polygon(hole) for hole in part.interiors], dtype=object)
+        area = shapely.area(holes)
+        specks += holes[(area < min_area) & (area >= max_crumb)].tolist()
+        crumbs += holes[area < max_crumb].tolist()
+        stays = area >= max(max_crumb, min_area)
+        tiny_count += int(np.count_nonzero(stays & (area < _TINY_AREA_M2)))
+        rings = shapely.get_exterior_ring(holes[stays]).tolist()
+        result.append(part if stays.all() else Polygon(part.exterior, rings))
+    if specks:
+        count = f"{format_count(len(specks), 'obstacle')} smaller than {min_area:.3g} m²"
+        conversion.dropped.append(f"{count}, {_format_total_area(specks)} (--specks 0 keeps them)")
+    if crumbs:
+        count = format_count(len(crumbs), "hole")
+        conversion.dropped.append(f"{count} of {_format_total_area(crumbs)}, which come of rounding")
+    if tiny_count >= _MANY_TINY_OBSTACLES and min_area < _TINY_AREA_M2:
+        conversion.notes.append(
+            f"{tiny_count} obstacles are smaller than {_TINY_AREA_M2:g} m² "
+            f"(--specks {_TINY_AREA_M2:g} drops them)"
+        )
+    return result
+
+
+def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], where: str) -> int:
+    """Return the index of the part that contains a position; MapError if none does."""
+    distance = shapely.distance(parts, shapely.Point(position))
+    nearest = int(np.argmin(distance))
+    if distance[nearest] > 0.0:
+        x, y = position
+        free_x, free_y = _choose_position_in(parts[nearest])
+        raise MapError(
+            f"{where}: inside: {x:.10g} {y:.10g} is solid, expected a free position; "
+            f"{free_x:.10g} {free_y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
+        )
+    return nearest
+
+
+def _find_main_part(parts: NDArray[np.object_], conversion: Conversion) -> int:
+    """Return the index of the part with most of the file's robots, or of the largest part."""
+    robots = conversion.foreign.robots[:MAX_FILE_ROBOTS]
+    if not robots:
+        return 0
+    shapely.prepare(parts)
+    positions = shapely.points(np.array(robots).reshape(-1, 2))
+    index = int(np.argmax([shapely.contains(part, positions).sum() for part in parts]))
+    if index:
+        conversion.notes.append("the part of the free space with most robots stays, which is not the largest")
+    return index
+
+
+def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> int | None:
+    """Return the index of the largest enclosed part if the largest part is the paper around a plan."""
+    page = conversion.foreign.page
+    if page is None or conversion.foreign.robots:
+        return None
+    edge_lengths = [_measure_length_along(part, page) for part in parts]
+    edge_share = edge_lengths[0] / page.length
+    if edge_share < _MIN_PAGE_EDGE_SHARE:
+        return None
+    largest = parts[0]
+    edge = f"{100 * edge_share:.0f} % of the edge of the picture"
+    paper = f"{format_area(largest.area, 3)}, runs along {edge}"
+    enclosed = [k for k, length in enumerate(edge_lengths) if length == 0.0]
+    if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:
+        x, y = _choose_position_in(largest)
+        conversion.notes.append(
+            f"the largest part of the free space, {paper}: taken as the paper around a plan, of which "
+            f"the largest enclosed part stays (--inside {x:.10g} {y:.10g}: the part along the edge)"
+        )
+        return enclosed[0]
+    if _has_hollow_obstacle(largest, _HOLLOW_SHARE * page.area):
+        conversion.notes.append(
+            f"the largest part of the free space, {paper}: if that is the paper around a plan, an outer "
+            "door may be open"
+        )
+    return None
+
+
+def _report_dropped_parts(
+    parts: NDArray[np.object_], stays: BoolArray, conversion: Conversion
+) -> tuple[tuple[float, float], ...]:
+    """Report the parts that do not stay; return a position in each one that the report offers."""
+    dropped: list[Polygon] = parts[~stays].tolist()
+    if not dropped:
+        return ()
+    largest = ""
+    if len(dropped) > 1:
+        largest = f" (the largest {format_area(dropped[0].area, 3)})"
+    count = format_count(len(dropped), "separate part")
+    conversion.dropped.append(f"{count} of the free space, {_format_total_area(dropped)}{largest}")
+    area = shapely.area(parts)
+    share = area[stays].sum() / area.sum()
+    if share >= _MIN_KEPT_SHARE and dropped[0].area / area.sum() <= _LARGE_PART_SHARE:
+        return ()
+    offered = dropped[:_MAX_OFFERED_PARTS]
+    positions = tuple(_choose_position_in(part) for part in offered)
+    choices = [
+        f"--inside {x:.10g} {y:.10g} ({format_area(part.area, 3)})"
+        for (x, y), part in zip(positions, offered, strict=True)
+    ]
+    only = "only " if share < _MIN_KEPT_SHARE else ""
+    conversion.notes.append(
+        f"{only}{100 * share:.2g} % of the free area stays: {' or '.join(choices)} keeps another part, "
+        "--keep all every part"
+    )
+    return positions
+
+
+def _has_hollow_obstacle(part: Polygon, min_box_area: float) -> bool:
+    """Return whether a hole of a part fills little of its bounding box, of at least that area in m²."""
+    holes = shapely.polygons(shapely.get_rings(part)[1:])
+    low_x, low_y, high_x, high_y = shapely.bounds(holes).reshape(-1, 4).T
+    box_areas = (high_x - low_x) * (high_y - low_y)
+    is_hollow = (box_areas >= min_box_area) & (shapely.area(holes) < _MAX_HOLLOW_FILL * box_areas)
+    return bool(is_hollow.any())
+
+
+def _measure_length_along(part: Polygon, page: Polygon) -> float:
+    """Measure how much of the outline of a part runs along the edge of a page, an upright rectangle, m."""
+    sides = extract_sides(part)
+    low_x, low_y, high_x, high_y = page.bounds
+    slack = 1e-6 * max(high_x - low_x, high_y - low_y)
+    length = np.hypot(*(sides[:, 1] - sides[:, 0]).T)
+    total = 0.0
+    for axis, edge in ((0, low_x), (0, high_x), (1, low_y), (1, high_y)):
+        is_on_edge = (np.abs(sides[:, :, axis] - edge) <= slack).all(axis=1)
+        total += float(length[is_on_edge].sum())
+    return total
+
+
+def _choose_position_in(part: Polygon) -> tuple[float, float]:
+    """Return a position in a part, to the centimeter."""
+    point = shapely.point_on_surface(part)
+    return round(point.x, 2) + 0.0, round(point.y, 2) + 0.0
+
+
+def _format_total_area(parts: list[Polygon]) -> str:
+    together = " together" if len(parts) > 1 else ""
+    return f"{format_area(sum(part.area for part in parts), 3)}{together}"

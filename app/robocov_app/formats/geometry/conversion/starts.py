@@ -1,0 +1,161 @@
+"""Positions at which robots can start: rooms, the roomiest point, and the starts of a converted map."""
+
+import math
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon, STRtree
+
+from robocov.arrays import Array
+from robocov.environment import MIN_START_GAP_RADII, DiscStart, PointsStart, StartSpec, UniformStart
+from robocov.errors import MapError, format_count
+from robocov_app.formats.geometry.conversion.free_parts import MAX_FILE_ROBOTS
+from robocov_app.formats.geometry.conversion.shaping import Conversion
+from robocov_app.formats.geometry.crossings import extract_sides
+from robocov_app.formats.geometry.simplification.narrow_gaps import count_ray_crossings
+
+_MAX_SQUARES = 1024
+"""Number of squares of each size that the search for the roomiest point subdivides."""
+_MAX_RAY_CROSSINGS = 5_000_000
+_QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
+_MAX_DISC_RADIUS_M = 2.0
+_MIN_DISC_RADIUS_M = 0.02
+
+
+def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
+    """Find the regions in which the center of a robot can move, without tiny ones.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+    radius : float, m
+        Radius of the robot.
+
+    Returns
+    -------
+    list of Polygon, m
+        A robot cannot move from one to another.
+    """
+    inner = free.buffer(-radius, quad_segs=4)
+    return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
+
+
+def find_roomiest_point(
+    free: Polygon, tolerance: float, sufficient: float = math.inf
+) -> tuple[tuple[float, float], float]:
+    """Find the point that is farthest from all walls.
+
+    Parameters
+    ----------
+    free : Polygon, m
+    tolerance : float, m
+        Another point may be farther from the walls by this much.
+    sufficient : float, m
+        The search ends at the first point that is as far from the walls.
+
+    Returns
+    -------
+    point : (float, float), m
+    distance : float, m
+        Distance to the nearest wall.
+
+    Notes
+    -----
+    Squares that may contain a better point are divided into four, the most promising `_MAX_SQUARES` of them.
+    """
+    sides = shapely.linestrings(extract_sides(free))
+    walls = STRtree(sides)
+    shapely.prepare(free)
+    max_squares = _limit_squares(free, sides)
+    centers, side = _cover_with_squares(free, max_squares)
+    point = centers[0]
+    best = -math.inf
+    while len(centers) and best < sufficient:
+        _, distance = walls.query_nearest(shapely.points(centers), return_distance=True, all_matches=False)
+        distance = np.where(shapely.contains_xy(free, *centers.T), distance, -distance)
+        if distance.max() > best:
+            best = float(distance.max())
+            point = centers[distance.argmax()]
+        reachable = distance + side * math.sqrt(0.5)
+        order = np.argsort(-reachable, kind="stable")[:max_squares]
+        required = best + tolerance
+        if sufficient != math.inf:
+            required = max(required, sufficient)
+        centers = centers[order[reachable[order] > required]]
+        side /= 2
+        centers = (centers[:, None] + side / 2 * _QUARTERS).reshape(-1, 2)
+    return (float(point[0]), float(point[1])), best
+
+
+def _limit_squares(free: Polygon, sides: Array) -> int:
+    """Return a number of squares whose centers are soon known to be inside or outside."""
+    _, low_y, _, high_y = free.bounds
+    crossings = count_ray_crossings(sides, np.linspace(low_y, high_y, _MAX_SQUARES))
+    return max(min(_MAX_SQUARES, _MAX_SQUARES * _MAX_RAY_CROSSINGS // max(crossings, 1)), 16)
+
+
+def _cover_with_squares(free: Polygon, max_squares: int) -> tuple[Array, float]:
+    """Return the centers, (n, 2) m, and the side, m, of squares that cover the bounding box of a polygon."""
+    low_x, low_y, high_x, high_y = free.bounds
+    width = high_x - low_x
+    height = high_y - low_y
+    side = max(min(width, height), max(width, height) / max_squares)
+    corners = np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side))
+    return np.stack(corners, axis=-1).reshape(-1, 2) + side / 2, side
+
+
+def require_room(parts: list[Polygon], conversion: Conversion) -> None:
+    """Raise MapError if no part of the free space is wide enough for a robot to start in."""
+    clearance = conversion.clearance
+    widest = 0.0
+    for part in parts:
+        if math.sqrt(part.area / math.pi) > widest:
+            _, distance = find_roomiest_point(part, clearance / 50, clearance)
+            widest = max(widest, distance)
+        if widest >= clearance:
+            return
+    radius = clearance / (1 + MIN_START_GAP_RADII)
+    max_radius = widest / (1 + MIN_START_GAP_RADII)
+    reason = f"no place is wide enough for a robot of radius {radius:g} m"
+    raise MapError(
+        f"{conversion.where}: {reason} (the widest is for one of {max_radius:.3g} m): is the scale right?"
+    )
+
+
+def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartSpec]:
+    """Build the starts of a map: a disc around the roomiest point, anywhere, and the robots of the file."""
+    part = free.geoms[0]
+    # A finer tolerance would hardly move the start.
+    (x, y), distance = find_roomiest_point(part, max(0.01, math.sqrt(part.area) / 500))
+    # The disc contains the centers of robots: the radius of one stays between it and the walls.
+    radius = min(distance - conversion.clearance, _MAX_DISC_RADIUS_M)
+    uniform = UniformStart()
+    starts: dict[str, StartSpec] = {"uniform": uniform}
+    if radius >= _MIN_DISC_RADIUS_M:
+        disc = DiscStart((round(x, 2) + 0.0, round(y, 2) + 0.0), math.floor(100 * radius) / 100)
+        # The first start of a map is its default.
+        if conversion.shaping.default_start == "room":
+            starts = {"room": disc, "uniform": uniform}
+        else:
+            starts = {"uniform": uniform, "room": disc}
+    if conversion.foreign.robots:
+        positions = _choose_robot_positions(free, conversion)
+        if len(positions):
+            starts["robots"] = PointsStart(tuple((x, y) for x, y in positions.tolist()))
+    return starts
+
+
+def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> Array:
+    """Return those positions of the file's robots that are free and apart from each other, (n, 2) m."""
+    robots = conversion.foreign.robots
+    clearance = conversion.clearance
+    positions = np.array(list(dict.fromkeys(robots))[:MAX_FILE_ROBOTS])
+    fits = shapely.contains_properly(free, shapely.points(positions))
+    fits &= shapely.distance(free.boundary, shapely.points(positions)) >= clearance
+    for k in np.flatnonzero(fits).tolist():
+        previous = positions[:k][fits[:k]]
+        fits[k] = (np.hypot(*(previous - positions[k]).T) >= 2 * clearance).all()
+    rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
+    count = f"{int(fits.sum())} of {format_count(len(robots), 'place')}"
+    conversion.notes.append(f'start "robots": {count} of robots in the file{rest}')
+    return np.asarray(positions[fits])

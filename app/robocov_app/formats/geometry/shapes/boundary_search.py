@@ -1,0 +1,236 @@
+"""Search for the boundary of a drawing: by its name, by what lies in it, or around everything."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.errors import MapError, quote
+from robocov_app.formats.geometry.polygons import to_multipolygon
+from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
+from robocov_app.formats.geometry.shapes.shape_types import BOUNDARY, ClosedOutline
+from robocov_app.formats.geometry.shapes.snapping import (
+    are_edge_to_edge,
+    close_gaps,
+    join_line_ends,
+    union_on_grid,
+)
+
+DEFAULT_AROUND_M = 1.0
+"""Distance from the shapes to the rectangle around them."""
+_MAJORITY = 0.5
+"""A boundary contains more of the other shapes; walls that are a boundary leave as much of it open."""
+_MAX_AREA_RATIO = 0.999
+"""Two outlines with a higher ratio of their areas are the same; neither lies in the other."""
+
+
+def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary | None:
+    """Find the boundary of a drawing by its format, by its name, or by what lies in it.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    solid, overlap : bool
+        See `interpretation.interpret`.
+
+    Returns
+    -------
+    Boundary or None
+
+    Raises
+    ------
+    MapError
+        If the user names a boundary that encloses nothing.
+    """
+    if drawing.world is not None:
+        return Boundary(drawing.world)
+    named = _find_named_boundary(drawing)
+    meaning = drawing.options.outlines
+    if named is not None or meaning in ("free", "nested") or not drawing.outlines:
+        return named
+    if meaning == "solid" or solid:
+        return _find_largest_outline(drawing)
+    if overlap:
+        return _find_covering_outline(drawing)
+    return _find_outermost_outlines(drawing)
+
+
+def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozenset()) -> Boundary:
+    """Find the outer edge of the walls of a drawing, else build a rectangle around everything.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    floors : frozenset of ClosedOutline
+        Outlines that are no walls.
+
+    Returns
+    -------
+    Boundary
+    """
+    enclosed = _find_outer_edge(drawing, floors)
+    if enclosed is not None:
+        source = f"the outer edge of the walls, around {enclosed.area:.4g} m²"
+        return Boundary(MultiPolygon([enclosed]), source)
+    around = DEFAULT_AROUND_M if drawing.options.around is None else drawing.options.around
+    everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
+    x, y, right, top = shapely.total_bounds(everything)
+    box = shapely.box(x - around, y - around, right + around, top + around)
+    source = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
+    return Boundary(MultiPolygon([box]), source, is_guess=True)
+
+
+def _find_outer_edge(drawing: Drawing, floors: frozenset[ClosedOutline]) -> Polygon | None:
+    """Return what the walls of a drawing enclose, if that is mostly open and contains most of them."""
+    edges = [edge for outline in drawing.outlines if outline in floors for edge in outline.edges]
+    lines = [line for line in (*drawing.lines, *edges) if line.role != "free"]
+    areas = [outline.area for outline in drawing.outlines if outline not in floors]
+    solid = _unite_exactly([*areas, *(line.solid for line in lines)])
+    if solid.is_empty:  # Everything is thinner than the grid.
+        return None
+    filled_parts = [Polygon(part.exterior) for part in solid.geoms]
+    largest = int(np.argmax([part.area for part in filled_parts]))
+    filled = filled_parts[largest]
+    is_open = solid.geoms[largest].area <= (1.0 - _MAJORITY) * filled.area
+    if is_open and _contains_most(filled, list(solid.geoms)):
+        return filled
+    return None
+
+
+def _find_named_boundary(drawing: Drawing) -> Boundary | None:
+    """Return what is called the boundary; MapError if the user names one that encloses nothing."""
+    given_name = drawing.options.boundary
+    name = given_name or BOUNDARY
+    outlines = frozenset(each for each in drawing.outlines if _has_label(each.labels, name))
+    lines = frozenset(each for each in drawing.lines if _has_label(each.labels, name))
+    # In the order of the file, as the order of a set differs from run to run.
+    paths = [LineString(line.points) for line in drawing.lines if line in lines]
+    noded = shapely.union_all(join_line_ends(paths, drawing.snap))
+    rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    areas = [outline.area for outline in drawing.outlines if outline in outlines]
+    area = _unite_exactly([*areas, shapely.union_all(rooms)])
+    if not area.is_empty:
+        return Boundary(area, f"what is called {quote(name)}", outlines, lines, is_named=True)
+    if given_name is not None:
+        reason = "encloses no area, expected a closed outline"
+        raise MapError(f"{drawing.where}: boundary {quote(given_name)}: {reason}")
+    return None
+
+
+def _has_label(labels: Sequence[str], name: str) -> bool:
+    return name.casefold() in map(str.casefold, labels)
+
+
+def _find_largest_outline(drawing: Drawing) -> Boundary | None:
+    """Return the largest outline, and what continues it, if most other shapes lie in it."""
+    largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
+    # Walls drawn as a single shape have rooms as holes.
+    if largest.area.area < _MAJORITY * largest.filled_area:
+        return None
+    members = _find_continuation(drawing, largest)
+    inner = [outline.area for outline in drawing.outlines if outline not in members]
+    inner += [*drawing.paths, *(pillar.polygon for pillar in drawing.pillars)]
+    if not inner and len(members) > 1:
+        return None
+    boundary = _join_outlines(drawing, largest, members)
+    if inner and not _contains_most(boundary.area, inner):
+        return None
+    return boundary
+
+
+def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOutline]:
+    """Return the largest outline, other parts of its geometry, and adjacent outlines that contain others."""
+    outlines = np.array(drawing.outlines, dtype=object)
+    areas = np.array(drawing.areas, dtype=object)
+    tree = STRtree(areas)
+    containers = _find_containers(areas, tree)
+    members = {largest}
+    fresh = [largest]
+    while fresh:
+        current = fresh.pop()
+        near = np.sort(tree.query(current.area, "dwithin", distance=drawing.snap))
+        for k in near.tolist():
+            other: ClosedOutline = outlines[k]
+            belongs = k in containers or (other.whole != "" and other.whole == largest.whole)
+            if other in members or not belongs:
+                continue
+            if are_edge_to_edge(current.area, other.area, drawing.snap):
+                members.add(other)
+                fresh.append(other)
+    return members
+
+
+def _find_containers(areas: Array, tree: STRtree) -> set[int]:
+    """Return which areas another area lies in."""
+    inner, outer = _find_nested_pairs(areas, tree)
+    return set(outer[inner != outer].tolist())
+
+
+def _find_nested_pairs(areas: Array, tree: STRtree) -> tuple[Array, Array]:
+    """Return the indices of pairs of areas; most of the first lies in the larger second."""
+    inner, outer = tree.query(areas, "intersects")
+    size = shapely.area(areas)
+    is_smaller = size[inner] < _MAX_AREA_RATIO * size[outer]
+    inner = inner[is_smaller]
+    outer = outer[is_smaller]
+    shared = shapely.area(shapely.intersection(areas[inner], areas[outer]))
+    is_nested = shared > _MAJORITY * size[inner]
+    return inner[is_nested], outer[is_nested]
+
+
+def _find_covering_outline(drawing: Drawing) -> Boundary | None:
+    """Return the largest outline if all others lie wholly in it."""
+    largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
+    members = {each for each in drawing.outlines if each.whole != "" and each.whole == largest.whole}
+    if len(members) == len(drawing.outlines):
+        members = set()
+    members.add(largest)
+    inner = [outline.area for outline in drawing.outlines if outline not in members]
+    boundary = _join_outlines(drawing, largest, members)
+    return boundary if shapely.covers(boundary.area, inner).all() else None
+
+
+def _find_outermost_outlines(drawing: Drawing) -> Boundary | None:
+    """Return the outlines that do not lie in a larger one, if any other does or if there is only one."""
+    areas = np.array(drawing.areas, dtype=object)
+    inner, _ = _find_nested_pairs(areas, STRtree(areas))
+    is_inner = np.zeros(len(areas), dtype=bool)
+    is_inner[inner] = True
+    if not is_inner.any() and len(areas) > 1:
+        return None
+    members = set(np.array(drawing.outlines, dtype=object)[~is_inner])
+    largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
+    return _join_outlines(drawing, largest, members)
+
+
+def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[ClosedOutline]) -> Boundary:
+    """Return a boundary of several outlines, one of which is the largest, or of that one alone."""
+    if len(members) == 1:
+        source = "the only closed outline"
+        if len(drawing.outlines) > 1:
+            name = f", {quote(largest.labels[0])}," if largest.labels else ""
+            source = f"the largest closed outline{name} of {largest.filled_area:.4g} m²"
+        return Boundary(largest.area, source, frozenset(members))
+    # In the order of the file, as the order of a set differs from run to run.
+    areas = [outline.area for outline in drawing.outlines if outline in members]
+    joined = close_gaps(areas, drawing.snap)
+    source = f"{len(members)} closed outlines that hold the others, together {joined.area.area:.4g} m²"
+    gaps = joined.describe() if joined.number else ""
+    return Boundary(joined.area, source, frozenset(members), gaps=gaps)
+
+
+def _contains_most(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
+    """Return whether most of the inner shapes lie in the outer one, each judged by one point on it."""
+    shapely.prepare(outer)
+    return bool(shapely.covers(outer, shapely.point_on_surface(inner)).mean() > _MAJORITY)
+
+
+def _unite_exactly(areas: Sequence[BaseGeometry]) -> MultiPolygon:
+    """Return the union of areas; a single one stays exactly as it is."""
+    areas = [area for area in areas if not area.is_empty]
+    if len(areas) == 1:
+        return to_multipolygon(areas[0])
+    return union_on_grid(areas)

@@ -1,0 +1,377 @@
+"""Collection of the shapes that a reader finds in a file, and the map that they stand for."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError
+from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
+from robocov_app.formats import files
+from robocov_app.formats.colors import UNPAINTED, ColorKey, Paint, count_colors, name_color
+from robocov_app.formats.foreign_map import ForeignMap, Painted
+from robocov_app.formats.geometry.crossings import CrossingCounter
+from robocov_app.formats.geometry.shapes.boundary_search import find_surrounding
+from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
+from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
+from robocov_app.formats.geometry.shapes.import_tally import ImportTally
+from robocov_app.formats.geometry.shapes.interpretation import interpret
+from robocov_app.formats.geometry.shapes.label_filter import LabelFilter
+from robocov_app.formats.geometry.shapes.shape_types import (
+    BOUNDARY,
+    ClosedOutline,
+    SourceGeometry,
+    WallLine,
+    get_obstacle_name,
+)
+from robocov_app.formats.options import ReadOptions
+
+__all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
+DEFAULT_THICKNESS_M = 0.1
+"""Width of walls that are drawn as lines without a width."""
+_MAX_RELATIVE_THINNING = 1e-6
+"""Relative width by which rounding may make a shape thinner."""
+_DIGITS = 9
+"""Decimals of coordinates: shapes smaller than a nanometer have no size."""
+
+
+class Shapes:
+    """The shapes of a file, checked, counted, and selected by name.
+
+    Parameters
+    ----------
+    where : str
+        The file, for messages.
+    options : ReadOptions
+
+    Attributes
+    ----------
+    outlines : list of ClosedOutline
+    lines : list of WallLine
+    pillars : list of CircleObstacle
+        Obstacles whatever outlines are.
+    labels : LabelFilter
+    tally : ImportTally
+    vertices : int
+        Number of vertices read.
+    thickness : float, m
+        Width of lines without a width.
+    robots, notes, cell, page
+        See `ForeignMap`.
+    """
+
+    def __init__(self, where: str, options: ReadOptions) -> None:
+        self.where = where
+        self.options = options
+        self.outlines: list[ClosedOutline] = []
+        self.lines: list[WallLine] = []
+        self.pillars: list[CircleObstacle] = []
+        self.labels = LabelFilter(where, options)
+        self.tally = ImportTally()
+        self.vertices = 0
+        self.thickness = DEFAULT_THICKNESS_M if options.thickness is None else options.thickness
+        self.robots: list[tuple[float, float]] = []
+        self.notes: list[str] = []
+        self.cell: float | None = None
+        self.page: Polygon | None = None
+        self._crossings = CrossingCounter(where)
+
+    def accept(self, labels: Iterable[str]) -> bool:
+        """Return whether a shape with these labels is read; else it is counted as left out."""
+        is_accepted = self.labels.accepts(labels)
+        if not is_accepted:
+            self.leave_out("shape", "by the names that were asked for")
+        return is_accepted
+
+    def add_all(self, geometries: Iterable[SourceGeometry]) -> None:
+        """Add geometries whose coordinates are meters, and join their lines."""
+        for geometry in geometries:
+            self.add(geometry)
+        self.join_lines()
+
+    def add(self, geometry: SourceGeometry) -> None:
+        """Add a geometry whose coordinates are meters. Raises MapError if one is out of range."""
+        if not self.accept(geometry.labels):
+            return
+        if geometry.kind == "point":
+            self.add_point(geometry.rings[0][0], geometry.labels, at=geometry.at)
+        elif geometry.kind == "line":
+            width = self.thickness
+            if geometry.width and self.options.thickness is None:
+                width = geometry.width
+            self.add_line(WallLine(geometry.rings[0], width, geometry.labels), at=geometry.at)
+        else:
+            self.add_outline(
+                geometry.rings,
+                geometry.labels,
+                rule=geometry.rule,
+                at=geometry.at,
+                whole=geometry.whole,
+            )
+
+    def add_outline(
+        self,
+        rings: Sequence[Array],
+        labels: Sequence[str] = (),
+        *,
+        rule: Rule = "holes",
+        at: str = "",
+        thing: str = "outline",
+        whole: str = "",
+        paint: Paint = UNPAINTED,
+    ) -> bool:
+        """Add the area that rings enclose.
+
+        Parameters
+        ----------
+        rings : sequence of (k, 2) arrays, m
+        labels : sequence of str
+        rule : str
+            See `enclosed_area.find_enclosed_area`.
+        at : str
+            Position in the file, for messages.
+        thing : str
+            What is counted as left out if the rings enclose no area; may be empty.
+        whole : str
+            See `SourceGeometry`.
+        paint : Paint
+
+        Returns
+        -------
+        bool
+            Whether the rings enclose an area.
+        """
+        enclosed = find_enclosed_area(self._check_rings(rings, at), rule, self._crossings)
+        for reason, count in enclosed.lost_holes.items():
+            self.leave_out("hole", reason, count)
+        if enclosed.invalidity is not None:
+            self.tally.add_self_crossing(enclosed.invalidity, at)
+        if enclosed.area.is_empty:
+            if thing:
+                self.leave_out(thing, "without an area")
+            return False
+        self._store_outline(ClosedOutline(enclosed.area, tuple(labels), whole=whole), paint)
+        return True
+
+    def add_circle(
+        self,
+        center: Array,
+        radius: float,
+        labels: Sequence[str] = (),
+        *,
+        at: str = "",
+        paint: Paint = UNPAINTED,
+    ) -> None:
+        """Add a disc with a center, (2,) m, and a radius, m."""
+        self._check_rings([center + np.array([[-radius, -radius], [radius, radius]])], at)
+        circle = CircleObstacle((float(center[0]), float(center[1])), radius, get_obstacle_name(labels))
+        (ring,) = self._check_rings([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
+        self._store_outline(ClosedOutline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
+
+    def _store_outline(self, outline: ClosedOutline, paint: Paint) -> None:
+        self.outlines.append(
+            replace(outline, color=paint.color, role=paint.role, order=self._get_next_order())
+        )
+
+    def _get_next_order(self) -> int:
+        return len(self.outlines) + len(self.lines)
+
+    def add_edges(self, lines: Sequence[WallLine]) -> None:
+        """Add the stroke of the outline that was added last; it counts only if the outline is free."""
+        last = self.outlines[-1]
+        edges = tuple(replace(line, order=last.order) for line in lines)
+        self.outlines[-1] = replace(last, edges=edges)
+
+    def add_line(self, line: WallLine, *, at: str = "") -> None:
+        """Add a wall. Raises MapError if a coordinate or the width is out of range."""
+        (points,) = self._check_rings([line.points], at)
+        width = max(line.width, 0.0)
+        place = ": ".join(filter(None, (self.where, at, "width")))
+        files.require_length(width, place, 0.0)
+        if width < MIN_SIZE_M:
+            self.tally.mended["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
+            width = MIN_SIZE_M
+        if not (points[1:] != points[:-1]).any():
+            self.leave_out("line", "without a length")
+            return
+        self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
+
+    def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
+        """Add a point, (2,) m, which is a pillar if the option ``pillar`` is given."""
+        ((x, y),) = self._check_rings([point[None]], at)[0].tolist()
+        if self.options.pillar is None:
+            self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
+        else:
+            self.pillars.append(CircleObstacle((x, y), self.options.pillar, get_obstacle_name(labels)))
+
+    def join_lines(self) -> None:
+        """Join lines of the same width and labels whose ends meet, so that their corners are whole."""
+        groups: dict[tuple[float, tuple[str, ...]], list[LineString]] = {}
+        for line in self.lines:
+            groups.setdefault((line.width, line.labels), []).append(LineString(line.points))
+        self.lines = []
+        for (width, labels), paths in groups.items():
+            merged = shapely.line_merge(shapely.MultiLineString(paths))
+            for path in shapely.get_parts(merged):
+                self.lines.append(WallLine(np.asarray(path.coords), width, labels))
+
+    def drop_thin_outlines(self, width: float) -> None:
+        """Drop outlines that are nowhere as wide as a width in meters, and count them."""
+        if not width > 0.0 or not self.outlines:
+            return
+        areas = [outline.area for outline in self.outlines]
+        inset = width / 2 * (1.0 - _MAX_RELATIVE_THINNING)
+        is_thin = shapely.is_empty(shapely.buffer(areas, -inset, quad_segs=4))
+        if is_thin.any():
+            self.leave_out("shape", f"thinner than {width:.3g} m (--min-stroke)", int(is_thin.sum()))
+            self.outlines = [
+                outline for outline, thin in zip(self.outlines, is_thin, strict=True) if not thin
+            ]
+
+    def build_polygon(
+        self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = ""
+    ) -> SourceGeometry:
+        """Build a polygon of a format that requires closed rings; rings that are not closed are counted."""
+        rings = tuple(rings)
+        unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
+        if unclosed:
+            self.tally.mended["ring", "closed: the last point was not the first"] += unclosed
+        return SourceGeometry("polygon", rings, labels, at, whole=whole)
+
+    def drop_heights(self, points: Array) -> Array:
+        """Return points without their third coordinates, (k, 2), and count these."""
+        self.tally.add_heights(points[:, 2:3])
+        return points[:, :2]
+
+    def leave_out(self, kind: str, reason: str = "", count: int = 1) -> None:
+        """Count things that are no part of the map, for the report."""
+        self.tally.left_out[kind, reason] += count
+
+    @property
+    def geometries(self) -> list[BaseGeometry]:
+        """All outlines and lines, m."""
+        areas = [outline.area for outline in self.outlines]
+        return [*areas, *(LineString(line.points) for line in self.lines)]
+
+    def count_vertices(self, number: int) -> None:
+        """Count vertices. Raises MapError if the file has too many."""
+        self.vertices += number
+        files.require_vertices(self.vertices, self.where)
+
+    def _check_rings(self, rings: Sequence[Array], at: str) -> list[Array]:
+        """Count and round the points of rings. Raises MapError if a coordinate is out of range."""
+        self.count_vertices(sum(map(len, rings)))
+        for ring in rings:
+            is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
+            if not is_valid.all():
+                x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
+                place = f"{self.where}: {at}" if at else self.where
+                expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
+                raise MapError(f"{place}: {expected}, got a point at [{x:g}, {y:g}] m")
+        return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
+
+    def build_foreign_map(
+        self,
+        name: str,
+        description: str,
+        *,
+        solid: bool,
+        overlap: bool = False,
+        world: MultiPolygon | None = None,
+    ) -> ForeignMap:
+        """Build the map that the shapes stand for, by the rules of `geometry.shapes.interpretation`.
+
+        Parameters
+        ----------
+        name, description : str
+        solid : bool
+            Whether closed outlines are solid unless the option ``outlines`` is given. Otherwise they are free
+            space, except for those that lie in a larger one.
+        overlap : bool
+            Outlines may overlap and are all free, as JuPedSim's accessible areas.
+        world : MultiPolygon or None, m
+            The free space without the shapes, if the format defines it.
+
+        Raises
+        ------
+        MapError
+            If there are no shapes, if the boundary has no area, or if they cross too often.
+        ParameterError
+            If the options contain a name that the file does not have.
+        """
+        self.labels.require_known_names()
+        if world is None and not self.outlines and not self.lines:
+            omissions = "; ".join(self.tally.describe_omissions())
+            left_out = f" ({omissions} left out)" if omissions else ""
+            reason = f"no closed outline and no line{left_out}, expected a drawing"
+            raise MapError(f"{self.where}: {reason}")
+        result = interpret(self._build_drawing(world), solid=solid, overlap=overlap)
+        if result.outside:
+            self.leave_out("shape", "outside of the boundary", result.outside)
+        return ForeignMap(
+            name=name,
+            description=description,
+            free=result.free,
+            boundary=result.boundary,
+            has_named_boundary=result.has_named_boundary,
+            boundary_source=result.boundary_source,
+            vertices_read=self.vertices,
+            cell=self.cell,
+            primitives=result.primitives,
+            robots=tuple(self.robots),
+            repaired=(*self.tally.describe_repairs(), *result.repaired),
+            dropped=self.tally.describe_omissions(),
+            notes=(*self.notes, *result.notes),
+            page=result.page,
+            painted=_list_painted(self),
+        )
+
+    def find_surrounding(self) -> Boundary:
+        """Find the outer edge of the shapes as walls, else build a rectangle around them."""
+        return find_surrounding(self._build_drawing(None))
+
+    def _build_drawing(self, world: MultiPolygon | None) -> Drawing:
+        return Drawing(
+            where=self.where,
+            outlines=self.outlines,
+            lines=self.lines,
+            pillars=self.pillars,
+            options=self.options,
+            world=world,
+            page=self.page,
+        )
+
+
+def note_colors(shapes: Shapes, key: ColorKey) -> None:
+    """Note how often colors with a declared role occur, and which colors there are if none of them does."""
+    painted: list[ClosedOutline | WallLine] = [*shapes.outlines, *shapes.lines, *_list_edges(shapes)]
+    for role in ("free", "solid"):
+        declared = [color for color, its_role in key.entries if its_role == role]
+        matches = [shape for shape in painted if shape.role == role]
+        if matches:
+            counts = count_colors(shape.color for shape in matches)
+            shapes.notes.append(f"painted as {role}: {counts} (--{role}-color)")
+        elif declared:
+            known = count_colors(shape.color for shape in painted)
+            others = f"; there are {known}" if known else ""
+            names = ", ".join(map(name_color, declared))
+            shapes.notes.append(f"nothing is painted {names} (--{role}-color){others}")
+
+
+def _list_edges(shapes: Shapes) -> list[WallLine]:
+    return [edge for outline in shapes.outlines for edge in outline.edges]
+
+
+def _list_painted(shapes: Shapes) -> tuple[Painted, ...]:
+    """Return everything that has a color, the lowest first."""
+    layers = [outline.paint_layer for outline in shapes.outlines if outline.color is not None]
+    lines = [*shapes.lines, *_list_edges(shapes)]
+    layers += [line.paint_layer for line in lines if line.color is not None]
+    # A fill and its own stroke, which is on top, have the same order; the sort keeps theirs.
+    layers.sort(key=lambda layer: layer.order)
+    return tuple(Painted(layer.area, layer.color) for layer in layers if layer.color is not None)

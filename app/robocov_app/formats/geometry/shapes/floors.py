@@ -1,0 +1,191 @@
+"""Floors: outlines of a drawing that are free among solid ones, by their color or their nesting."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import shapely
+from shapely import LineString, MultiPolygon, Polygon
+
+from robocov_app.formats.colors import WHITE, count_colors
+from robocov_app.formats.geometry.polygons import to_multipolygon, unite
+from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing, InterpretationReport
+from robocov_app.formats.geometry.shapes.painting import (
+    PaintLayer,
+    find_evident_floors,
+    is_dark,
+    is_pale,
+    split_alternating,
+)
+from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline
+from robocov_app.formats.reports import format_area
+
+_MIN_BACKGROUND_SHARE = 0.98
+"""Fraction of the page that its background covers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Floors:
+    """Outlines that are free among solid ones.
+
+    Attributes
+    ----------
+    outlines : frozenset of ClosedOutline
+    layers : sequence of PaintLayer
+        Paint that uncovers what is below it.
+    is_slab : bool
+        Whether the boundary is solid itself, except for the floors on it.
+    """
+
+    outlines: frozenset[ClosedOutline]
+    layers: Sequence[PaintLayer]
+    is_slab: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class NestedAreas:
+    """A boundary in which outlines are free and solid in turns, and the solid area in it."""
+
+    boundary: Boundary
+    solid: PaintLayer
+
+
+def find_floors(
+    drawing: Drawing, boundary: Boundary | None, report: InterpretationReport, *, are_solid: bool
+) -> Floors:
+    """Find the floors of a drawing: what was declared free, and where nothing was, what is pale.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    boundary : Boundary or None
+    report : InterpretationReport
+    are_solid : bool
+        Whether closed outlines are solid, except for the boundary.
+
+    Returns
+    -------
+    Floors
+    """
+    used = frozenset() if boundary is None else boundary.outlines
+    others = [outline for outline in drawing.outlines if outline not in used]
+    chosen = {outline for outline in others if outline.role == "free"}
+    is_slab = are_solid and boundary is not None and _is_slab(drawing, boundary)
+    if are_solid and drawing.options.outlines is None:
+        undecided = [each for each in others if each.role is None and each.color is not None]
+        if is_slab:
+            pale_floors = _PaleFloors([each for each in undecided if is_pale(each.color)], "on a dark ground")
+        else:
+            pale_floors = _find_pale_floors(drawing, boundary, others, undecided)
+        _report_pale(drawing, undecided, pale_floors, report)
+        chosen |= set(pale_floors.outlines)
+    layers = [outline.paint_layer for outline in others if outline in chosen]
+    layers += [line.paint_layer for line in drawing.lines if line.role == "free"]
+    return Floors(frozenset(chosen), layers, is_slab)
+
+
+def find_nested_areas(
+    drawing: Drawing, boundary: Boundary | None, report: InterpretationReport
+) -> NestedAreas | None:
+    """Divide the outlines of a drawing, which are free and solid in turns; None if there are none."""
+    used = frozenset() if boundary is None else boundary.outlines
+    areas = [each.area for each in drawing.outlines if each not in used and each.role is None]
+    if not areas:
+        return None
+    odd, even = split_alternating(areas)
+    if boundary is not None:
+        report.notes.append("what lies in an odd number of outlines within the boundary is solid")
+        return NestedAreas(boundary, PaintLayer(odd, -1))
+    is_odd_free = odd.area >= even.area
+    if is_odd_free:
+        free = odd
+        solid = even
+    else:
+        free = even
+        solid = odd
+    whole = to_multipolygon(unite([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
+    number = "an odd number" if is_odd_free else "an even number"
+    size = format_area(free.area, 3)
+    report.notes.append(f"what lies in {number} of outlines is free, {size}, as the larger area")
+    return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, -1))
+
+
+def build_ground(boundary: Boundary | None, region: MultiPolygon, floors: Floors) -> PaintLayer | None:
+    """Return the region as a layer of paint if only what is painted as a floor is free."""
+    if boundary is None:
+        return None
+    has_declared = any(outline.role == "free" for outline in floors.outlines)
+    if floors.is_slab or (boundary.is_guess and has_declared):
+        order = min((outline.order for outline in boundary.outlines), default=-1)
+        return PaintLayer(region, order)
+    return None
+
+
+def is_background(drawing: Drawing, boundary: Boundary | None) -> bool:
+    """Return whether the boundary is a filled rectangle without a stroke, as large as the page."""
+    if drawing.page is None or boundary is None or boundary.is_named or len(boundary.outlines) != 1:
+        return False
+    (outline,) = boundary.outlines
+    is_plain = not outline.edges and outline.role is None and not is_dark(outline.color)
+    covered = shapely.intersection(outline.area, drawing.page).area
+    return is_plain and covered > _MIN_BACKGROUND_SHARE * drawing.page.area
+
+
+def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
+    """Return whether a boundary is a dark area that pale floors are painted on, or declared solid."""
+    if boundary.is_named or len(boundary.outlines) != 1:
+        return False
+    (outline,) = boundary.outlines
+    if outline.role is not None:
+        return outline.role == "solid"
+    later = [each for each in drawing.outlines if each.order > outline.order and each.role != "solid"]
+    return is_dark(outline.color) and any(is_pale(each.color) for each in later)
+
+
+@dataclass(frozen=True, eq=False)
+class _PaleFloors:
+    """Outlines that are floors by their color, and why, for the import report."""
+
+    outlines: list[ClosedOutline]
+    reason: str
+
+
+def _find_pale_floors(
+    drawing: Drawing,
+    boundary: Boundary | None,
+    outlines: Sequence[ClosedOutline],
+    undecided: Sequence[ClosedOutline],
+) -> _PaleFloors:
+    """Return undecided outlines with something darker on them, those like these, and unseen ones."""
+    marks = [outline.paint_layer for outline in outlines]
+    lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
+    marks += [PaintLayer(LineString(line.points), line.order, line.color) for line in lines]
+    is_evident = find_evident_floors([outline.paint_layer for outline in undecided], marks)
+    chosen = [outline for outline, evident in zip(undecided, is_evident, strict=True) if evident]
+    chosen += [each for each in undecided if each not in chosen and _is_unseen(each, boundary)]
+    reason = "as darker paint lies on such" if any(is_evident) else "in the color of the ground"
+    return _PaleFloors(chosen, reason)
+
+
+def _is_unseen(outline: ClosedOutline, boundary: Boundary | None) -> bool:
+    """Return whether an outline has the pale color of the ground and no stroke: it only covers others."""
+    ground = [] if boundary is None else [each.color for each in boundary.outlines]
+    return is_pale(outline.color) and not outline.edges and outline.color in (ground or [WHITE])
+
+
+def _report_pale(
+    drawing: Drawing,
+    undecided: Sequence[ClosedOutline],
+    floors: _PaleFloors,
+    report: InterpretationReport,
+) -> None:
+    """Report which pale paint was taken as floor, and which as solid."""
+    rest = [outline for outline in undecided if outline not in floors.outlines]
+    pale = [outline.color for outline in rest if is_pale(outline.color)]
+    pale += [line.color for line in drawing.lines if line.role is None and is_pale(line.color)]
+    if floors.outlines:
+        counts = count_colors(outline.color for outline in floors.outlines)
+        hint = "(--solid-color: as obstacles)"
+        report.notes.append(f"pale fills taken as floor: {counts} {floors.reason} {hint}")
+    if pale:
+        counts = count_colors(pale)
+        report.notes.append(f"pale paint taken as solid: {counts} (--free-color: as free space)")

@@ -1,0 +1,288 @@
+"""Interpretation of a drawing: find the boundary, classify the other shapes, subtract them, report.
+
+Closed outlines are either *free space*, all of them together; or they are *solid*, except for the boundary.
+Lines and pillars are obstacles in both cases. The boundary is, in this order,
+
+1. the shape whose name, id, class or layer the option ``boundary`` gives, or that is called so. Lines of that
+   name are one if they enclose an area. Outlines around it are frames, and left out;
+2. the largest closed outline, together with what continues it, if it is the only shape, or if more than half
+   of the others lie in it. What continues it are the other parts of its geometry, as of one that is cut at
+   the antimeridian, and outlines next to it, edge to edge, in which other outlines lie;
+3. the outer edge of the walls, if they close and what they enclose is mostly open;
+4. a rectangle around everything, at the distance of the option ``around``.
+
+If the colors of a drawing are known, what is painted later covers what was painted before, and what was
+declared free is so. Pale fills with something darker painted on them are floors, and so are others of their
+color or of the size of a room; pale fills in the color of the ground, without a stroke; and all pale fills
+on a dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free and
+solid in turns, from the outside in.
+
+In drawings whose outlines are free by default, 2 is: all outlines that do not lie in a larger one, if any
+does; then those that do are obstacles.
+
+Where walls separate the free space from the boundary, it ends at the walls: see
+`robocov_app.formats.geometry.conversion.environment`.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.environment import GRID_M, CircleObstacle
+from robocov.errors import MapError, format_count
+from robocov.mapfile.models import MAX_SIZE_M
+from robocov_app.formats.foreign_map import Primitive
+from robocov_app.formats.geometry.crossings import CrossingCounter
+from robocov_app.formats.geometry.polygons import to_multipolygon, unite
+from robocov_app.formats.geometry.shapes.boundary_search import find_boundary, find_surrounding
+from robocov_app.formats.geometry.shapes.drawings import (
+    Boundary,
+    Drawing,
+    Interpretation,
+    InterpretationReport,
+    fill_area_holes,
+)
+from robocov_app.formats.geometry.shapes.floors import (
+    Floors,
+    build_ground,
+    find_floors,
+    find_nested_areas,
+    is_background,
+)
+from robocov_app.formats.geometry.shapes.painting import PaintLayer, uncover
+from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline, WallLine
+
+_MAX_EXTENT_M = 10.0 * MAX_SIZE_M
+"""Shapes farther apart belong to no map, and their union would take seconds."""
+
+
+def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation:
+    """Interpret a drawing by the rules of this module.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    solid : bool
+        What closed outlines are unless the option ``outlines`` is given. True: solid. False: free, but solid
+        where rule 1 or 2 finds a boundary of others, or where there are only lines.
+    overlap : bool
+        Outlines may overlap and are all free, as JuPedSim's accessible areas: then rule 2 holds only if all
+        others lie wholly in the largest one.
+
+    Returns
+    -------
+    Interpretation
+
+    Raises
+    ------
+    MapError
+        If the boundary has no area, or if shapes are too far apart or cross too often.
+    """
+    _require_measurable(drawing)
+    report = InterpretationReport()
+    boundary = find_boundary(drawing, solid=solid, overlap=overlap)
+    are_solid = _are_solid(drawing, boundary, solid=solid)
+    nested = None
+    if drawing.options.outlines == "nested":
+        nested = find_nested_areas(drawing, boundary, report)
+    if nested is not None:
+        boundary = nested.boundary
+    floors = find_floors(drawing, boundary, report, are_solid=are_solid)
+    if are_solid and boundary is None:
+        boundary = find_surrounding(drawing, floors.outlines)
+    region = _build_region(drawing, boundary, report, are_solid=are_solid)
+    if nested is None:
+        obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=are_solid)
+        ground = build_ground(boundary, region, floors)
+    else:
+        obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=False)
+        ground = nested.solid
+    layers = [*obstacles.layers] if ground is None else [*obstacles.layers, ground]
+    free = _subtract(region, uncover(layers, floors.layers))
+    _describe(drawing, boundary, obstacles, report, are_solid=are_solid)
+    return Interpretation(
+        free=free,
+        boundary=_choose_outer(drawing, boundary, region, free, obstacles, are_solid=are_solid),
+        has_named_boundary=boundary is not None and boundary.is_named,
+        boundary_source=boundary.source if boundary is not None and are_solid else "",
+        primitives=obstacles.primitives,
+        outside=obstacles.outside,
+        page=drawing.page if is_background(drawing, boundary) else None,
+        repaired=report.repaired,
+        notes=report.notes,
+    )
+
+
+def require_size(bounds: Iterable[float], where: str, maximum: float = MAX_SIZE_M) -> None:
+    """Raise MapError if bounds, m, are larger than any map."""
+    x, y, right, top = bounds
+    if max(right - x, top - y) > maximum:
+        expected = f"expected at most {MAX_SIZE_M / 1000:g} km"
+        raise MapError(f"{where}: {expected}, got {right - x:.6g} x {top - y:.6g} m: is the scale right?")
+
+
+def _require_measurable(drawing: Drawing) -> None:
+    """Raise MapError if shapes are too far apart, or cross too often, for their union to be computed."""
+    everything = [*drawing.areas, *drawing.paths]
+    if drawing.world is not None:
+        everything.append(drawing.world)
+    # One of many parts may be a map, if they are not too far from each other.
+    require_size(shapely.total_bounds(everything), drawing.where, _MAX_EXTENT_M)
+    rings = shapely.get_rings(shapely.get_parts(drawing.areas))
+    CrossingCounter(drawing.where).add([*rings, *drawing.paths])
+
+
+def _are_solid(drawing: Drawing, boundary: Boundary | None, *, solid: bool) -> bool:
+    """Return whether closed outlines are solid, except for the boundary."""
+    if drawing.options.outlines is not None:
+        return drawing.options.outlines != "free"
+    if solid or not drawing.outlines:
+        return True
+    return boundary is not None and len(drawing.outlines) > len(boundary.outlines)
+
+
+def _build_region(
+    drawing: Drawing, boundary: Boundary | None, report: InterpretationReport, *, are_solid: bool
+) -> MultiPolygon:
+    """Return what would be free without any obstacle, m; MapError if there is nothing."""
+    if are_solid:
+        assert boundary is not None
+        region = boundary.area
+    else:
+        used = frozenset() if boundary is None else boundary.outlines
+        outlines = [outline for outline in drawing.outlines if outline.role != "solid"]
+        areas = [outline.area for outline in outlines if outline not in used]
+        if areas:
+            region = report.join_areas(areas, drawing.snap)
+        else:
+            region = MultiPolygon() if boundary is None else boundary.area
+    if region.is_empty:
+        reason = "no closed outline, expected one that encloses free space"
+        raise MapError(f"{drawing.where}: {reason}")
+    require_size(region.geoms[0].bounds, drawing.where)
+    return region
+
+
+@dataclass(frozen=True, eq=False)
+class _Obstacles:
+    """Obstacles in a region.
+
+    Attributes
+    ----------
+    outlines : sequence of ClosedOutline
+    walls : sequence of WallLine
+    pillars : sequence of CircleObstacle
+    layers : sequence of PaintLayer
+        The paint of all of them.
+    count : int
+        Number of outlines that are not around the whole region.
+    outside : int
+        Number of shapes that do not meet the region, and of outlines around all of it.
+    """
+
+    outlines: Sequence[ClosedOutline]
+    walls: Sequence[WallLine]
+    pillars: Sequence[CircleObstacle]
+    layers: Sequence[PaintLayer]
+    count: int
+    outside: int
+
+    @property
+    def primitives(self) -> tuple[Primitive, ...]:
+        """The circles and walls, as obstacles of a map."""
+        circles = [outline.circle for outline in self.outlines if outline.circle is not None]
+        walls = [wall for line in self.walls if (wall := line.wall) is not None]
+        return (*circles, *walls, *self.pillars)
+
+
+def _find_obstacles(
+    drawing: Drawing, boundary: Boundary | None, region: MultiPolygon, floors: Floors, *, are_solid: bool
+) -> _Obstacles:
+    """Return the obstacles in a region, m, that has the given boundary."""
+    used = Boundary(region) if boundary is None else boundary
+    others = [each for each in drawing.outlines if each not in used.outlines and each not in floors.outlines]
+    outlines = [each for each in others if are_solid or each.role == "solid"]
+    edges = [edge for outline in drawing.outlines if outline in floors.outlines for edge in outline.edges]
+    lines = [line for line in drawing.lines if line not in used.lines]
+    walls = [line for line in (*lines, *edges) if line.role != "free"]
+    blocks = np.array([outline.area for outline in outlines], dtype=object)
+    shapely.prepare(region)
+    is_frame = shapely.covered_by(region, blocks)
+    layers = [outline.paint_layer for outline, frames in zip(outlines, is_frame, strict=True) if not frames]
+    layers += [line.paint_layer for line in walls]
+    # Pillars have no paint that could be covered.
+    layers += [PaintLayer(pillar.polygon, np.inf) for pillar in drawing.pillars]
+    is_inside = shapely.intersects(region, [layer.area for layer in layers])
+    return _Obstacles(
+        outlines=outlines,
+        walls=walls,
+        pillars=drawing.pillars,
+        layers=layers,
+        count=int((~is_frame).sum()),
+        outside=int((~is_inside).sum() + is_frame.sum()),
+    )
+
+
+def _subtract(region: MultiPolygon, solids: Sequence[BaseGeometry]) -> MultiPolygon:
+    if not solids:
+        return region
+    return to_multipolygon(shapely.difference(region, unite(solids), grid_size=GRID_M))
+
+
+def _choose_outer(
+    drawing: Drawing,
+    boundary: Boundary | None,
+    region: MultiPolygon,
+    free: MultiPolygon,
+    obstacles: _Obstacles,
+    *,
+    are_solid: bool,
+) -> MultiPolygon | None:
+    """Return the boundary of the map, without holes; None where it is the outline of the free space."""
+    world = drawing.world
+    # The free space of a grid has an outline of its own.
+    is_grid = world is not None and (len(world.geoms) > 1 or len(world.geoms[0].interiors) > 0)
+    if boundary is not None and not is_grid and (are_solid or boundary.area is not region):
+        return fill_area_holes(boundary.area)
+    has_walls = bool(obstacles.walls or obstacles.pillars)
+    if has_walls and len(region.geoms) == len(free.geoms) == 1:
+        # Walls that start at the edge are no part of it.
+        return fill_area_holes(region)
+    return None
+
+
+def _describe(
+    drawing: Drawing,
+    boundary: Boundary | None,
+    obstacles: _Obstacles,
+    report: InterpretationReport,
+    *,
+    are_solid: bool,
+) -> None:
+    """Report what the boundary is, and what the other shapes were taken for."""
+    if boundary is not None and boundary.gaps:
+        report.repaired.append(boundary.gaps)
+    # Where the format defines the whole boundary, outlines need no note.
+    is_found = boundary is None or boundary.source != ""
+    if is_found and obstacles.count:
+        count = format_count(obstacles.count, "closed outline")
+        report.notes.append(f"{count} taken as solid (--outlines free: as free space)")
+    elif not are_solid and len(drawing.outlines) > 1:
+        count = format_count(len(drawing.outlines), "closed outline")
+        report.notes.append(f"{count} taken as free space (--outlines solid: as obstacles)")
+    if obstacles.walls:
+        count = format_count(len(obstacles.walls), "line")
+        report.notes.append(f"{count} taken as walls, {_format_widths(obstacles.walls)} m wide (--thickness)")
+    if obstacles.pillars:
+        report.notes.append(f"{format_count(len(obstacles.pillars), 'point')} taken as pillars")
+
+
+def _format_widths(walls: Sequence[WallLine]) -> str:
+    widths = [width for line in walls for width in line.measure_widths()]
+    narrowest = f"{min(widths):.3g}"
+    widest = f"{max(widths):.3g}"
+    return narrowest if narrowest == widest else f"{narrowest} to {widest}"

@@ -1,0 +1,125 @@
+"""Paint of drawings: which filled shapes are floors, and which areas they leave of the shapes below them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import BoolArray
+from robocov.environment import GRID_M
+from robocov_app.formats.colors import MAX_DARK_LUMINANCE, MIN_PALE_LUMINANCE, Color, compute_luminance
+from robocov_app.formats.geometry.polygons import to_multipolygon, unite
+from robocov_app.formats.geometry.shapes.enclosed_area import find_enclosed_area
+
+_MIN_ROOM_SHARE = 0.5
+"""Pale fills of this fraction of the area of the smallest evident floor have the size of a room."""
+
+
+@dataclass(frozen=True, eq=False)
+class PaintLayer:
+    """A painted area.
+
+    Attributes
+    ----------
+    area : shapely geometry, m
+    order : float
+        Layers of a higher order are painted later, on top of lower ones.
+    color : Color or None
+        Color as it is seen on white; None where it is not known.
+    """
+
+    area: BaseGeometry
+    order: float
+    color: Color | None = None
+
+
+def is_dark(color: Color | None) -> bool:
+    """Return whether a color is known and dark."""
+    return color is not None and compute_luminance(color) < MAX_DARK_LUMINANCE
+
+
+def is_pale(color: Color | None) -> bool:
+    """Return whether a color is known and pale."""
+    return color is not None and compute_luminance(color) >= MIN_PALE_LUMINANCE
+
+
+def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
+    """Decide which filled shapes are floors by what is painted on them.
+
+    Furniture and walls are not painted onto a pale obstacle. So a pale fill with something darker on it is a
+    floor, and so are fills of its color, and pale fills of the size of a room: rooms often have different
+    colors.
+
+    Parameters
+    ----------
+    fills : sequence of PaintLayer
+    marks : sequence of PaintLayer
+        Everything that is painted; pale marks do not count.
+
+    Returns
+    -------
+    list of bool
+        One for each fill.
+    """
+    is_marked = _find_marked(fills, marks)
+    if not is_marked.any():
+        return [False] * len(fills)
+    colors = {fills[k].color for k in np.flatnonzero(is_marked).tolist()}
+    sizes = shapely.area([fill.area for fill in fills])
+    min_size = _MIN_ROOM_SHARE * sizes[is_marked].min()
+    return [
+        is_pale(fill.color) and (fill.color in colors or size >= min_size)
+        for fill, size in zip(fills, sizes.tolist(), strict=True)
+    ]
+
+
+def _find_marked(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
+    """Return which fills are pale and have something on them that is not."""
+    is_marked = np.zeros(len(fills), dtype=bool)
+    darker = [mark for mark in marks if mark.color is not None and not is_pale(mark.color)]
+    if not darker:
+        return is_marked
+    tree = shapely.STRtree([mark.area for mark in darker])
+    order = np.array([mark.order for mark in darker])
+    for k, fill in enumerate(fills):
+        if is_pale(fill.color):
+            on_fill = tree.query(fill.area, "covers")
+            is_marked[k] = (order[on_fill] > fill.order).any()
+    return is_marked
+
+
+def uncover(solids: Sequence[PaintLayer], floors: Sequence[PaintLayer]) -> list[BaseGeometry]:
+    """Return the areas of solids without the floors that are painted on top of them, m."""
+    if not floors:
+        return [solid.area for solid in solids]
+    tree = shapely.STRtree([floor.area for floor in floors])
+    order = np.array([floor.order for floor in floors])
+    areas = []
+    for solid in solids:
+        above = tree.query(solid.area, "intersects")
+        above = above[order[above] > solid.order]
+        area = solid.area
+        if len(above):
+            covers = unite([floors[k].area for k in above])
+            area = shapely.difference(area, covers, grid_size=GRID_M)
+        if not area.is_empty:
+            areas.append(area)
+    return areas
+
+
+def split_alternating(areas: Sequence[BaseGeometry]) -> tuple[MultiPolygon, MultiPolygon]:
+    """Split the union of areas by the number of areas that overlap.
+
+    Returns
+    -------
+    odd, even : MultiPolygon, m
+        What lies in an odd number of areas, and in an even number of at least two.
+    """
+    parts = shapely.get_parts(shapely.get_parts(areas))
+    rings = [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(parts)]
+    odd = find_enclosed_area(rings, "evenodd").area
+    whole = unite([Polygon(part.exterior) for part in parts])
+    return odd, to_multipolygon(shapely.difference(whole, odd, grid_size=GRID_M))

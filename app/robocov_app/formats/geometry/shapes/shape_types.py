@@ -1,0 +1,205 @@
+"""Shapes of drawings: geometries as a file has them, and the outlines and walls in meters made of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.environment import CircleObstacle, WallObstacle
+from robocov.errors import to_one_line
+from robocov.mapfile.models import MAX_LABEL_CHARACTERS
+from robocov_app.formats.colors import Color, Role
+from robocov_app.formats.geometry.shapes.enclosed_area import Rule
+from robocov_app.formats.geometry.shapes.painting import PaintLayer
+
+Kind: TypeAlias = Literal["polygon", "line", "point"]
+BOUNDARY = "boundary"
+"""A shape with this name, id, class or layer is the boundary."""
+
+
+@dataclass(frozen=True, eq=False)
+class SourceGeometry:
+    """A geometry of a file, before the units of its coordinates are known.
+
+    Attributes
+    ----------
+    kind : "polygon", "line" or "point"
+    rings : tuple of (k, 2) arrays
+    labels : tuple of str
+    at : str
+        Position in the file, for messages.
+    rule : str
+        See `enclosed_area.find_enclosed_area`.
+    width : float or None, m
+        Width of a line, if the file gives it.
+    whole : str
+        Position of the geometry that this is a part of, if it is one of several parts.
+    """
+
+    kind: Kind
+    rings: tuple[Array, ...]
+    labels: tuple[str, ...] = ()
+    at: str = ""
+    rule: Rule = "holes"
+    width: float | None = None
+    whole: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedOutline:
+    """A closed outline.
+
+    Attributes
+    ----------
+    area : MultiPolygon, m
+        Valid.
+    labels : tuple of str
+        The most specific one first.
+    circle : CircleObstacle or None
+        The disc that the outline is, if it is one.
+    whole : str
+        See `SourceGeometry`.
+    color : Color or None
+        Color of the fill as it is seen on white, if known.
+    role : str or None
+        Role that the user has declared for this color.
+    order : int
+        Outlines and lines of a higher order are painted later.
+    edges : tuple of WallLine
+        The stroke, which is a wall only if the outline is free.
+    """
+
+    area: MultiPolygon
+    labels: tuple[str, ...] = ()
+    circle: CircleObstacle | None = None
+    whole: str = ""
+    color: Color | None = None
+    role: Role | None = None
+    order: int = 0
+    edges: tuple["WallLine", ...] = ()
+
+    @property
+    def paint_layer(self) -> PaintLayer:
+        """The fill."""
+        return PaintLayer(self.area, self.order, self.color)
+
+    @property
+    def filled_area(self) -> float:
+        """Area including holes, m²."""
+        return float(sum(Polygon(part.exterior).area for part in self.area.geoms))
+
+
+@dataclass(frozen=True, eq=False)
+class PenStroke:
+    """A line drawn by a pen that a transform has stretched, so that it is not round.
+
+    Attributes
+    ----------
+    points : (k, 2) array
+        In the units of the pen.
+    width : float
+    matrix : (3, 3) array
+        Transform from these units to meters.
+    """
+
+    points: Array
+    width: float
+    matrix: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WallLine:
+    """A line, open or closed, that is a wall.
+
+    Attributes
+    ----------
+    points : (k, 2) array, m
+    width : float, m
+    labels : tuple of str
+    cap, join : str
+        See `shapely.buffer`.
+    mitre_limit : float
+        See `robocov.environment.WallObstacle`.
+    stretched : PenStroke or None
+        Where the width depends on the direction.
+    color, role, order
+        See `ClosedOutline`.
+    """
+
+    points: Array
+    width: float
+    labels: tuple[str, ...] = ()
+    cap: Literal["flat", "square", "round"] = "flat"
+    join: Literal["mitre", "bevel", "round"] = "mitre"
+    mitre_limit: float = 4.0
+    stretched: PenStroke | None = None
+    color: Color | None = None
+    role: Role | None = None
+    order: int = 0
+
+    @cached_property
+    def solid(self) -> BaseGeometry:
+        """Area that the wall covers, m."""
+        stroke = self.stretched
+        if stroke is None:
+            return self._buffer(self.points, self.width)
+        linear = stroke.matrix[:2, :2].T
+        offset = stroke.matrix[:2, 2]
+        solid = self._buffer(stroke.points, stroke.width)
+        return shapely.transform(solid, lambda points: points @ linear + offset)
+
+    def _buffer(self, points: Array, width: float) -> BaseGeometry:
+        area: BaseGeometry = LineString(points).buffer(
+            width / 2, cap_style=self.cap, join_style=self.join, mitre_limit=self.mitre_limit
+        )
+        return area
+
+    @property
+    def paint_layer(self) -> PaintLayer:
+        """The stroke."""
+        return PaintLayer(self.solid, self.order, self.color)
+
+    @property
+    def wall(self) -> WallObstacle | None:
+        """The line as an obstacle, except for its corners; None if its ends cannot be those of one."""
+        if self.stretched is not None or self.cap == "round":
+            return None
+        points = self.points.copy()
+        if self.cap == "square":
+            for end, inner in ((0, 1), (-1, -2)):
+                vector = points[end] - self.points[inner]
+                points[end] += vector / max(np.hypot(*vector), 1e-300) * self.width / 2
+        vertices = tuple((x, y) for x, y in points.tolist())
+        return WallObstacle(vertices, self.width, get_obstacle_name(self.labels))
+
+    def measure_widths(self) -> tuple[float, float]:
+        """Return the smallest and the largest width of the segments, m.
+
+        They differ where the pen is stretched: a line along the stretch is as wide as the pen, and a line
+        across it is wider.
+        """
+        stroke = self.stretched
+        if stroke is None:
+            return self.width, self.width
+        segments = np.diff(stroke.points, axis=0)
+        segments = segments[(segments != 0.0).any(axis=1)]
+        if not len(segments):
+            return self.width, self.width
+        linear = stroke.matrix[:2, :2]
+        # The area of a strip grows with the determinant, and its length depends on its direction.
+        stretch = np.hypot(*(segments @ linear.T).T) / np.hypot(*segments.T)
+        widths = stroke.width * abs(np.linalg.det(linear)) / np.maximum(stretch, 1e-300)
+        return float(widths.min()), float(widths.max())
+
+
+def get_obstacle_name(labels: Sequence[str]) -> str | None:
+    """Return the name of an obstacle with these labels; layer 0 of a drawing is no name."""
+    if not labels or labels[0] == "0":
+        return None
+    return to_one_line(labels[0])[:MAX_LABEL_CHARACTERS].strip() or None

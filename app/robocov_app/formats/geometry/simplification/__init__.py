@@ -1,0 +1,1 @@
+"""Simplification of free space, without closing passages or changing sizes."""

@@ -1,0 +1,236 @@
+"""Checks that a simplified outline keeps its sizes, crosses nothing, and leaves gaps open."""
+
+from collections import Counter
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, STRtree
+
+from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_run_starts
+from robocov_app.formats.geometry.simplification.narrow_gaps import find_closed_gaps
+from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline, ThinParts
+from robocov_app.formats.geometry.simplification.ring_vertices import RingVertices
+from robocov_app.formats.geometry.vectors import compute_cross, compute_dot
+
+MAX_OUTLINE_CHANGE = 0.1
+"""Fraction of its area by which an outline, or a thin part, may change."""
+MAX_AREA_CHANGE = 0.02
+"""Fraction of the whole free area by which that may change."""
+_THIN_AREA_SLACK = 0.5
+"""Area by which a thin part may change in addition to `MAX_OUTLINE_CHANGE`, in squared tolerances."""
+
+
+class SimplificationCheck:
+    """Checks of a drawing of an outline; the answers select vertices of the outline, (k,).
+
+    Parameters
+    ----------
+    outline : OriginalOutline
+    drawing : RingVertices
+    allowed : (k,) array, m
+        Tolerance at each vertex of the outline; 0 where it must stay.
+    tolerance : float, m
+        The tolerance where nothing was wrong so far.
+    width : float, m
+        Diameter of a robot.
+    problems : Counter
+        Counts problems by their kind where the tolerance is still the whole one.
+
+    Attributes
+    ----------
+    side : (k,) array of int
+        Side of the drawing that stands for each vertex, by its first vertex.
+    """
+
+    def __init__(
+        self,
+        outline: OriginalOutline,
+        drawing: RingVertices,
+        *,
+        allowed: Array,
+        tolerance: float,
+        width: float,
+        problems: Counter[str],
+    ) -> None:
+        self.outline = outline
+        self.drawing = drawing
+        self.allowed = allowed
+        self.tolerance = tolerance
+        self.width = width
+        self.problems = problems
+        self.side = self._assign_sides()
+
+    def _assign_sides(self) -> IntArray:
+        drawing = self.drawing
+        ring = self.outline.ring
+        order = np.argsort(drawing.source, kind="stable")
+        place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
+        # Before the first vertex of a ring comes its last one.
+        last = drawing.starts + drawing.size - 1
+        return np.asarray(order[np.where(place < drawing.starts[ring], last[ring], place)])
+
+    def find_misdrawn(self) -> tuple[BoolArray, BoolArray]:
+        """Find rings whose area has changed too much, and vertices that are too far from the drawing.
+
+        Returns
+        -------
+        wrong : (k,) array of bool
+            Vertices of rings with another area.
+        far : (k,) array of bool
+            Of the vertices that a side stands for, the farthest one, if it is beyond the tolerance.
+        """
+        allowed = self.allowed
+        far = self._find_far()
+        areas_before = self.outline.areas
+        areas_after = self.drawing.areas
+        ring = self.outline.ring
+        has_changed = np.abs(areas_after - areas_before) > MAX_OUTLINE_CHANGE * np.abs(areas_before)
+        fresh_rings = np.unique(ring[allowed == self.tolerance])
+        self.problems["outline"] += int(np.count_nonzero(has_changed[fresh_rings]))
+        wrong = has_changed[ring] & (allowed > 0.0)
+        total_change = abs(areas_after.sum() - areas_before.sum())
+        if not (wrong.any() or far.any()) and total_change > MAX_AREA_CHANGE * areas_before.sum():
+            self.problems["area"] += 1
+            wrong = allowed > 0.0
+        return wrong, far
+
+    def _find_far(self) -> BoolArray:
+        """Return the farthest vertex of each side, where it is farther away than allowed."""
+        drawing = self.drawing
+        points = self.outline.points
+        allowed = self.allowed
+        distance = np.full(len(points), np.inf)
+        # Where a corner was restored, the side before or after may be the nearer one.
+        for side in (self.side, drawing.before[self.side], drawing.after[self.side]):
+            start = drawing.points[side]
+            vector = drawing.sides[side]
+            parameter = compute_dot(points - start, vector)
+            parameter = parameter / np.maximum(compute_dot(vector, vector), 1e-300)
+            foot = start + np.clip(parameter, 0.0, 1.0)[:, None] * vector
+            distance = np.minimum(distance, np.hypot(*(points - foot).T))
+        by_distance = np.lexsort((-distance, self.side))
+        farthest = by_distance[find_run_starts(self.side[by_distance])]
+        far = np.zeros(len(distance), dtype=bool)
+        far[farthest] = distance[farthest] > allowed[farthest] * (1 + 1e-9)
+        return far & (allowed > 0.0)
+
+    def find_misshapen(self, thin: ThinParts) -> BoolArray:
+        """Find the vertices of thin parts whose area has changed too much."""
+        wrong = np.zeros(len(self.outline.points), dtype=bool)
+        if not len(thin.areas):
+            return wrong
+        changes = self._measure_area_changes()
+        # A side counts once, whatever number of the part's vertices it stands for.
+        pairs = np.unique(np.column_stack([thin.part, self.side[thin.vertex]]), axis=0)
+        change = np.bincount(pairs[:, 0], changes[pairs[:, 1]], minlength=len(thin.areas))
+        limit = MAX_OUTLINE_CHANGE * thin.areas + _THIN_AREA_SLACK * self.tolerance**2
+        has_changed = np.abs(change) > limit
+        vertex = thin.vertex[has_changed[thin.part]]
+        part = thin.part[has_changed[thin.part]]
+        self.problems["thin part"] += len(np.unique(part[self.allowed[vertex] == self.tolerance]))
+        wrong[vertex] = True
+        return wrong & (self.allowed > 0.0)
+
+    def _measure_area_changes(self) -> Array:
+        """Return by how much each side of the drawing changes the area of its ring, (m,) m².
+
+        This is the signed area between the side and the run of the outline that it stands for. The sum over a
+        ring is the difference of the areas of the rings.
+        """
+        outline = self.outline
+        drawing = self.drawing
+        first = drawing.vertex
+        last = drawing.vertex[drawing.after]
+        # Areas along the outline are summed up from the first vertex of the ring; a run that passes that
+        # vertex needs the sum over the whole ring, too.
+        local = outline.points - outline.points[outline.starts[outline.ring]]
+        total = np.append(0.0, np.cumsum(compute_cross(local, local[outline.after])))
+        run = total[last] - total[first]
+        start = outline.starts[drawing.ring]
+        size = outline.size[drawing.ring]
+        passes_start = last <= first
+        run += np.where(passes_start, total[start + size] - total[start], 0.0)
+        side_start = drawing.points - outline.points[start]
+        side_end = drawing.points[drawing.after] - outline.points[start]
+        drawn = compute_cross(local[first], side_start) + compute_cross(side_start, side_end)
+        drawn = drawn + compute_cross(side_end, local[last])
+        return np.asarray((drawn - run) / 2)
+
+    def find_crossings(self) -> tuple[MultiPolygon, BoolArray]:
+        """Build the polygons of the drawing, and find where they cross themselves or each other.
+
+        Returns
+        -------
+        polygons : MultiPolygon, m
+        wrong : (k,) array of bool
+            All False if the polygons are valid.
+        """
+        outline = self.outline
+        allowed = self.allowed
+        drawing = outline.restore_necks(self.drawing)
+        polygons = outline.to_polygons(drawing)
+        if polygons.is_valid:
+            return polygons, np.zeros(len(outline.points), dtype=bool)
+        after = drawing.after
+        sides = shapely.linestrings(drawing.endpoints)
+        first, second = STRtree(sides).query(sides, predicate="intersects")
+        is_crossing = (first < second) & (after[first] != second) & (after[second] != first)
+        crossing = np.append(first[is_crossing], second[is_crossing])
+        wrong = np.isin(self.side, drawing.vertex[crossing])
+        wrong |= wrong[outline.after]
+        wrong &= allowed > 0.0
+        if (allowed[wrong] == self.tolerance).any():
+            self.problems["place"] += int(np.count_nonzero(is_crossing))
+        if not wrong.any():
+            # A ring lies where it must not, without crossing anything.
+            wrong = allowed > 0.0
+        return polygons, wrong
+
+    def find_closed_gaps(self, polygons: MultiPolygon) -> BoolArray | None:
+        """Find the surroundings of gaps that a robot does not pass any more.
+
+        Parameters
+        ----------
+        polygons : MultiPolygon, m
+            The polygons of the drawing.
+
+        Returns
+        -------
+        (k,) array of bool, or None if there are too many gaps to check
+        """
+        drawing = self.drawing
+        # A side from or to the midpoint of a short side stands for all of that.
+        first = drawing.vertex
+        last = np.ceil(drawing.source[drawing.after]).astype(np.intp)
+        paths = self._build_paths(first, last)
+        moved = 3 * self.tolerance
+        closed = find_closed_gaps(drawing.endpoints, paths, polygons, self.width, moved)
+        if closed is None:
+            return None
+        wrong = np.zeros(len(self.outline.points), dtype=bool)
+        order = np.argsort(self.side, kind="stable")
+        boundaries = np.searchsorted(self.side[order], np.arange(1, len(paths)))
+        vertices_by_side = np.split(order, boundaries)
+        for pair, middle in zip(*closed, strict=True):
+            around = [vertices_by_side[side] for side in pair]
+            around.append(first[drawing.after[pair]])
+            wrong[self._choose_loose(np.concatenate(around), middle)] = True
+        self.problems["narrow place"] += len(closed[0])
+        return wrong
+
+    def _build_paths(self, first: IntArray, last: IntArray) -> Array:
+        """Return the run of the outline that each side of the drawing stands for, as linestrings."""
+        outline = self.outline
+        starts = outline.starts[self.drawing.ring]
+        size = outline.size[self.drawing.ring]
+        count = (last - first - 1) % size + 2
+        index = starts.repeat(count) + concatenate_ranges(first - starts, count) % size.repeat(count)
+        line = np.arange(len(count)).repeat(count)
+        return np.asarray(shapely.linestrings(outline.points[index], indices=line))
+
+    def _choose_loose(self, vertices: IntArray, middle: Array) -> IntArray:
+        """Return the vertices around a gap that may still move, those near its middle if there are any."""
+        loose = vertices[self.allowed[vertices] > 0.0]
+        distance = np.hypot(*(self.outline.points[loose] - middle).T)
+        near = loose[distance <= self.width + 3 * self.tolerance]
+        return near if len(near) else loose

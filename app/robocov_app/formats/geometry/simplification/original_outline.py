@@ -1,0 +1,231 @@
+"""The outline of a free space before it is simplified, and the drawings of it with fewer vertices."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon, STRtree
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov_app.formats.geometry.cells.vectorize import NECK
+from robocov_app.formats.geometry.polygons import buffer_with_mitres
+from robocov_app.formats.geometry.simplification.ring_vertices import RingVertices
+from robocov_app.formats.geometry.simplification.stairs import fit_walls, replace_stairs
+from robocov_app.formats.geometry.vectors import compute_dot
+
+_MAX_AREA_LOSS = 0.02
+"""Fraction of its area that a ring may lose or gain before the area is restored."""
+_FULL_TOLERANCE_SIZE = 16
+"""Rings of the area of a square of this many tolerances get the whole tolerance, smaller ones less."""
+_MIN_TOLERANCE_CELLS = 0.4
+"""Tolerance, in cells, that even the smallest rings get."""
+_MAX_RIGHT_ANGLE_COSINE = 1e-5
+_MAX_LINE_VERTICES = 1024
+"""Number of vertices between two fixed ones; the recursion of Douglas and Peucker may be as deep."""
+_MAX_THIN_WIDTH = 1.5
+"""Parts narrower than this many tolerances are thin."""
+_MIN_THIN_LENGTH = 2.5
+"""Thin parts shorter than this many tolerances are bumps."""
+_MIN_THIN_WIDTH = 0.01
+"""Thin parts narrower than this many tolerances are rounding errors."""
+_MAX_THIN_VERTICES = 80_000
+"""Outlines with more vertices are not searched for thin parts, which would take many seconds."""
+
+
+class ThinParts(NamedTuple):
+    """Parts of a free space, or of the solid space around it, about as thin as the tolerance.
+
+    Attributes
+    ----------
+    areas : (n,) array, m²
+    vertex, part : (m,) arrays of int
+        Pairs of a vertex of the outline and the part that it belongs to.
+    """
+
+    areas: Array
+    vertex: IntArray
+    part: IntArray
+
+
+class OriginalOutline(RingVertices):
+    """All vertices of polygons.
+
+    Parameters
+    ----------
+    polygons : list of Polygon, m
+    cell : float or None, m
+        Longer side of the cells that these polygons are the outline of, if any. The necks at which
+        obstacles touch are then replaced by the corners between them.
+
+    Attributes
+    ----------
+    owner : (r,) array of int
+        Polygon of each ring; its outer ring comes first.
+    is_neck : (k,) array of bool
+        Whether a vertex stands for a neck.
+    cell : float or None, m
+    """
+
+    def __init__(self, polygons: list[Polygon], cell: float | None) -> None:
+        lines, owner = shapely.get_rings(polygons, return_index=True)
+        points, ring = shapely.get_coordinates(lines, return_index=True)
+        is_closing = np.append(ring[1:] != ring[:-1], True)
+        points = points[~is_closing]
+        ring = ring[~is_closing]
+        starts = np.searchsorted(ring, np.arange(len(lines)))
+        rings = RingVertices(points, starts, np.arange(len(points), dtype=float))
+        is_neck = np.zeros(len(points), dtype=bool)
+        if cell is not None:
+            rings, is_neck = _remove_necks(rings, cell)
+        super().__init__(rings.points, rings.starts, rings.source)
+        self.owner = owner
+        self.is_neck = is_neck
+        self.cell = cell
+
+    def draw(self, tolerance: Array, is_fixed: BoolArray) -> RingVertices:
+        """Draw the outline with fewer vertices.
+
+        Parameters
+        ----------
+        tolerance : (k,) array, m
+            Where it is 0, vertices stay.
+        is_fixed : (k,) array of bool
+            These vertices stay, or the midpoints of sides that stand for them.
+
+        Returns
+        -------
+        RingVertices
+        """
+        path: RingVertices = self
+        if self.cell is not None:
+            path = replace_stairs(self, self.cell, tolerance)
+        allowed = tolerance[path.vertex]
+        is_midpoint = path.source != path.vertex
+        stays = is_fixed[path.vertex] | (is_midpoint & is_fixed[self.after[path.vertex]])
+        stays |= path.find_extremes() | (allowed == 0.0)
+        stays |= np.arange(len(allowed)) % _MAX_LINE_VERTICES == 0
+        # Small rings have few corners to lose.
+        min_tolerance = 0.0 if self.cell is None else _MIN_TOLERANCE_CELLS * self.cell
+        max_tolerance = np.maximum(np.sqrt(np.abs(self.areas)) / _FULL_TOLERANCE_SIZE, min_tolerance)
+        kept, starts = path.simplify(allowed, stays, max_tolerance)
+        drawing = RingVertices(path.points[kept], starts, path.source[kept])
+        if self.cell is None:
+            return drawing
+        return fit_walls(path, kept, drawing, allowed[kept])
+
+    def restore_areas(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
+        """Give rings of a drawing their original area back where they lost or gained much of it.
+
+        All sides of such a ring move by the same distance, at most half the tolerance. Small round obstacles
+        need it: with few corners, all of them on the circle, they would shrink.
+        """
+        areas_before = self.areas
+        areas_after = drawing.areas
+        has_changed = np.abs(areas_after - areas_before) > _MAX_AREA_LOSS * np.abs(areas_before)
+        has_changed &= 2 * areas_after * np.sign(areas_before) > np.abs(areas_before)
+        if not has_changed.any():
+            return drawing
+        side = drawing.sides
+        length = drawing.lengths
+        # The outside of a counter-clockwise ring is to the right of its sides.
+        normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
+        perimeter = np.maximum(np.add.reduceat(length, drawing.starts), 1e-300)
+        max_distance = tolerance[drawing.vertex] / 2
+        ring_distance = np.where(has_changed, (areas_before - areas_after) / perimeter, 0.0)
+        distance = np.clip(ring_distance[drawing.ring], -max_distance, max_distance)
+        both_normals = normal + normal[drawing.before]
+        # A corner moves farther than its sides, a sharp one up to twice as far.
+        scale = distance / np.maximum(compute_dot(both_normals, both_normals) / 2, 0.5)
+        return RingVertices(drawing.points + scale[:, None] * both_normals, drawing.starts, drawing.source)
+
+    def restore_necks(self, drawing: RingVertices) -> RingVertices:
+        """Insert the necks of the outline into a drawing; the source of each vertex is its vertex there."""
+        points = drawing.points
+        is_neck = self.is_neck[drawing.vertex] & (drawing.source == drawing.vertex)
+        if self.cell is None or not is_neck.any():
+            return RingVertices(points, drawing.starts, np.arange(len(points), dtype=float))
+        doubled = np.arange(len(points)).repeat(1 + is_neck)
+        is_second = np.append(False, doubled[1:] == doubled[:-1])
+        neighbor = np.where(is_second, drawing.after[doubled], drawing.before[doubled])
+        vector = points[neighbor] - points[doubled]
+        length = np.maximum(np.hypot(*vector.T), 1e-300)
+        fraction = np.where(is_neck[doubled], np.minimum(NECK * self.cell / length, 0.4), 0.0)
+        starts = np.searchsorted(doubled, drawing.starts)
+        return RingVertices(points[doubled] + fraction[:, None] * vector, starts, doubled.astype(float))
+
+    @cached_property
+    def walls(self) -> STRtree:
+        """The sides of all rings."""
+        return STRtree(shapely.linestrings(self.endpoints))
+
+    def restrain(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
+        """Put vertices of a drawing back that are farther from all walls than the tolerance."""
+        vertex = drawing.vertex
+        # A vertex comes from a vertex of the outline, or from the midpoint of the side after it.
+        half = (drawing.source % 1.0)[:, None]
+        origin = (1.0 - half) * self.points[vertex] + half * self.points[self.after[vertex]]
+        moved = np.flatnonzero((drawing.points != origin).any(axis=1))
+        positions = shapely.points(drawing.points[moved])
+        _, distance = self.walls.query_nearest(positions, return_distance=True, all_matches=False)
+        too_far = moved[distance > tolerance[vertex[moved]]]
+        points = drawing.points.copy()
+        points[too_far] = origin[too_far]
+        return RingVertices(points, drawing.starts, drawing.source)
+
+    def find_thin_parts(self, free: MultiPolygon, tolerance: float) -> ThinParts:
+        """Find the thin parts of a free space and of the solid space around it.
+
+        Parameters
+        ----------
+        free : MultiPolygon, m
+            The free space that this is the outline of.
+        tolerance : float, m
+
+        Returns
+        -------
+        ThinParts
+        """
+        if len(self.points) > _MAX_THIN_VERTICES:
+            return ThinParts(np.empty(0), np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))
+        radius = _MAX_THIN_WIDTH * tolerance / 2
+        closed = buffer_with_mitres(buffer_with_mitres(free, radius), -radius)
+        opened = buffer_with_mitres(buffer_with_mitres(free, -radius), radius)
+        thin = [shapely.difference(closed, free), shapely.difference(free, opened)]
+        pieces = shapely.get_parts(shapely.get_parts(thin))
+        x, y, right, top = shapely.bounds(pieces).T
+        is_long = np.maximum(right - x, top - y) > _MIN_THIN_LENGTH * tolerance
+        is_rounding = shapely.area(pieces) < _MIN_THIN_WIDTH * tolerance * shapely.length(pieces)
+        pieces = pieces[is_long & ~is_rounding]
+        reach = 1e-9 if self.cell is None else 1.5 * NECK * self.cell
+        part, vertex = STRtree(shapely.points(self.points)).query(pieces, "dwithin", distance=reach)
+        return ThinParts(np.asarray(shapely.area(pieces)), vertex, part)
+
+    def to_polygons(self, drawing: RingVertices) -> MultiPolygon:
+        """Return the polygons of a drawing of this outline, m; perhaps invalid."""
+        rings = shapely.linearrings(drawing.points, indices=drawing.ring)
+        return MultiPolygon(list(shapely.polygons(rings, indices=self.owner)))
+
+
+def _remove_necks(rings: RingVertices, cell: float) -> tuple[RingVertices, BoolArray]:
+    """Replace necks, short sides between two at right angles, by the corner between them.
+
+    Returns
+    -------
+    rings : RingVertices
+    is_neck : (k,) array of bool
+        Which vertices stand for a neck.
+    """
+    before = rings.before
+    after_next = rings.after[rings.after]
+    length = rings.lengths
+    direction = rings.sides[before] / np.maximum(length[before], 1e-300)[:, None]
+    is_neck = np.abs(compute_dot(direction, direction[after_next])) < _MAX_RIGHT_ANGLE_COSINE
+    is_neck &= length < np.minimum(length[before], length[rings.after])
+    is_neck &= length < 1.001 * np.sqrt(2) * NECK * cell
+    corner = rings.points + compute_dot(rings.sides, direction)[:, None] * direction
+    points = np.where(is_neck[:, None], corner, rings.points)
+    is_kept = ~is_neck[before]
+    ring = rings.ring[is_kept]
+    starts = np.searchsorted(ring, np.arange(len(rings.starts)))
+    return RingVertices(points[is_kept], starts, rings.source[: is_kept.sum()]), is_neck[is_kept]

@@ -1,0 +1,147 @@
+"""Simplification of a free space: fewer vertices, while everything that matters stays.
+
+Walls move by at most the tolerance. Afterwards it is checked that no outline meets another one or
+itself, that every obstacle and every part that is as thin as the tolerance keeps its size, and that a robot
+passes wherever it passed. Where a check fails, the tolerance is reduced around that place, and the import
+report mentions it.
+
+The outline of cells along a wall at an angle consists of stairs, which are replaced by the midpoints of their
+steps (see `stairs`). Then the algorithm of Douglas and Peucker drops the vertices that are within
+the tolerance, between vertices that must stay.
+
+D. H. Douglas, T. K. Peucker, Algorithms for the reduction of the number of points required to represent
+a digitized line or its caricature, Cartographica 10 (1973), 112-122.
+"""
+
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+from shapely import MultiPolygon
+
+from robocov.arrays import Array, BoolArray
+from robocov.errors import format_count
+from robocov_app.formats.geometry.simplification.checks import (
+    MAX_AREA_CHANGE,
+    MAX_OUTLINE_CHANGE,
+    SimplificationCheck,
+)
+from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline
+
+_MIN_CELLS = 16
+"""Rings of fewer cells stay as they are: the cells are the best description of them."""
+_MAX_HALVINGS = 3
+"""Number of times that the tolerance around a place is halved before everything stays there."""
+_PATIENT_ROUNDS = 24
+"""Number of rounds after which whole walls stay instead of single vertices."""
+_MAX_ROUNDS = 60
+_MAX_VERTEX_ROUNDS = 1_000_000
+"""Number of rounds times the number of vertices after which everything stays."""
+
+
+class SimplifiedSpace(NamedTuple):
+    """A simplified free space.
+
+    Attributes
+    ----------
+    free : MultiPolygon, m
+    tolerance : float, m
+        Distance by which walls may have moved.
+    changed : tuple of str
+        Where and why less was simplified, for the import report.
+    """
+
+    free: MultiPolygon
+    tolerance: float
+    changed: tuple[str, ...] = ()
+
+
+def simplify_free_space(
+    free: MultiPolygon, tolerance: float, cell: float | None, radius: float
+) -> SimplifiedSpace:
+    """Simplify a free space.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+        Must be valid.
+    tolerance : float, m
+        Distance by which walls may move.
+    cell : float or None, m
+        Side of the cells that the free space consists of, if it does.
+    radius : float, m
+        Radius of a robot; it passes wherever it passed.
+
+    Returns
+    -------
+    SimplifiedSpace
+    """
+    if tolerance == 0.0 or free.is_empty:
+        return SimplifiedSpace(free, 0.0)
+    outline = OriginalOutline(list(free.geoms), cell)
+    allowed = np.full(len(outline.points), tolerance)
+    if cell is not None:
+        is_small = np.abs(outline.areas) < _MIN_CELLS * cell * cell
+        allowed[is_small[outline.ring]] = 0.0
+    is_fixed = np.zeros(len(outline.points), dtype=bool)
+    thin = outline.find_thin_parts(free, tolerance)
+    problems: Counter[str] = Counter()
+    for attempt in range(min(_MAX_ROUNDS, 1 + _MAX_VERTEX_ROUNDS // len(allowed))):
+        drawing = outline.restore_areas(outline.draw(allowed, is_fixed), allowed)
+        drawing = outline.restrain(drawing, allowed)
+        check = SimplificationCheck(
+            outline,
+            drawing,
+            allowed=allowed,
+            tolerance=tolerance,
+            width=2 * radius,
+            problems=problems,
+        )
+        wrong, far = check.find_misdrawn()
+        wrong |= check.find_misshapen(thin)
+        parts = None
+        if not (wrong.any() or far.any()):
+            parts, wrong = check.find_crossings()
+        if parts is None or wrong.any():
+            _tighten(check, wrong, far, is_fixed, whole_walls=attempt >= _PATIENT_ROUNDS)
+            continue
+        closed = check.find_closed_gaps(parts)
+        if closed is None:
+            note = "not simplified: too many gaps that a robot may pass or not"
+            return SimplifiedSpace(free, 0.0, (note,))
+        if not closed.any():
+            return SimplifiedSpace(parts, tolerance, _describe_problems(problems, radius))
+        allowed[closed] = 0.0
+    return SimplifiedSpace(free, 0.0, ("not simplified: walls would have met, or closed passages",))
+
+
+def _tighten(
+    check: SimplificationCheck, wrong: BoolArray, far: BoolArray, is_fixed: BoolArray, *, whole_walls: bool
+) -> None:
+    """Reduce the tolerances of a check where something is wrong, and fix vertices that are too far away."""
+    allowed: Array = check.allowed
+    wrong |= far & is_fixed
+    is_fixed |= far
+    if whole_walls:
+        # Everything that a side stands for together with one of these stays.
+        allowed[np.isin(check.side, check.side[wrong | far])] = 0.0
+    allowed[wrong] /= 2
+    allowed[allowed < 0.75 * check.tolerance * 0.5**_MAX_HALVINGS] = 0.0
+
+
+def _describe_problems(problems: Counter[str], radius: float) -> tuple[str, ...]:
+    """Return the lines of the import report about where less was simplified."""
+    reasons = {
+        "narrow place": f"so that a robot of radius {radius:g} m passes where it passed",
+        "thin part": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
+        "outline": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
+        "place": "where walls would have met",
+    }
+    lines = []
+    for kind, reason in reasons.items():
+        if problems[kind]:
+            lines.append(f"simplified less at {format_count(problems[kind], kind)}, {reason}")
+    if problems["area"]:
+        limit = f"{100 * MAX_AREA_CHANGE:g} %"
+        lines.append(f"simplified less, so that the free area changes by less than {limit}")
+    return tuple(lines)

@@ -1,0 +1,1 @@
+"""Formats of cells: ROS maps, pictures, Tiled maps and MovingAI grids."""

@@ -1,0 +1,180 @@
+"""MovingAI benchmark grids.
+
+Each cell is a letter: ``.`` and ``G`` are passable, and so is ``S``, swamp; ``@`` and ``O`` are out of
+bounds; ``T``, trees, and ``W``, water, are obstacles unless an option makes them free.
+
+N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Computational Intelligence
+and AI in Games 4 (2012), 144-148.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.environment import Environment
+from robocov.errors import MapError, quote, to_one_line
+from robocov.files.writing import replace_file
+from robocov_app.formats import files
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, GridFrame, build_grid_map
+from robocov_app.formats.geometry.cells.rasterize import build_grid, build_grid_report, find_free_cells
+from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.reports import ExportReport
+
+DEFAULT_CELL_M = 1.0
+"""Side of a cell if no option gives it: the format has no unit."""
+_PASSABLE_LETTERS = b".GS"
+_SOLID_LETTERS = b"@O"
+_UNKNOWN_LETTER = 255
+"""Value in the table of letters for those that the format does not have."""
+_BLANKS = b" \t\r"
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_MAX_HEADER_LINES = 19
+_MAX_HEADER_LINE_BYTES = 200
+_MAX_SIZE_DIGITS = 9
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The header of a grid.
+
+    Attributes
+    ----------
+    columns, rows : int
+    body : bytes
+        What follows the header.
+    body_line : int
+        Number of the first line of the body, from 1.
+    """
+
+    columns: int
+    rows: int
+    body: bytes
+    body_line: int
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    words = head.removeprefix(_BYTE_ORDER_MARK).split(None, 3)
+    return len(words) > 2 and words[0].lower() == b"type" and words[2].lower() in (b"height", b"width")
+
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read a grid.
+
+    Raises
+    ------
+    MapError
+        If the header is incomplete, or a row or a letter is wrong.
+    """
+    where = to_one_line(path)
+    content = files.read_content(path, files.MAX_CELLS + files.HEAD_BYTES).removeprefix(_BYTE_ORDER_MARK)
+    header = _parse_header(content, where)
+    letters = _parse_rows(header, where)
+    cells = _build_letter_table(options)[letters]
+    is_unknown = cells == _UNKNOWN_LETTER
+    if is_unknown.any():
+        row, column = np.argwhere(is_unknown)[0].tolist()
+        place = f"{where}: line {header.body_line + row}, column {column + 1}"
+        raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(letters[row, column]))}")
+    cell = DEFAULT_CELL_M if options.cell is None else options.cell
+    notes = (f"no cell size was given: {DEFAULT_CELL_M:g} m taken",) if options.cell is None else ()
+    return build_grid_map(
+        cells,
+        GridFrame(cell),
+        where,
+        name=path.stem,
+        description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
+        notes=notes,
+    )
+
+
+def _build_letter_table(options: ReadOptions) -> NDArray[np.uint8]:
+    """Return the kind of cell of each of the 256 letters."""
+    table = np.full(256, _UNKNOWN_LETTER, np.uint8)
+    table[list(_PASSABLE_LETTERS)] = FREE
+    table[list(_SOLID_LETTERS)] = BLOCKED
+    table[ord("T")] = FREE if options.trees == "free" else BLOCKED
+    table[ord("W")] = FREE if options.water == "free" else BLOCKED
+    return table
+
+
+def _parse_rows(header: _Header, where: str) -> NDArray[np.uint8]:
+    """Return the letters of a grid, (rows, columns), the top row first."""
+    rows = header.rows
+    columns = header.columns
+    lines = header.body.replace(b"\r\n", b"\n").split(b"\n", rows)
+    for k in range(rows):
+        width = len(lines[k].rstrip(_BLANKS)) if k < len(lines) else 0
+        if width != columns:
+            is_end = k >= len(lines) or (width == 0 and k == len(lines) - 1)
+            actual = "end of file" if is_end else f"{width} letters"
+            line = header.body_line + k
+            raise MapError(f"{where}: line {line}: expected {columns} letters, got {actual}")
+    if len(lines) > rows and lines[rows].strip():
+        raise MapError(f"{where}: line {header.body_line + rows}: expected {rows} rows, got more")
+    joined = b"".join(line.rstrip(_BLANKS) for line in lines[:rows])
+    return np.frombuffer(joined, np.uint8).reshape(rows, columns)
+
+
+def _parse_header(content: bytes, where: str) -> _Header:
+    """Parse the lines up to the one that says ``map``."""
+    sizes: dict[str, int] = {}
+    at = 0
+    for number in range(1, _MAX_HEADER_LINES + 1):
+        limit = at + _MAX_HEADER_LINE_BYTES
+        end = content.find(b"\n", at, limit)
+        line = content[at:end] if end >= 0 else content[at:limit]
+        at = end + 1 if end >= 0 else len(content)
+        words = line.decode("ascii", "replace").split()
+        place = f"{where}: line {number}"
+        if not words:
+            continue
+        if len(words) == 1 and words[0].lower() == "map":
+            for key in ("height", "width"):
+                if key not in sizes:
+                    raise MapError(f"{place}: expected {key} first")
+            files.require_cells(sizes["width"], sizes["height"], where)
+            return _Header(sizes["width"], sizes["height"], content[at:], number + 1)
+        _parse_header_line(words, sizes, place)
+    raise MapError(f"{where}: expected a line map after type, height and width, got none")
+
+
+def _parse_header_line(words: list[str], sizes: dict[str, int], place: str) -> None:
+    """Check a line of the header, and add its height or width to `sizes`."""
+    key = words[0].lower()
+    value = words[1] if len(words) == 2 else ""
+    if key == "type" and value:
+        if value.lower() not in ("octile", "tile"):
+            raise MapError(f"{place}: expected octile, got type {quote(value)}")
+    elif key in ("height", "width") and value.isascii() and value.isdigit():
+        if len(value) > _MAX_SIZE_DIGITS:
+            raise MapError(f"{place}: expected a smaller {key}, got {quote(value)}")
+        sizes[key] = int(value)
+    else:
+        expected = "expected type octile, height N, width N or map"
+        raise MapError(f"{place}: {expected}, got {quote(' '.join(words))}")
+
+
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    """Write an environment as a grid.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    grid = build_grid(environment, options.cell)
+    free = find_free_cells(environment, grid)
+    letters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
+    letters[:, :-1][free[::-1]] = ord(".")
+    letters[:, -1] = ord("\n")
+    header = f"type octile\nheight {grid.rows}\nwidth {grid.columns}\nmap\n"
+    with replace_file(path) as temporary:
+        temporary.write_bytes(header.encode("ascii") + letters.tobytes())
+    x, y = grid.origin
+    georeference = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
+    report = build_grid_report("movingai", (path,), environment, grid, free)
+    return replace(report, dropped=(georeference, *report.dropped))

@@ -1,0 +1,186 @@
+"""Free, blocked and unknown cells from the pixels of a picture."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from robocov.arrays import BoolArray
+from robocov.errors import MapError, format_count
+from robocov_app.formats.colors import NO_ROLE, ROLES, Role
+from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
+from robocov_app.formats.geometry.cells.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
+from robocov_app.formats.options import ReadOptions
+from robocov_app.formats.raster.picture.brightness import OPAQUE_ALPHA, STRIP_ROWS, Brightness
+from robocov_app.formats.reports import format_area
+
+_MAX_LIGHT_RATIO = 0.02
+"""Light pixels for each dark one of a drawing on a transparent ground: soft edges."""
+_MAX_LINE_FRACTION = 0.25
+"""Fraction of the pixels that lines cover if they are walls."""
+_LINE_WIDTH_FRACTION = 0.05
+"""Width of a line, of the shorter side of a picture: no line is as wide."""
+_SOFT_EDGE_PX = 2
+"""Number of pixels from one color to the next."""
+_ROLE_LABELS: dict[Role, str] = {"free": "free", "solid": "obstacles", "ignore": "left out"}
+
+
+def classify_pixels(picture: Brightness, options: ReadOptions) -> tuple[Cells, list[str]]:
+    """Return the pixels as cells, and notes on the declared colors.
+
+    Parameters
+    ----------
+    picture : Brightness
+        Its `roles` are changed where it is transparent.
+    options : ReadOptions
+    """
+    cells = _classify_brightness(picture, options)
+    is_transparent = None if picture.alpha is None else picture.alpha < OPAQUE_ALPHA
+    roles = picture.roles
+    notes: list[str] = []
+    if roles is not None:
+        if is_transparent is not None:
+            roles[is_transparent] = NO_ROLE  # a transparent pixel has no color
+        notes = _describe_roles(roles, options)
+        cells[roles == _get_role_code("free")] = FREE
+        cells[roles == _get_role_code("solid")] = BLOCKED
+        if not options.invert:
+            _free_soft_edges(cells, picture, roles, options)
+    if is_transparent is not None:
+        cells[is_transparent] = UNKNOWN
+    if roles is not None and options.ignore_color:
+        _fill_from_around(cells, roles == _get_role_code("ignore"))
+    return cells, notes
+
+
+def _get_role_code(role: Role) -> int:
+    return ROLES.index(role) + 1
+
+
+def _classify_brightness(picture: Brightness, options: ReadOptions) -> Cells:
+    """Return light pixels as free cells, or dark ones if the option ``invert`` is set."""
+    threshold = 0.5 if options.threshold is None else options.threshold
+    shade = np.arange(picture.full + 1) / picture.full
+    is_free = shade <= 1.0 - threshold if options.invert else shade >= threshold
+    table = np.where(is_free, FREE, BLOCKED).astype(np.uint8)
+    return table[picture.level]
+
+
+def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]:
+    """Return how much of the picture each declared role covers."""
+    notes = []
+    for role in ROLES:
+        names = getattr(options, f"{role}_color")
+        if names:
+            fraction = np.count_nonzero(roles == _get_role_code(role)) / roles.size
+            colors = ", ".join(names)
+            notes.append(f"{100 * fraction:.3g} % of the pixels are {colors}, taken as {_ROLE_LABELS[role]}")
+    return notes
+
+
+def _free_soft_edges(
+    cells: Cells, picture: Brightness, roles: NDArray[np.uint8], options: ReadOptions
+) -> None:
+    """Make soft edges between a dark declared color and light paint free.
+
+    Their mixed colors are neither; without this, they would become walls around such colors.
+    """
+    declared = [sum(color) / 765 for color, role in options.build_color_key().entries if role != "solid"]
+    if not declared or min(declared) >= 0.5:
+        return
+    mixed = (cells == BLOCKED) & (roles == NO_ROLE) & (picture.level > min(declared) * picture.full)
+    around = np.ones((3, 3), dtype=bool)
+    is_declared = (roles == ROLES.index("free") + 1) | (roles == ROLES.index("ignore") + 1)
+    mixed &= ndimage.binary_dilation(is_declared, around, iterations=_SOFT_EDGE_PX)
+    mixed &= ndimage.binary_dilation((cells == FREE) & (roles == NO_ROLE), around, iterations=_SOFT_EDGE_PX)
+    cells[mixed] = FREE
+
+
+def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:
+    """Give ignored cells the value of the nearest other cell, or make them free if there is none near."""
+    halo = STRIP_ROWS // 4
+    original = cells.copy()
+    for top in range(0, len(cells), STRIP_ROWS):
+        low = max(top - halo, 0)
+        high = min(top + STRIP_ROWS + halo, len(cells))
+        strip = ignored[low:high]
+        inner = ignored[top : top + STRIP_ROWS]
+        if not inner.any():
+            continue
+        if strip.all():
+            cells[top : top + STRIP_ROWS] = FREE
+            continue
+        indices = ndimage.distance_transform_edt(strip, return_distances=False, return_indices=True)
+        row, column = indices[:, top - low : top - low + len(inner)][:, inner]
+        cells[top : top + STRIP_ROWS][inner] = original[low:high][row, column]
+
+
+def is_on_transparent_ground(cells: Cells) -> bool:
+    """Return whether a picture has only transparent and dark pixels, apart from soft edges."""
+    counts = np.bincount(cells.ravel(), minlength=3)
+    return bool(counts[FREE] < _MAX_LIGHT_RATIO * counts[BLOCKED] and counts[UNKNOWN] > counts[BLOCKED] > 0)
+
+
+def drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -> tuple[str, ...]:
+    """Make thin strokes free in `cells`, and return lines of the report."""
+    width = options.compute_stroke_width(cell)
+    pixels = math.ceil(width / cell - 1e-9)
+    if pixels > MAX_STROKE_PIXELS:
+        problem = f"expected at most {MAX_STROKE_PIXELS} pixels, got {pixels}"
+        raise MapError(f"{where}: min_stroke: {problem}")
+    solid = cells == BLOCKED
+    thin = solid & ~remove_thin_strokes(solid, pixels)
+    count = int(np.count_nonzero(thin))
+    if not count:
+        return ()
+    cells[thin] = FREE
+    pieces = ndimage.label(thin, structure=np.ones((3, 3)))[1]
+    area = format_area(count * cell * cell, 3)
+    strokes = f"strokes thinner than {pixels * cell:.3g} m ({pixels} px)"
+    return (f"{strokes} in {format_count(pieces, 'piece')}, {area} (--min-stroke)",)
+
+
+def _is_line_drawing(cells: Cells) -> bool:
+    """Return whether the free cells are thin lines on a dark ground, as in a blueprint."""
+    free = cells == FREE
+    if not 0.0 < free.mean() < _MAX_LINE_FRACTION:
+        return False
+    width = min(max(round(_LINE_WIDTH_FRACTION * min(cells.shape)), 3), MAX_STROKE_PIXELS)
+    return not remove_thin_strokes(free, width).any()
+
+
+def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: str) -> None:
+    """Raise MapError, with the cause, if no cell is free; `unknown` is the treatment of unknown cells."""
+    counts = np.bincount(cells.ravel(), minlength=3)
+    if counts[FREE] or (unknown == "free" and counts[UNKNOWN]):
+        return
+    if counts[UNKNOWN]:
+        percentage = 100 * counts[UNKNOWN] / cells.size
+        cause = f"{percentage:.3g} % of the pixels are transparent, which counts as solid"
+        advice = "--unknown free takes transparent cells as free"
+    else:
+        darkest = picture.level.min() / picture.full
+        lightest = picture.level.max() / picture.full
+        cause = f"its brightness is from {darkest:.2g} to {lightest:.2g}"
+        advice = "--threshold, --invert or --free-color choose otherwise"
+    raise MapError(f"{where}: no cell is free: {cause} ({advice})")
+
+
+def describe_doubts(cells: Cells, unknown: str, picture: Brightness) -> list[str]:
+    """Return a note if nothing is solid, or if the free cells look like walls."""
+    counts = np.bincount(cells.ravel(), minlength=3)
+    if not counts[BLOCKED] and unknown == "free" and counts[UNKNOWN]:
+        percentage = 100 * counts[UNKNOWN] / cells.size
+        return [
+            f"nothing is solid: {percentage:.3g} % of the pixels are transparent (less than half opaque), "
+            "which --unknown free takes as free"
+        ]
+    if _is_line_drawing(cells):
+        percentage = 100 * counts[FREE] / cells.size
+        light = f"only {percentage:.2g} % of the pixels are light, all of them thin lines"
+        return [f"{light}: if they are the walls, --invert takes them as such"]
+    if not counts[BLOCKED] and not counts[UNKNOWN]:
+        darkest = picture.level.min() / picture.full
+        return [f"nothing is solid: the darkest pixel has a brightness of {darkest:.2g} (--threshold)"]
+    return []

@@ -1,0 +1,133 @@
+"""Cells of a ROS map from the pixels of its picture.
+
+The rules are those of http://wiki.ros.org/map_server and of nav2_map_server in ROS 2. With p the darkness of
+a pixel from 0 to 1 (or its brightness, if `negate` is set), a cell of mode
+
+- trinary is occupied if p > occupied_thresh, free if p < free_thresh, else unknown; an alpha channel is
+  averaged in like a color;
+- scale is unknown if it is not opaque; between the thresholds, its occupancy rises from 0 to 100 %;
+- raw has the value of the pixel as its occupancy in %, and is unknown if that exceeds 100; `negate` and the
+  thresholds do not count.
+"""
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import ParameterError
+from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
+from robocov_app.formats.options import ReadOptions
+from robocov_app.formats.raster.picture import Brightness
+from robocov_app.formats.raster.ros.metadata import Metadata
+
+_DEFAULT_OCCUPANCY = 0.5
+"""Cells with this occupancy or a higher one are obstacles, in the modes scale and raw."""
+
+
+def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, where: str) -> Cells:
+    """Return the cells of a picture by the mode of its map.
+
+    Parameters
+    ----------
+    picture : Brightness
+    metadata : Metadata
+    options : ReadOptions
+    where : str
+        The file, for messages.
+
+    Returns
+    -------
+    (rows, columns) array of uint8
+
+    Raises
+    ------
+    ParameterError
+        If the option ``threshold`` is given for the mode trinary, which has two of its own.
+    """
+    threshold = _DEFAULT_OCCUPANCY if options.threshold is None else options.threshold
+    if metadata.mode == "raw":
+        return classify_raw(picture, threshold)
+    if metadata.mode == "scale":
+        return classify_scale(
+            picture,
+            negate=metadata.negate,
+            free=metadata.free,
+            occupied=metadata.occupied,
+            threshold=threshold,
+        )
+    if options.threshold is not None:
+        raise ParameterError(f"--threshold: of no use here: {where} is of mode trinary")
+    return classify_trinary(picture, negate=metadata.negate, free=metadata.free, occupied=metadata.occupied)
+
+
+def classify_trinary(picture: Brightness, *, negate: bool, free: float, occupied: float) -> Cells:
+    """Return the cells of a picture of mode trinary.
+
+    Parameters
+    ----------
+    picture : Brightness
+    negate : bool
+        Whether light pixels are occupied, not dark ones.
+    free, occupied : float
+        Thresholds of darkness, from 0 to 1.
+
+    Returns
+    -------
+    (rows, columns) array of uint8
+    """
+    level = picture.level
+    full = picture.full
+    if picture.alpha is not None:
+        # The mean of red, green, blue and alpha; in a gray picture, each color is the level.
+        color_sums = np.rint(np.arange(full + 1) * (765 / full)).astype(np.uint16)
+        level = color_sums[level] + picture.alpha.astype(np.uint16)
+        full = 4 * 255
+    darkness = _compute_darkness(full, negate)
+    table = np.full(full + 1, UNKNOWN, np.uint8)
+    table[darkness < free] = FREE
+    table[darkness > occupied] = BLOCKED
+    return table[level]
+
+
+def classify_scale(
+    picture: Brightness, *, negate: bool, free: float, occupied: float, threshold: float
+) -> Cells:
+    """Return the cells of a picture of mode scale.
+
+    Parameters
+    ----------
+    picture, negate, free, occupied
+        See `classify_trinary`.
+    threshold : float
+        Occupancy, from 0 to 1, from which a cell is an obstacle.
+
+    Returns
+    -------
+    (rows, columns) array of uint8
+    """
+    darkness = _compute_darkness(picture.full, negate)
+    occupancy = np.rint((darkness - free) / max(occupied - free, 1e-9) * 100.0)
+    occupancy[darkness < free] = 0.0
+    occupancy[darkness > occupied] = 100.0
+    cells = _find_blocked_cells(occupancy, threshold)[picture.level]
+    if picture.alpha is not None:
+        cells[picture.alpha < 255] = UNKNOWN
+    return cells
+
+
+def classify_raw(picture: Brightness, threshold: float) -> Cells:
+    """Return the cells, (rows, columns), of a picture of mode raw, whose pixels are the occupancy."""
+    occupancy = np.rint(_compute_darkness(picture.full, negate=True) * 255.0)
+    table = _find_blocked_cells(occupancy, threshold)
+    table[occupancy > 100.0] = UNKNOWN
+    return table[picture.level]
+
+
+def _compute_darkness(full: int, negate: bool) -> Array:
+    """Return the darkness, from 0 to 1, of each level from 0 to `full`."""
+    shade = np.arange(full + 1) / full
+    return shade if negate else 1.0 - shade
+
+
+def _find_blocked_cells(occupancy: Array, threshold: float) -> Cells:
+    """Return `BLOCKED` or `FREE` for occupancies in percent; a cell of 0 % is always free."""
+    return np.where(occupancy >= max(100.0 * threshold, 1.0), BLOCKED, FREE).astype(np.uint8)

@@ -1,0 +1,87 @@
+"""Global IDs of the tiles of a layer: CSV, base64 with or without compression, or elements."""
+
+import binascii
+import zlib
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.errors import to_one_line
+from robocov_app.formats import files
+from robocov_app.formats.files.xml_tree import Element
+from robocov_app.formats.raster.tmx.attributes import parse_integer
+
+GlobalIDs: TypeAlias = NDArray[np.uint32]
+"""The number of a tile and its flips; 0 where there is no tile."""
+FLIPPED_HORIZONTALLY = 0x80000000
+FLIPPED_VERTICALLY = 0x40000000
+FLIPPED_DIAGONALLY = 0x20000000
+ID_MASK = 0x0FFFFFFF
+"""Bits of the number of a tile."""
+_MAX_NAME_CHARACTERS = 20
+
+
+def decode_ids(piece: Element, data: Element, count: int) -> GlobalIDs:
+    """Return the global IDs of tiles.
+
+    Parameters
+    ----------
+    piece : Element
+        The element that contains the tiles, which is `data` or a chunk in it.
+    data : Element
+        Its attributes give the encoding.
+    count : int
+        Expected number of tiles.
+
+    Returns
+    -------
+    (count,) array
+
+    Raises
+    ------
+    MapError
+        If the encoding is unknown, the data are damaged, or the number of tiles is another one.
+    """
+    encoding = data.attributes.get("encoding", "")
+    compression = data.attributes.get("compression", "")
+    ids: GlobalIDs | None
+    if encoding == "base64" and compression in ("", "zlib", "gzip"):
+        ids = _decode_base64_ids(piece, compression, count)
+    elif encoding == "csv":
+        ids = _decode_csv_ids(piece, count)
+    elif not encoding:
+        tiles = [child for child in piece.children if child.tag == "tile"]
+        ids = np.array([parse_integer(tile, "gid", 0, "0") for tile in tiles], np.uint32)
+    else:
+        words = [to_one_line(word)[:_MAX_NAME_CHARACTERS] for word in (encoding, compression) if word]
+        name = " ".join(words)
+        piece.refuse(f"expected CSV, or base64 with zlib or gzip or neither, got {name}")
+    if ids is None or len(ids) != count:
+        actual = "more" if ids is None else len(ids)
+        piece.refuse(f"expected {count} tiles, as it says, got {actual}")
+    return ids
+
+
+def _decode_base64_ids(piece: Element, compression: str, count: int) -> GlobalIDs | None:
+    """Return global IDs, or None if there are more than `count`."""
+    size = 4 * count
+    try:
+        raw = binascii.a2b_base64("".join(piece.text.split()), strict_mode=True)
+        if compression:  # never unpacked to more than expected
+            raw = zlib.decompressobj(wbits=47).decompress(raw, size + 1)
+    except (ValueError, zlib.error) as error:
+        piece.refuse(f"not {compression or 'base64'}: {to_one_line(error)[:60]}")
+    if len(raw) > size:
+        return None
+    return np.frombuffer(raw, "<u4", min(count, len(raw) // 4))
+
+
+def _decode_csv_ids(piece: Element, count: int) -> GlobalIDs | None:
+    """Return global IDs, or None if there are more than `count`."""
+    if piece.text.count(",") > count:  # a comma may end the text
+        return None
+    numbers = files.parse_integers(piece.text, ",")
+    if numbers is None or not ((numbers >= 0) & (numbers < 2**32)).all():
+        piece.refuse("expected whole numbers from 0, separated by commas")
+    return numbers.astype(np.uint32)

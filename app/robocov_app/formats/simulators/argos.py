@@ -1,0 +1,135 @@
+"""Arenas of the simulator ARGoS: https://www.argos-sim.info/user_manual.php.
+
+C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for multi-robot systems, Swarm
+Intelligence 6 (2012), 271-295.
+
+Boxes and cylinders are obstacles, whether they can be moved or not. Other bodies are robots, and their
+positions are starts. Entities distributed by the methods ``grid`` and ``constant`` are placed. Those
+distributed at random are left out and counted, because only ARGoS can compute their positions from the seed.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from robocov.arrays import Array
+from robocov.errors import quote, to_one_line
+from robocov.mapfile.models import MAX_SIZE_M
+from robocov_app.formats.files.xml_tree import Element, read_xml_tree
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
+from robocov_app.formats.geometry.shapes.collection import Shapes
+from robocov_app.formats.options import ReadOptions
+
+MAX_PLACED_ENTITIES = 4_000
+"""Largest number of entities that a file distributes in a grid or at one position."""
+_MAX_TILT_DEG = 1e-6
+"""Bodies that are turned about other axes than z by more are tilted."""
+_MAX_TAG_CHARACTERS = 30
+_MIN_LENGTH_M = 1e-6
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return b"<argos-configuration" in head
+
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read the arena of an experiment.
+
+    Raises
+    ------
+    MapError
+        If the file is not an experiment, or has no arena.
+    """
+    root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
+    arena = root.find_child("arena")
+    if arena is None:
+        root.refuse("no <arena>")
+    shapes = Shapes(root.where, options)
+    size = _parse_lengths(arena, "size")[:2]
+    corner = arena.parse_numbers("center", count=3, default="0,0,0")[:2] - size / 2
+    world = MultiPolygon([shapely.box(*corner, *(corner + size))])
+    for child in arena.children:
+        if child.tag == "distribute":
+            _distribute(child, shapes)
+            continue
+        body = child.find_child("body")
+        if body is not None:
+            position = body.parse_numbers("position", count=3, default="0,0,0")
+            orientation = body.parse_numbers("orientation", count=3, default="0,0,0")
+            _place(child, position, orientation, shapes)
+    return shapes.build_foreign_map(path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
+
+
+def _distribute(element: Element, shapes: Shapes) -> None:
+    """Place the entities of a <distribute>, or count them as left out if their positions are random."""
+    position = element.find_child("position")
+    orientation = element.find_child("orientation")
+    entity = element.find_child("entity")
+    if position is None or orientation is None or entity is None or not entity.children:
+        element.refuse("expected <position>, <orientation> and <entity> with something in it")
+    quantity = int(entity.parse_numbers("quantity", count=1)[0])
+    body = entity.children[0]
+    method = position.attributes.get("method", "")
+    is_turned_alike = orientation.attributes.get("method", "") == "constant"
+    if method not in ("grid", "constant") or not is_turned_alike:
+        tag = to_one_line(body.tag)[:_MAX_TAG_CHARACTERS]
+        shapes.leave_out(tag, "that ARGoS places at random", max(quantity, 0))
+        return
+    if not 0 <= quantity <= MAX_PLACED_ENTITIES:
+        entity.refuse(f"expected a number from 0 to {MAX_PLACED_ENTITIES}, got quantity {quantity}")
+    angles = orientation.parse_numbers("values", count=3)
+    if method == "constant":
+        positions = [position.parse_numbers("values", count=3)] * quantity
+    else:
+        positions = list(_compute_grid_positions(position, quantity))
+    for point in positions:
+        _place(body, point, angles, shapes)
+
+
+def _compute_grid_positions(element: Element, quantity: int) -> Array:
+    """Return the positions of entities in a grid, (quantity, 3) m, in the order in which ARGoS fills it."""
+    layout = element.parse_numbers("layout", count=3).astype(int)
+    if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
+        element.refuse(f"expected one for {quantity}, got layout {layout.tolist()}")
+    columns, rows, _ = layout
+    distances = element.parse_numbers("distances", count=3)
+    first = element.parse_numbers("center", count=3) + (layout - 1) * distances / 2
+    k = np.arange(quantity)
+    steps = np.column_stack([k % columns, k // columns % rows, k // (columns * rows)])
+    positions: Array = first - steps * distances
+    return positions
+
+
+def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> None:
+    """Add a body at a position, (3,) m, turned about z, y and x by three angles, degrees."""
+    tag = element.tag
+    labels = [element.attributes.get("id", tag), tag]
+    if not shapes.accept(labels):
+        return
+    if tag not in ("box", "cylinder"):
+        shapes.robots.append((float(position[0]), float(position[1])))
+        return
+    tilt = np.abs((angles[1:] + 90) % 180 - 90)
+    if (tilt > _MAX_TILT_DEG).any():
+        shapes.leave_out(tag, "that is tilted")
+    elif tag == "box":
+        ring = UNIT_SQUARE * _parse_lengths(element, "size")[:2]
+        frame = build_frame(position[0], position[1], math.radians(angles[0]))
+        shapes.add_outline([transform_points(frame, ring)], labels, at=f"line {element.line}")
+    else:
+        radius = float(_parse_lengths(element, "radius", count=1)[0])
+        shapes.add_circle(position[:2], radius, labels, at=f"line {element.line}")
+
+
+def _parse_lengths(element: Element, name: str, count: int = 3) -> Array:
+    """Return the lengths in an attribute, m; the first two must be positive."""
+    values = element.parse_numbers(name, count=count)
+    lengths = values[:2]
+    if not (lengths.min() >= _MIN_LENGTH_M and lengths.max() <= MAX_SIZE_M):
+        element.refuse(f"expected lengths above 0, got {name} {quote(element.attributes[name])}")
+    return values

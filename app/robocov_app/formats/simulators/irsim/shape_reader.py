@@ -1,0 +1,87 @@
+"""Shapes of the obstacles of IR-SIM: circles, rectangles, polygons, lines and compounds of them."""
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.formats import files
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
+from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
+from robocov_app.formats.simulators.irsim.node import Node
+
+
+class ShapeReader:
+    """Adds the shapes of obstacles to a collection, and limits their number.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    """
+
+    def __init__(self, shapes: Shapes) -> None:
+        self._shapes = shapes
+        self._count = 0
+
+    def add(self, shape: Node, frame: Array, labels: tuple[str, ...]) -> None:
+        """Add a shape.
+
+        Parameters
+        ----------
+        shape : Node
+        frame : (3, 3) array
+            Transform from the frame of the shape to meters.
+        labels : tuple of str
+
+        Raises
+        ------
+        MapError
+            If a value is invalid, or there are too many shapes.
+        """
+        # Few objects may stand for many shapes, so these are counted before they are built.
+        self._count += 1
+        files.require_shapes(self._count, self._shapes.where)
+        name = shape["name"].get_text("circle").lower()
+        shift = np.array([shape["wheelbase"].parse_number(0.0) / 2, 0.0])
+        if shape["random_shape"].is_true():
+            self._shapes.leave_out("shape", "by chance")
+        elif name == "circle":
+            self._add_circle(shape, frame, labels, shift)
+        elif name == "rectangle":
+            self._add_rectangle(shape, frame, labels, shift)
+        elif name == "polygon":
+            points = _parse_vertices(shape, frame, minimum=3)
+            self._shapes.add_outline([points], labels, at=_get_place(shape), thing="polygon")
+        elif name == "linestring":
+            points = _parse_vertices(shape, frame, minimum=2)
+            self._shapes.add_line(WallLine(points, self._shapes.thickness, labels), at=_get_place(shape))
+        elif name == "compound":
+            for part in shape["parts"].list_items():
+                pose = part["pose"].parse_numbers([0.0, 0.0, 0.0])[:3]
+                self.add(part, frame @ build_frame(*pose), labels)
+        else:
+            shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
+
+    def _add_circle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
+        """Add a disc; `shift` is the position of its frame, (2,) m."""
+        center = shape["center"].parse_numbers([0.0, 0.0])[:2] + shift
+        radius = shape["radius"].parse_length(0.2)
+        (center,) = transform_points(frame, center[None])
+        self._shapes.add_circle(center, radius, labels, at=_get_place(shape))
+
+    def _add_rectangle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
+        size = np.array([shape["length"].parse_length(1.0), shape["width"].parse_length(1.0)])
+        ring = transform_points(frame, UNIT_SQUARE * size + shift)
+        self._shapes.add_outline([ring], labels, at=_get_place(shape))
+
+
+def _get_place(shape: Node) -> str:
+    """Return the position of a shape without the file, for messages."""
+    _, _, place = shape.at.partition(": ")
+    return place
+
+
+def _parse_vertices(shape: Node, frame: Array, *, minimum: int) -> Array:
+    """Return the vertices of a polygon or line, (k, 2) m. Raises MapError if there are too few."""
+    points = [point.parse_numbers([0.0, 0.0])[:2] for point in shape["vertices"].list_items()]
+    if len(points) < minimum:
+        shape["vertices"].refuse("a list of points [x, y]")
+    return transform_points(frame, np.array(points))

@@ -1,0 +1,5 @@
+"""Worlds of Stage: words and includes (`tokens`), models and macros (`entities`), `placement`, the map."""
+
+from robocov_app.formats.simulators.stage.reading import read, sniff
+
+__all__ = ["read", "sniff"]

@@ -1,0 +1,82 @@
+"""Bitmaps of models, whose dark pixels are walls."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from shapely import MultiPolygon
+
+from robocov.errors import MapError, to_one_line
+from robocov_app.formats import files
+from robocov_app.formats.geometry.cells.vectorize import outline_free_cells
+from robocov_app.formats.raster.picture import describe_transparency, read_picture
+
+_MAX_DARK_LEVEL = 127 / 255
+"""Pixels are dark up to this brightness, from 0 to 1."""
+
+
+class Bitmap(NamedTuple):
+    """The free part of a picture.
+
+    Attributes
+    ----------
+    free : MultiPolygon
+        Scaled so that the box around all dark pixels is the square of side 1 around the origin.
+    columns, rows : int
+        Size of that box in pixels.
+    """
+
+    free: MultiPolygon
+    columns: int
+    rows: int
+
+
+class BitmapReader:
+    """Reads the pictures of a world, each once.
+
+    Parameters
+    ----------
+    notes : list of str
+        Takes remarks about pictures.
+    """
+
+    def __init__(self, notes: list[str]) -> None:
+        self._notes = notes
+        self._bitmaps: dict[Path, Bitmap] = {}
+        self._pixel_count = 0
+
+    def read(self, file: Path) -> Bitmap:
+        """Read a picture.
+
+        Raises
+        ------
+        MapError
+            If it cannot be read, is only dark or light, or all pictures together are too large.
+        """
+        if file not in self._bitmaps:
+            self._bitmaps[file] = self._read(file, to_one_line(file))
+        return self._bitmaps[file]
+
+    def _read(self, file: Path, where: str) -> Bitmap:
+        picture = read_picture(file, where)
+        self._pixel_count += picture.level.size
+        if self._pixel_count > files.MAX_CELLS:
+            millions = files.MAX_CELLS // 1_000_000
+            actual = f"with those before it more than {millions} million pixels"
+            raise MapError(f"{where}: expected fewer, got {actual}")
+        is_dark = picture.level <= _MAX_DARK_LEVEL * picture.full
+        transparency = describe_transparency(picture)
+        if transparency:
+            self._notes.append(f"{to_one_line(file.name)}: {transparency}")
+        if not is_dark.any() or (transparency and is_dark.all()):
+            shade = "dark" if is_dark.any() else "light"
+            cause = f": {transparency}" if transparency else ""
+            raise MapError(f"{where}: all is {shade}, expected a picture with dark walls{cause}")
+        row = np.flatnonzero(is_dark.any(axis=1))
+        column = np.flatnonzero(is_dark.any(axis=0))
+        is_free = ~is_dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
+        rows, columns = is_free.shape
+        free = MultiPolygon()
+        if is_free.any():
+            free = outline_free_cells(is_free, (1 / columns, 1 / rows), (-0.5, -0.5), where)
+        return Bitmap(free, columns, rows)

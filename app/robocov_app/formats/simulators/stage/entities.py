@@ -1,0 +1,168 @@
+"""Models, blocks and windows of world files, with their properties, and macros that stand for them."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import MapError, quote
+from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov_app.formats import files
+from robocov_app.formats.simulators.stage.tokens import BRACKETS, Token
+
+
+@dataclass(frozen=True, eq=False)
+class Entity:
+    """A model, block or window.
+
+    Attributes
+    ----------
+    type : str
+        Type of the model, or name of a macro.
+    at : str
+        File and line.
+    properties : dict of str to list of str
+        Values by the name of the property.
+    children : list of Entity
+        Entities within this one.
+    """
+
+    type: str
+    at: str
+    properties: dict[str, list[str]] = field(default_factory=dict)
+    children: list[Entity] = field(default_factory=list)
+
+    def get_text(self, name: str, default: str = "") -> str:
+        """Return the first value of a property."""
+        return self.properties.get(name, [default])[0]
+
+    def parse_number(self, name: str, default: float) -> float:
+        """Return the first value of a property as a number. Raises MapError if it is not one."""
+        return float(self.parse_numbers(name, (default,))[0])
+
+    def parse_numbers(self, name: str, default: tuple[float, ...]) -> Array:
+        """Return the values of a property as numbers.
+
+        Parameters
+        ----------
+        name : str
+        default : tuple of float
+            Values that are taken for missing ones at the end.
+
+        Returns
+        -------
+        (k,) array
+            As long as `default`.
+
+        Raises
+        ------
+        MapError
+            If a value is not a number, or out of range.
+        """
+        texts = self.properties.get(name, [])[: len(default)]
+        numbers = [files.parse_number(text) for text in texts]
+        values = np.array([*numbers, *default[len(texts) :]])
+        if not (np.abs(values) <= MAX_COORDINATE_M).all():
+            raise MapError(f"{self.at}: expected numbers within 1e7, got {name} {quote(' '.join(texts))}")
+        return values
+
+
+class World(NamedTuple):
+    """The content of a world file.
+
+    Attributes
+    ----------
+    root : Entity
+        Its children and properties are those on the top level of the file.
+    macros : dict of str to Entity
+        Entities that others are based on, by their names.
+    """
+
+    root: Entity
+    macros: dict[str, Entity]
+
+
+def parse_world(tokens: deque[Token], where: str) -> World:
+    """Parse the tokens of a world.
+
+    Parameters
+    ----------
+    tokens : deque of Token
+        They are consumed.
+    where : str
+        The file, for messages.
+
+    Raises
+    ------
+    MapError
+        At the first mistake.
+    """
+    parser = _EntityParser(tokens)
+    root = Entity("world", where)
+    parser.parse_content(root, 0)
+    return World(root, parser.macros)
+
+
+class _EntityParser:
+    """Builds entities from tokens."""
+
+    def __init__(self, tokens: deque[Token]) -> None:
+        self.macros: dict[str, Entity] = {}
+        self._tokens = tokens
+
+    def parse_content(self, entity: Entity, depth: int) -> None:
+        """Add properties and children to an entity, up to its closing bracket; `depth` 0 has none."""
+        if depth > files.MAX_DEPTH:
+            raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}")
+        while self._tokens:
+            token = self._tokens.popleft()
+            if depth and token.kind == ")":
+                return
+            if token.kind != "word":
+                closing = ", or )," if depth else ""
+                token.refuse(f"the name of a model or a property{closing}")
+            if token.text == "define" and self._is_at_macro():
+                self._parse_macro(token, depth)
+            elif self._peek_kind(0) == "(":
+                self._tokens.popleft()
+                child = Entity(token.text, token.at)
+                entity.children.append(child)
+                self.parse_content(child, depth + 1)
+            else:
+                entity.properties[token.text] = self._parse_values(token)
+        if depth:
+            Token("", "the end of the file", entity.at).refuse("a ) after what begins here")
+
+    def _peek_kind(self, index: int) -> str:
+        """Return the kind of a following token, or an empty text beyond the end."""
+        return self._tokens[index].kind if index < len(self._tokens) else ""
+
+    def _is_at_macro(self) -> bool:
+        """Return whether a name, a type and a bracket follow."""
+        kinds = [self._peek_kind(index) for index in range(3)]
+        return kinds[:2] == ["word", "word"] and kinds[2] in BRACKETS
+
+    def _parse_macro(self, define: Token, depth: int) -> None:
+        name = self._tokens.popleft()
+        base = self._tokens.popleft()
+        self._tokens.popleft()  # the bracket
+        macro = Entity(base.text, define.at)
+        self.parse_content(macro, depth + 1)
+        self.macros.setdefault(name.text, macro)
+
+    def _parse_values(self, name: Token) -> list[str]:
+        """Return the values of a property, at least one, which may be an empty text."""
+        values = [self._tokens.popleft()] if self._tokens else [name]
+        if values[0].kind == "[":
+            values = []
+            while self._tokens and self._tokens[0].kind not in BRACKETS:
+                values.append(self._tokens.popleft())
+            if not self._tokens or self._tokens.popleft().text != "]":
+                name.refuse("a ] after its values")
+        if not all(value.kind in ("number", "string") for value in values):
+            name.refuse("a value, or ( and ), after it")
+        return [value.text for value in values] or [""]

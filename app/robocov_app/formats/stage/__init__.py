@@ -1,5 +1,0 @@
-"""Worlds of Stage: words and includes (`tokens`), models and macros (`entities`), `placement`, the map."""
-
-from robocov_app.formats.stage.reading import read, sniff
-
-__all__ = ["read", "sniff"]

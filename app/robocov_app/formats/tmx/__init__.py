@@ -1,5 +1,0 @@
-"""Tile maps of Tiled: the map (`reading`), its layers, their grids of tiles, tilesets and objects."""
-
-from robocov_app.formats.tmx.reading import read, sniff
-
-__all__ = ["read", "sniff"]

@@ -1,0 +1,6 @@
+"""DXF drawings: loading by ezdxf (`document`), the map (`reading`), entities (`entity_reader`) and curves."""
+
+from robocov_app.formats.vector.dxf.document import sniff
+from robocov_app.formats.vector.dxf.reading import read
+
+__all__ = ["read", "sniff"]

@@ -1,0 +1,114 @@
+"""HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in meters.
+
+The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
+corners cut by a step or two of it. Doors and furniture are not in the format.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely import MultiPolygon, Polygon
+
+from robocov.arrays import Array
+from robocov.errors import MapError, format_count, to_one_line
+from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov_app.formats.files import JsonFile, starts_with
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.crossings import CrossingCounter
+from robocov_app.formats.geometry.shapes.enclosed_area import EnclosedArea, find_enclosed_area
+from robocov_app.formats.options import ReadOptions
+
+_MIN_HOLE_M2 = 1e-4
+"""Smaller holes come from rounding."""
+_MAX_NAME_CHARACTERS = 60
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return starts_with(head, b"{") and b'"verts"' in head
+
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    """Read a floor plan.
+
+    Raises
+    ------
+    MapError
+        If the file has no ring of finite points that encloses an area.
+    """
+    file = JsonFile(path)
+    document = file.document
+    if not isinstance(document, dict) or "verts" not in document:
+        raise MapError(f'{file.where}: not a HouseExpo plan, expected an object with "verts"')
+    vertices = _parse_vertices(file, document["verts"])
+    is_new = (vertices != np.roll(vertices, 1, axis=0)).any(axis=1)
+    ring = vertices[is_new]
+    if len(ring) < 3:
+        raise MapError(f"{file.where}: verts: expected at least 3 different points, got {len(ring)}")
+    enclosed = find_enclosed_area([ring], crossings=CrossingCounter(file.where))
+    if enclosed.area.is_empty:
+        raise MapError(f"{file.where}: verts: expected an outline with an area, got 0 m²")
+    free, dropped = _remove_small_holes(enclosed.area)
+    return ForeignMap(
+        name=f"HouseExpo {_get_name(document, path)}",
+        description=f"A floor plan{_describe_rooms(document)}, imported from HouseExpo.",
+        free=free,
+        vertices_read=len(vertices),
+        cut_corners=True,
+        repaired=_describe_repairs(len(vertices) - len(ring), enclosed),
+        dropped=dropped,
+    )
+
+
+def _parse_vertices(file: JsonFile, value: Any) -> Array:
+    """Return the vertices of the ring, (k, 2) m."""
+    if not isinstance(value, list) or len(value) < 3:
+        raise file.build_error(("verts",), value, "a list of at least 3 points [x, y]")
+    for k, point in enumerate(value):
+        is_pair = isinstance(point, list) and len(point) == 2
+        if not is_pair or not all(map(_is_coordinate, point)):
+            raise file.build_error(("verts", k), point, "a point [x, y] in meters")
+    return np.array(value, dtype=float)
+
+
+def _is_coordinate(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) <= MAX_COORDINATE_M
+
+
+def _remove_small_holes(area: MultiPolygon) -> tuple[MultiPolygon, tuple[str, ...]]:
+    """Return an area without holes that come from rounding, and a line of the report about them."""
+    polygons: list[Polygon] = []
+    small_holes: list[Polygon] = []
+    for polygon in area.geoms:
+        large_holes: list[Polygon] = []
+        for ring in polygon.interiors:
+            hole = Polygon(ring)
+            holes = small_holes if hole.area < _MIN_HOLE_M2 else large_holes
+            holes.append(hole)
+        polygons.append(Polygon(polygon.exterior, [hole.exterior for hole in large_holes]))
+    dropped: tuple[str, ...] = ()
+    if small_holes:
+        small_area = sum(hole.area for hole in small_holes)
+        dropped = (f"{format_count(len(small_holes), 'hole')} of {small_area:.2g} m² together",)
+    return MultiPolygon(polygons), dropped
+
+
+def _describe_repairs(repeated_vertices: int, enclosed: EnclosedArea) -> tuple[str, ...]:
+    repaired = []
+    if repeated_vertices:
+        repaired.append(f"{repeated_vertices} repeated vertices taken out")
+    if enclosed.invalidity is not None:
+        repaired.append(f"the outline met itself: {enclosed.invalidity}")
+    return tuple(repaired)
+
+
+def _get_name(document: dict[str, Any], path: Path) -> str:
+    identifier = document.get("id")
+    is_named = isinstance(identifier, str) and bool(identifier)
+    return to_one_line(identifier if is_named else path.stem)[:_MAX_NAME_CHARACTERS]
+
+
+def _describe_rooms(document: dict[str, Any]) -> str:
+    rooms = document.get("room_num")
+    return f" of {rooms} rooms" if type(rooms) is int and rooms > 1 else ""

@@ -1,0 +1,285 @@
+"""Shapes of a drawing, from paths to rectangles, as outlines and walls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
+from robocov_app.formats.colors import Paint, parse_css_color_on_white
+from robocov_app.formats.files import MAX_VERTICES
+from robocov_app.formats.files.xml_tree import Element
+from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
+from robocov_app.formats.geometry.frames import transform_points
+from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
+from robocov_app.formats.geometry.shapes.enclosed_area import Rule
+from robocov_app.formats.geometry.shapes.shape_types import PenStroke
+from robocov_app.formats.vector.svg.element_state import ElementState
+from robocov_app.formats.vector.svg.numbers import METERS_PER_UNIT, parse_length, parse_numbers
+from robocov_app.formats.vector.svg.path_data import MAX_COMMANDS, Subpath, parse_path
+from robocov_app.formats.vector.svg.style import StyleSheet, compute_visible_color, is_painted
+from robocov_app.formats.vector.svg.transforms import compute_stretch
+
+SHAPE_TAGS = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
+_CAPS: dict[str, Literal["square", "round"]] = {"square": "square", "round": "round"}
+_JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "round"}
+_MAX_REFERENCES = 5
+"""Number of references from one gradient to the next."""
+_MAX_EVEN_STRETCH = 1.0 + 1e-6
+"""Ratio of the stretch in two directions up to which a stroke has a single width."""
+_DEFAULT_MITRE_LIMIT = 4.0
+
+
+class ShapeReader:
+    """Adds the shapes of a drawing to a collection.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    sheet : StyleSheet
+    elements_by_id : dict of str to Element
+        For references to gradients.
+
+    Attributes
+    ----------
+    unit : float, m
+        Length of a unit of the root.
+    key : ColorKey
+        Colors with a declared role.
+    dashed : int
+        Number of dashed strokes.
+    """
+
+    def __init__(self, shapes: Shapes, sheet: StyleSheet, elements_by_id: dict[str, Element]) -> None:
+        self.shapes = shapes
+        self.unit = METERS_PER_UNIT if shapes.options.scale is None else shapes.options.scale
+        self.key = shapes.options.build_color_key()
+        self.dashed = 0
+        self._sheet = sheet
+        self._elements_by_id = elements_by_id
+        self._remaining_commands = MAX_COMMANDS
+
+    def add(self, element: Element, state: ElementState) -> None:
+        """Add a shape. Raises ValueError if an attribute is invalid."""
+        style = state.style
+        is_visible = style["visibility"].lower() not in ("hidden", "collapse")
+        if is_visible and not self.shapes.accept(state.labels):
+            return
+        has_fill = is_painted(style, "fill") and element.tag != "line"
+        has_stroke = is_painted(style, "stroke")
+        if not (is_visible and (has_fill or has_stroke)):
+            self.shapes.leave_out("hidden element")
+            return
+        fill = self._find_paint(state, "fill")
+        stroke = self._find_paint(state, "stroke")
+        has_fill = has_fill and not self._is_ignored(fill, "fill")
+        has_stroke = has_stroke and not self._is_ignored(stroke, "stroke")
+        if has_fill:
+            self._add_filled(element, state, fill, stroke if has_stroke else None)
+        elif has_stroke:
+            self._add_walls(self._compute_subpaths(element, state), state, stroke, element)
+
+    def _add_filled(self, element: Element, state: ElementState, fill: Paint, stroke: Paint | None) -> None:
+        """Add a filled shape with its stroke, if any; a shape without an area is only its stroke."""
+        if self._add_disc(element, state, fill):
+            if stroke is not None:
+                with suppress(ValueError):  # A disc may be too large to have points, but needs none.
+                    self._add_edges(self._compute_subpaths(element, state), state, stroke)
+            return
+        subpaths = self._compute_subpaths(element, state)
+        has_area = self._add_area(subpaths, state, fill, element)
+        if stroke is not None and has_area:
+            self._add_edges(subpaths, state, stroke)
+        elif stroke is not None:
+            self._add_walls(subpaths, state, stroke, element)
+        elif not has_area:
+            self.shapes.leave_out("shape", "without an area")
+
+    def _is_ignored(self, paint: Paint, what: str) -> bool:
+        """Return whether a color is declared to be ignored; then the fill or stroke is counted."""
+        if paint.role != "ignore":
+            return False
+        self.shapes.leave_out(what, "of a color that is left out (--ignore-color)")
+        return True
+
+    def _find_paint(self, state: ElementState, what: Literal["fill", "stroke"]) -> Paint:
+        """Return the color of a fill or a stroke; of a gradient, the first one."""
+        visible = compute_visible_color(state.style, what, state.opacity, self._get_gradient_color)
+        written = parse_css_color_on_white(state.style[what])
+        return Paint(visible, self.key.find_role(written) or self.key.find_role(visible))
+
+    def _get_gradient_color(self, name: str) -> str | None:
+        """Return the first color of the gradient of that name, or of the one that it refers to."""
+        for _ in range(_MAX_REFERENCES):
+            gradient = self._elements_by_id.get(name)
+            if gradient is None:
+                return None
+            stop = next((child for child in gradient.children if child.tag == "stop"), None)
+            if stop is not None:
+                properties = self._sheet.get_properties(stop)
+                return properties.get("stop-color") or stop.attributes.get("stop-color", "black")
+            name = gradient.attributes.get("href", "").strip().removeprefix("#")
+        return None
+
+    def _add_disc(self, element: Element, state: ElementState, paint: Paint) -> bool:
+        """Add a circle that the transform leaves one; return whether it is."""
+        smallest, largest = compute_stretch(state.matrix)
+        if element.tag != "circle" or largest - smallest > 1e-9 * largest:
+            return False
+        center = np.array([state.parse_lengths(element, "cx", "cy")])
+        radius = state.parse_radius(element) * largest
+        if radius <= 0.0:
+            return False
+        (center,) = transform_points(state.matrix, center)
+        self.shapes.add_circle(center, radius, state.labels, at=_format_line(element), paint=paint)
+        return True
+
+    def _add_area(
+        self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint, element: Element
+    ) -> bool:
+        """Add the area of a filled shape; return whether it has one."""
+        if not subpaths:
+            return False
+        rings = [transform_points(state.matrix, subpath.points) for subpath in subpaths]
+        rule: Rule = "evenodd" if state.style["fill-rule"].lower() == "evenodd" else "nonzero"
+        return self.shapes.add_outline(
+            rings, state.labels, rule=rule, at=_format_line(element), thing="", paint=paint
+        )
+
+    def _add_edges(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> None:
+        """Add the stroke of a filled shape, which only counts if its fill turns out to be floor."""
+        try:
+            lines = self._build_lines(subpaths, state, paint)
+        except ValueError:  # An invalid width does not matter if the stroke never counts.
+            return
+        min_width = self.shapes.options.compute_stroke_width(self.unit)
+        wide = [line for line in lines if min_width <= line.measure_widths()[1] <= MAX_SIZE_M]
+        self.shapes.add_edges([replace(line, width=max(line.width, MIN_SIZE_M)) for line in wide])
+
+    def _add_walls(
+        self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint, element: Element
+    ) -> None:
+        """Add the walls that a stroke stands for."""
+        lines = self._build_lines(subpaths, state, paint)
+        if not lines:
+            self.shapes.leave_out("stroke", "without a width")
+            return
+        min_width = self.shapes.options.compute_stroke_width(self.unit)
+        if max(line.measure_widths()[1] for line in lines) < min_width:
+            self.shapes.leave_out("stroke", f"thinner than {min_width:.3g} m (--min-stroke)")
+            return
+        if state.style["stroke-dasharray"].lower() != "none":
+            self.dashed += 1
+        for line in lines:
+            self.shapes.add_line(line, at=_format_line(element))
+
+    def _build_lines(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> list[WallLine]:
+        """Return the lines of a stroke; none if it has no width."""
+        style = state.style
+        thickness = self.shapes.options.thickness
+        smallest, largest = compute_stretch(state.matrix)
+        pen_width = parse_length(style["stroke-width"], state.diagonal)
+        width = pen_width * math.sqrt(smallest * largest) if thickness is None else thickness
+        if not width > 0.0:
+            return []
+        limit = parse_numbers(style["stroke-miterlimit"])
+        is_stretched = thickness is None and largest > _MAX_EVEN_STRETCH * smallest
+        lines = []
+        for points, is_closed in subpaths:
+            path = np.concatenate([points, points[:1]]) if is_closed else points
+            line = WallLine(
+                transform_points(state.matrix, path),
+                width,
+                state.labels,
+                cap=_CAPS.get(style["stroke-linecap"].lower(), "flat"),
+                join=_JOINS.get(style["stroke-linejoin"].lower(), "mitre"),
+                mitre_limit=limit[0] if limit and limit[0] >= 1.0 else _DEFAULT_MITRE_LIMIT,
+                stretched=PenStroke(path, pen_width, state.matrix) if is_stretched else None,
+                color=paint.color,
+                role=paint.role,
+            )
+            lines.append(line)
+        return lines
+
+    def _compute_subpaths(self, element: Element, state: ElementState) -> list[Subpath]:
+        """Return the subpaths of a shape, in its units."""
+        _, stretch = compute_stretch(state.matrix)
+        tolerance = CURVE_TOLERANCE_M / stretch if stretch > 0.0 else np.inf
+        attributes = element.attributes
+        match element.tag:
+            case "path":
+                return self._parse_path(attributes.get("d", ""), tolerance)
+            case "polyline" | "polygon":
+                values = parse_numbers(attributes.get("points", ""))
+                points = np.array(values[: len(values) // 2 * 2]).reshape(-1, 2)
+                return [Subpath(points, element.tag == "polygon")] if len(points) > 1 else []
+            case "line":
+                ends = state.parse_lengths(element, "x1", "y1", "x2", "y2")
+                return [Subpath(np.array(ends).reshape(2, 2), False)]
+            case "rect":
+                return _compute_rectangle(element, state, tolerance)
+            case _:
+                return _compute_ellipse(element, state, tolerance)
+
+    def _parse_path(self, data: str, tolerance: float) -> list[Subpath]:
+        if data.strip() == "none":
+            return []
+        subpaths, commands = parse_path(data, tolerance, MAX_VERTICES, self._remaining_commands)
+        self._remaining_commands -= commands
+        return subpaths
+
+
+def _format_line(element: Element) -> str:
+    return f"line {element.line}"
+
+
+def _compute_ellipse(element: Element, state: ElementState, tolerance: float) -> list[Subpath]:
+    """Return the points of a circle or an ellipse, if it has a size."""
+    if element.tag == "circle":
+        rx = ry = state.parse_radius(element)
+    else:
+        rx, ry = state.parse_lengths(element, "rx", "ry")
+        # A missing radius is the other one.
+        if "rx" not in element.attributes:
+            rx = ry
+        elif "ry" not in element.attributes:
+            ry = rx
+    if min(rx, ry) <= 0.0:
+        return []
+    center = np.array(state.parse_lengths(element, "cx", "cy"))
+    u, v = np.diag([rx, ry])
+    points = flatten_arc(center, u, v, start=0.0, sweep=2 * np.pi, tolerance=tolerance)
+    return [Subpath(points, True)]
+
+
+def _compute_rectangle(element: Element, state: ElementState, tolerance: float) -> list[Subpath]:
+    """Return the points of a rectangle, whose corners may be round, if it has a size."""
+    x, y, width, height = state.parse_lengths(element, "x", "y", "width", "height")
+    rx, ry = state.parse_lengths(element, "rx", "ry")
+    if width <= 0.0 or height <= 0.0:
+        return []
+    # A missing radius is the other one.
+    if element.attributes.get("rx", "auto").strip() == "auto":
+        rx = ry
+    elif element.attributes.get("ry", "auto").strip() == "auto":
+        ry = rx
+    rx = min(rx, width / 2)
+    ry = min(ry, height / 2)
+    corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+    if rx <= 0.0 or ry <= 0.0:
+        return [Subpath(corners, True)]
+    u, v = np.diag([rx, ry])
+    inward = np.array([[rx, ry], [-rx, ry], [-rx, -ry], [rx, -ry]])
+    parts: list[Array] = []
+    for k, center in enumerate(corners + inward):
+        start = np.pi + k * np.pi / 2
+        first = center + u * np.cos(start) + v * np.sin(start)
+        parts.append(first[None])
+        parts.append(flatten_arc(center, u, v, start=start, sweep=np.pi / 2, tolerance=tolerance))
+    return [Subpath(np.concatenate(parts), True)]

@@ -1,0 +1,164 @@
+"""Maps as SVG drawings at true scale."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+from shapely import Polygon
+
+from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
+from robocov.files.writing import replace_file
+from robocov_app.formats.geometry.cells.rasterize import describe_unsupported
+from robocov_app.formats.geometry.conversion.primitives import transform_numbers
+from robocov_app.formats.geometry.polygons import compute_free_area, format_decimal
+from robocov_app.formats.options import WriteOptions
+from robocov_app.formats.reports import ExportReport
+from robocov_app.look.theme import DARK, LIGHT, Theme
+
+DEFAULT_DIGITS = 3
+"""Decimals of millimeters: at true scale, as fine as the free space is known."""
+DEFAULT_SCALE = 0.001
+"""Meters that a millimeter of the drawing stands for."""
+_MARGIN = 0.03
+"""Margin around the map, as a fraction of its longer side."""
+# A browser window shows the whole map, whatever its size.
+_PAGE = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" {size}
+     {box}>
+<title>{title}</title>
+<desc>{text}</desc>
+<style>
+svg {{ max-width: 100vw; max-height: 100vh }}
+#boundary {{ stroke-width: 1.5px; stroke-linejoin: miter; vector-effect: non-scaling-stroke }}
+.wall {{ stroke-linecap: butt; stroke-linejoin: miter; stroke-miterlimit: 4 }}
+{light}
+@media (prefers-color-scheme: dark) {{
+{dark}
+}}
+</style>
+<path id="boundary" d="{boundary}"/>
+<g id="obstacles">
+{obstacles}</g>
+</svg>
+"""
+
+
+@dataclass(frozen=True)
+class _ShapeWriter:
+    """Writes shapes in millimeters of the drawing, whose y axis points down.
+
+    Attributes
+    ----------
+    scale : float
+        Meters that a millimeter stands for.
+    digits : int
+        Number of decimals.
+    """
+
+    scale: float
+    digits: int
+
+    def format_length(self, length: float) -> str:
+        """Return a length in meters as millimeters of the drawing."""
+        return format_decimal(length / self.scale, self.digits)
+
+    def round_length(self, length: float) -> float:
+        """Return a length in meters as precisely as it is written."""
+        return round(length / self.scale, self.digits) * self.scale
+
+    def format_ring(self, ring: Ring, end: str = "Z") -> str:
+        """Return the path data of a ring, or of a line if the end is empty."""
+        points = [f"{self.format_length(x)} {self.format_length(-y)}" for x, y in ring]
+        return f"M{' L'.join(points)}{end}"
+
+    def format_obstacle(self, obstacle: Obstacle) -> str:
+        """Return the element of an obstacle."""
+        if isinstance(obstacle, CircleObstacle):
+            x = self.format_length(obstacle.center[0])
+            y = self.format_length(-obstacle.center[1])
+            tag = "circle"
+            attributes = f'cx="{x}" cy="{y}" r="{self.format_length(obstacle.radius)}"'
+        elif isinstance(obstacle, WallObstacle):
+            line = self.format_ring(obstacle.points, "")
+            width = self.format_length(obstacle.width)
+            tag = "path"
+            attributes = f'class="wall" fill="none" stroke-width="{width}" d="{line}"'
+        else:
+            rings = " ".join(self.format_ring(ring) for ring in (obstacle.vertices, *obstacle.holes))
+            tag = "path"
+            attributes = f'fill-rule="evenodd" d="{rings}"'
+        title = _escape(obstacle.name or "")
+        if not title:
+            return f"<{tag} {attributes}/>"
+        return f"<{tag} {attributes}><title>{title}</title></{tag}>"
+
+
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    """Write a map as an SVG drawing."""
+    scale = DEFAULT_SCALE if options.scale is None else options.scale
+    writer = _ShapeWriter(scale, DEFAULT_DIGITS if options.digits is None else options.digits)
+    vertices = np.asarray(environment.boundary, dtype=float)
+    margin = _MARGIN * float(np.ptp(vertices, axis=0).max())
+    low = vertices.min(axis=0) - margin
+    high = vertices.max(axis=0) + margin
+    size = high - low
+    with replace_file(path) as part:
+        part.write_text(_build_page(environment, writer, low, high), encoding="utf-8")
+    obstacles = [transform_numbers(obstacle, writer.round_length) for obstacle in environment.obstacles]
+    boundary = Polygon([(writer.round_length(x), writer.round_length(y)) for x, y in environment.boundary])
+    notes = [f"1 mm is {scale:g} m: {size[0] / scale:.6g} x {size[1] / scale:.6g} mm"]
+    if options.scale is not None:
+        notes.append(f"to import it again: --scale {scale:g}")
+    return ExportReport(
+        "svg",
+        (path,),
+        area=environment.free_area,
+        area_written=compute_free_area(boundary, [obstacle.polygon for obstacle in obstacles]),
+        dropped=describe_unsupported(environment, names=False),
+        notes=tuple(notes),
+    )
+
+
+def _build_page(environment: Environment, writer: _ShapeWriter, low: np.ndarray, high: np.ndarray) -> str:
+    """Return the drawing of a map between two corners, m."""
+    x = writer.format_length(low[0])
+    y = writer.format_length(-high[1])
+    width = writer.format_length(high[0] - low[0])
+    height = writer.format_length(high[1] - low[1])
+    # The lower left corner of the box with its decimals.
+    left = float(x) * writer.scale
+    bottom = -(float(y) + float(height)) * writer.scale
+    obstacles = [f"{writer.format_obstacle(obstacle)}\n" for obstacle in environment.obstacles]
+    return _PAGE.format(
+        size=f'width="{width}mm" height="{height}mm"',
+        box=f'viewBox="{x} {y} {width} {height}" data-origin="{left!r} {bottom!r}"',
+        title=_escape(environment.name),
+        text=_escape(environment.description),
+        light=_build_rules(LIGHT),
+        dark=_build_rules(DARK),
+        boundary=writer.format_ring(environment.boundary),
+        obstacles="".join(obstacles),
+    )
+
+
+def _build_rules(theme: Theme) -> str:
+    """Return the style rules for a theme."""
+    ground = _format_color(theme.panel)
+    page = _format_color(theme.background)
+    edge = _format_color(theme.boundary)
+    solid = _format_color(theme.obstacle)
+    return (
+        f"svg {{ background: {ground} }}\n#boundary {{ fill: {page}; stroke: {edge} }}\n"
+        f"#obstacles {{ fill: {solid} }}\n.wall {{ fill: none; stroke: {solid} }}"
+    )
+
+
+def _format_color(color: tuple[int, int, int]) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+def _escape(text: str) -> str:
+    """Return printable text with entities for special characters."""
+    return escape("".join(character if character.isprintable() else " " for character in text))

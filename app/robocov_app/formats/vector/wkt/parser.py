@@ -1,0 +1,277 @@
+"""Grammar of well-known text: OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of PostGIS."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import quote
+from robocov_app.formats.files import MAX_DEPTH
+from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
+from robocov_app.formats.vector.wkt.scanner import Scanner
+
+KINDS = (
+    "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
+    "MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN", "GEOMETRYCOLLECTION",
+)  # fmt: skip
+"""Kinds of geometries that are read."""
+CURVED_KINDS = (
+    "CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULTISURFACE", "CURVE", "SURFACE",
+)  # fmt: skip
+"""Kinds that are known, but not read."""
+START = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
+    % b"|".join(kind.encode() for kind in (*KINDS, *CURVED_KINDS)),
+    re.IGNORECASE,
+)
+"""Start of a file: comments, a reference system, and a geometry."""
+_COMMENT = re.compile(r"^[ \t]*(?:#|--).*$", re.MULTILINE)
+_SRID = re.compile(r"SRID\s*=\s*(\d{1,9})\s*;", re.IGNORECASE)
+_WORD = re.compile(r"[A-Za-z_]+")
+_KIND = re.compile(rf"((?ai:{'|'.join(KINDS)}))\s*((?ai:ZM|Z|M))?(?![A-Za-z_])")
+_POINTS = re.compile(r"\(([-+.\deE\s,]*)\)", re.ASCII)
+_NOT_IN_POINT = re.compile(r"[^-+.\deE\s,]", re.ASCII)
+_MAX_NUMBER = 1e100
+"""Larger numbers might overflow before the limits of a map are checked."""
+_MAX_POINT_CHARACTERS = 80
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return START.match(head) is not None
+
+
+class _Geometry(NamedTuple):
+    """The beginning of a geometry.
+
+    Attributes
+    ----------
+    kind : str
+    is_measured : bool
+        Whether the last coordinate of its points is a measure, not a height.
+    start : int
+        Index of its first character.
+    at : str
+        Number of the geometry, for messages, as in "geometry 2.1".
+    depth : int
+        Number of collections around it.
+    """
+
+    kind: str
+    is_measured: bool
+    start: int
+    at: str
+    depth: int
+
+
+class WktParser:
+    """Parser of a sequence of geometries.
+
+    Between them are commas, semicolons or nothing. Lines that begin with # or -- are comments.
+
+    Parameters
+    ----------
+    text : str
+    where : str
+        The file, for messages.
+    shapes : Shapes
+        Counts what is left out or mended.
+
+    Attributes
+    ----------
+    srid : int or None
+        Number of the reference system that the geometries name.
+    """
+
+    def __init__(self, text: str, where: str, shapes: Shapes) -> None:
+        # As many spaces replace a comment, so that the columns in messages are right.
+        text = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
+        self.srid: int | None = None
+        self._scanner = Scanner(text, where)
+        self._shapes = shapes
+        self._geometries: list[SourceGeometry] = []
+        self._parsers: dict[str, Callable[[_Geometry], None]] = {
+            "GEOMETRYCOLLECTION": self._parse_collection,
+            "LINEARRING": self._parse_line,
+            "LINESTRING": self._parse_line,
+            "MULTILINESTRING": self._parse_lines,
+            "MULTIPOINT": self._parse_multipoint,
+            "MULTIPOLYGON": self._parse_polygons,
+            "POINT": self._parse_point,
+            "POLYGON": self._parse_polygon,
+            "POLYHEDRALSURFACE": self._parse_polygons,
+            "TIN": self._parse_polygons,
+            "TRIANGLE": self._parse_polygon,
+        }
+
+    def parse(self) -> list[SourceGeometry]:
+        """Return all geometries. Raises MapError at the first mistake in the text."""
+        scanner = self._scanner
+        number = 0
+        while not scanner.is_at_end():
+            self._parse_srid()
+            number += 1
+            self._parse_geometry(f"geometry {number}", depth=0)
+            scanner.accept(",;")
+        return self._geometries
+
+    def _parse_srid(self) -> None:
+        """Read the reference system in front of a geometry, if there is one."""
+        match = self._scanner.match(_SRID)
+        if match is None:
+            return
+        srid = int(match[1])
+        if self.srid not in (None, srid):
+            self._scanner.refuse(f"expected one SRID for all geometries, got {srid} after {self.srid}")
+        self.srid = srid
+        self._scanner.position = match.end()
+        self._scanner.skip_space()
+
+    def _parse_geometry(self, at: str, *, depth: int) -> None:
+        if depth > MAX_DEPTH:
+            self._scanner.refuse(f"nested too deeply, expected at most {MAX_DEPTH} levels")
+        start = self._scanner.position
+        kind, is_measured = self._parse_kind()
+        if self._accept_empty():
+            self._shapes.leave_out("geometry", "without coordinates")
+            return
+        parse = self._parsers[kind]
+        parse(_Geometry(kind, is_measured, start, at, depth))
+
+    def _parse_kind(self) -> tuple[str, bool]:
+        """Return the kind of a geometry, and whether its last coordinate is a measure."""
+        scanner = self._scanner
+        match = scanner.match(_KIND)
+        if match is None:
+            word = scanner.match(_WORD)
+            name = word[0].upper() if word else ""
+            if name.rstrip("ZM") in CURVED_KINDS:
+                scanner.refuse(f"expected a geometry of straight edges, got {name}")
+            scanner.refuse(f"expected one of {', '.join(KINDS)}, got {scanner.quote_next()}")
+        scanner.position = match.end()
+        scanner.skip_space()
+        dimensions = match[2] or ""
+        return match[1].upper(), dimensions.upper() == "M"
+
+    def _accept_empty(self) -> bool:
+        """Move past the word EMPTY, if it follows; return whether it did."""
+        self._scanner.skip_space()
+        word = self._scanner.match(_WORD)
+        if word is None or word[0].upper() != "EMPTY":
+            return False
+        self._scanner.position = word.end()
+        return True
+
+    def _iterate_items(self, *, may_be_empty: bool = True) -> Iterator[int]:
+        """Read brackets and commas around items, which the caller reads; yield the number of each.
+
+        Items that are EMPTY are skipped, unless that word would be part of a geometry.
+        """
+        self._scanner.expect("(")
+        for number in count(1):
+            self._scanner.skip_space()
+            if not (may_be_empty and self._accept_empty()):
+                yield number
+            if not self._scanner.accept(","):
+                break
+        self._scanner.expect(")")
+
+    def _parse_collection(self, geometry: _Geometry) -> None:
+        for number in self._iterate_items(may_be_empty=False):
+            self._parse_geometry(f"{geometry.at}.{number}", depth=geometry.depth + 1)
+
+    def _parse_polygon(self, geometry: _Geometry) -> None:
+        self._add_polygon(geometry, geometry.at)
+
+    def _parse_polygons(self, geometry: _Geometry) -> None:
+        for number in self._iterate_items():
+            self._add_polygon(geometry, f"{geometry.at}.{number}", whole=geometry.at)
+
+    def _add_polygon(self, geometry: _Geometry, at: str, whole: str = "") -> None:
+        """Read the rings of a polygon, which may be one of several in a geometry."""
+        rings = [self._parse_points(geometry, minimum=1) for _ in self._iterate_items()]
+        if rings:
+            self._geometries.append(self._shapes.build_polygon(rings, (), at, whole))
+
+    def _parse_line(self, geometry: _Geometry) -> None:
+        points = self._parse_points(geometry, minimum=2)
+        self._geometries.append(SourceGeometry("line", (points,), at=geometry.at))
+
+    def _parse_lines(self, geometry: _Geometry) -> None:
+        for _ in self._iterate_items():
+            self._parse_line(geometry)
+
+    def _parse_point(self, geometry: _Geometry) -> None:
+        points = self._parse_points(geometry, minimum=1)
+        if len(points) != 1:
+            self._scanner.refuse(f"expected one point, got {len(points)}", geometry.start)
+        self._add_points(points, geometry)
+
+    def _parse_multipoint(self, geometry: _Geometry) -> None:
+        """Read points in common brackets, or each in its own."""
+        if self._scanner.match(_POINTS):
+            self._add_points(self._parse_points(geometry, minimum=1), geometry)
+            return
+        for _ in self._iterate_items():
+            self._add_points(self._parse_points(geometry, minimum=1), geometry)
+
+    def _add_points(self, points: Array, geometry: _Geometry) -> None:
+        self._geometries += [SourceGeometry("point", (point[None],), at=geometry.at) for point in points]
+
+    def _parse_points(self, geometry: _Geometry, *, minimum: int) -> Array:
+        """Return the points in brackets, (k, 2), at least `minimum`; heights are counted."""
+        scanner = self._scanner
+        scanner.skip_space()
+        match = scanner.match(_POINTS)
+        if match is None:
+            self._refuse_points()
+        scanner.position = match.start(1)
+        rows: list[list[float]] = []
+        for text in match[1].split(","):
+            try:
+                rows.append([float(number) for number in text.split()])
+            except ValueError:
+                self._refuse_point()
+            if not 2 <= len(rows[-1]) <= 4 or len(rows[-1]) != len(rows[0]):
+                self._refuse_point()
+            scanner.position += len(text) + 1
+        if len(rows) < minimum:
+            scanner.refuse(f"expected at least {minimum} points, got 1", match.start())
+        scanner.position = match.end()
+        points = np.array(rows)
+        if not (np.abs(points) < _MAX_NUMBER).all():
+            scanner.refuse("expected finite numbers", match.start())
+        dimensions = points.shape[1]
+        has_heights = dimensions > 2 and not (geometry.is_measured and dimensions == 3)
+        if has_heights:
+            self._shapes.tally.add_heights(points[:, 2])
+        return points[:, :2]
+
+    def _refuse_points(self) -> NoReturn:
+        """Raise the MapError of what follows, which is no list of points in brackets."""
+        scanner = self._scanner
+        scanner.expect("(")
+        strange = _NOT_IN_POINT.search(scanner.text, scanner.position)
+        end = strange.start() if strange else len(scanner.text)
+        if scanner.text[end : end + 1] in ("", "("):
+            scanner.position = end
+            scanner.refuse(f"expected a point or ), got {scanner.quote_next()}")
+        comma = scanner.text.rfind(",", scanner.position, end)
+        if comma >= 0:
+            scanner.position = comma + 1
+        self._refuse_point()
+
+    def _refuse_point(self) -> NoReturn:
+        """Raise the MapError of the following point."""
+        scanner = self._scanner
+        ahead = scanner.text[scanner.position : scanner.position + _MAX_POINT_CHARACTERS]
+        point = ahead.split(",")[0].split(")")[0]
+        scanner.skip_space()
+        actual = quote(" ".join(point.split())) if point.strip() else "nothing"
+        scanner.refuse(f"expected a point as 1.5 2, with as many numbers as the first, got {actual}")
