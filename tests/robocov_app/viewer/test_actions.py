@@ -1,8 +1,9 @@
-"""What keys do: no key twice, nothing named that does not exist, everything in words."""
+"""Commands of the viewer: their keys, names and titles, and the state that they change."""
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 import pygame
@@ -26,48 +27,57 @@ from robocov_app.viewer.tools.toolbox import ViewerToolbox
 TITLES = {layer.name: layer.title for layer in standard_layers()}
 TEXTS = [path.read_text() for path in Path(package.__path__[0]).glob("*.py")]
 
-HARMLESS = frozenset({"quit", "video", "screenshot", "save:run", "save:map", "fullscreen"})
-"""Left out where each action is done: tested for themselves, or they write files."""
+UNTRIED = frozenset({"quit", "video", "screenshot", "save:run", "save:map", "fullscreen"})
+"""Commands that are not run here, because other tests cover them or they write files."""
 
 
 @pytest.fixture(scope="module")
-def actions(shared: Driver) -> list[Command]:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
+    with open_viewer(tmp_path_factory.mktemp("window")) as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def commands(shared: Driver) -> list[Command]:
     return shared.window.commands.commands
 
 
-def test_no_key_does_two_things(actions: list[Command]) -> None:
-    keys = [key for action in actions for key in action.keys]
+def test_no_key_belongs_to_two_commands(commands: list[Command]) -> None:
+    keys = [key for command in commands for key in command.keys]
     assert len(keys) == len(set(keys))
 
 
-def test_no_two_actions_have_one_name_or_one_title(actions: list[Command]) -> None:
-    for words in ([action.name for action in actions], [action.title for action in actions]):
-        assert len(words) == len(set(words))
+def test_names_and_titles_of_commands_are_unique(commands: list[Command]) -> None:
+    names = [command.name for command in commands]
+    titles = [command.title for command in commands]
+    assert len(names) == len(set(names))
+    assert len(titles) == len(set(titles))
 
 
-def test_everything_has_a_key_or_is_typed_and_is_in_a_group_of_the_help(actions: list[Command]) -> None:
-    for action in actions:
-        assert action.keys or action.argument, action.name
-        assert action.title[0].isupper() and not action.title.endswith(".")
-        assert action.group in GROUPS
-    assert {action.group for action in actions} == set(GROUPS)
+def test_every_command_has_a_key_or_an_argument_and_a_group(commands: list[Command]) -> None:
+    for command in commands:
+        assert command.keys or command.argument, command.name
+        assert command.title[0].isupper()
+        assert not command.title.endswith(".")
+        assert command.group in GROUPS
+    assert {command.group for command in commands} == set(GROUPS)
 
 
-def test_all_layers_and_all_tools_are_there(shared: Driver) -> None:
-    named = [each.name for each in list_viewer_commands(shared.viewer, TITLES)]
-    assert [name for name in named if name.startswith("tool:")] == [
-        f"tool:{name}" for name in ViewerToolbox(Inspection()).by_name
-    ]
-    assert {name for name in named if name.startswith("layer:")} == {f"layer:{name}" for name in TITLES}
+def test_all_layers_and_tools_have_commands(shared: Driver) -> None:
+    names = [command.name for command in list_viewer_commands(shared.viewer, TITLES)]
+    tools = [name.removeprefix("tool:") for name in names if name.startswith("tool:")]
+    layers = {name.removeprefix("layer:") for name in names if name.startswith("layer:")}
+    assert tools == list(ViewerToolbox(Inspection()).by_name)
+    assert layers == set(TITLES)
 
 
-def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key(shared: Driver) -> None:
+def test_a_new_layer_has_a_command_without_a_key(shared: Driver) -> None:
     listed = list_viewer_commands(shared.viewer, {**TITLES, "dust": "Dust"})
-    assert [each.keys for each in listed if each.name == "layer:dust"] == [()]
+    assert [command.keys for command in listed if command.name == "layer:dust"] == [()]
 
 
 @pytest.mark.parametrize(
-    ("key", "words"),
+    ("key", "text"),
     [
         ("ctrl+shift+z", "Ctrl Shift Z"),
         ("shift+=", "Shift ="),
@@ -82,127 +92,56 @@ def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key(shared: Driver)
         ("[", "["),
     ],
 )
-def test_keys_are_written_as_on_the_keyboard(key: str, words: str) -> None:
-    assert format_key(key) == words
+def test_keys_are_written_as_on_the_keyboard(key: str, text: str) -> None:
+    assert format_key(key) == text
 
 
-def test_every_key_is_one_that_there_is(actions: list[Command]) -> None:
-    for key in (key for action in actions for key in action.keys):
-        *held, last = [*key[:-1].split("+"), "+"] if key.endswith("++") or key == "+" else key.split("+")
-        assert {each for each in held if each} <= {"ctrl", "alt", "shift"}
-        code = KEYS.get(last) or pygame.key.key_code(last)
-        assert pygame.key.name(code) == last
+def test_every_key_exists_in_pygame(commands: list[Command]) -> None:
+    for key in (key for command in commands for key in command.keys):
+        # The key "+" is written behind the plus signs that join the modifiers.
+        is_plus = key == "+" or key.endswith("++")
+        *modifiers, name = [*key[:-1].split("+"), "+"] if is_plus else key.split("+")
+        assert {modifier for modifier in modifiers if modifier} <= {"ctrl", "alt", "shift"}
+        code = KEYS.get(name) or pygame.key.key_code(name)
+        assert pygame.key.name(code) == name
 
 
-def test_what_panel_pages_and_window_name_exists(actions: list[Command]) -> None:
-    """Every text that looks like an action's name, and is used where one is wanted, is one."""
-    names = {action.name for action in actions}
-    calls = {"_show_button", "do", "_do"}
+def test_commands_named_in_the_code_exist(commands: list[Command]) -> None:
+    """Calls of functions that expect the name of a command have one."""
+    names = {command.name for command in commands}
+    functions = {"_show_button", "do", "_do"}
     for text in TEXTS:
         for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in calls:
-                for arg in node.args:
-                    if (
-                        isinstance(arg, ast.Constant)
-                        and isinstance(arg.value, str)
-                        and arg.value[0].islower()
-                    ):
-                        assert arg.value in names, arg.value
+            if not isinstance(node, ast.Call) or getattr(node.func, "attr", "") not in functions:
+                continue
+            values = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
+            # Texts that start with a capital letter are titles.
+            used = {value for value in values if isinstance(value, str) and value[0].islower()}
+            assert used <= names
     assert names >= COMMANDS_WITHIN_LESSON
 
 
-def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_panels_own(
-    shared: Driver, actions: list[Command]
-) -> None:
-    names = {action.name for action in actions}
-    options = {name for law in CONTROLLERS.values() for name in get_gains(law)}
+def test_buttons_of_the_panel_run_commands(shared: Driver, commands: list[Command]) -> None:
+    """Every button runs the command of its name, or belongs to the panel alone."""
+    names = {command.name for command in commands}
+    gains = {name for controller in CONTROLLERS.values() for name in get_gains(controller)}
+    own_keys = {"tab", "reset", "close", "team.kinematics", *gains}
     for tab in ViewerPanel.tabs:
         shared.window.panel.show_tab(tab)
         shared.settle()
-        for each in shared.window.panel.ui.widgets.values():
-            own = each.key.partition(":")[0] in {"tab", "reset", "close", "team.kinematics", *options}
-            assert each.kind != "button" or own or each.key in names, each.key
+        buttons = [widget for widget in shared.window.panel.ui.widgets.values() if widget.kind == "button"]
+        for button in buttons:
+            assert button.key in names or button.key.partition(":")[0] in own_keys, button.key
 
 
-def state_of(driver: Driver) -> list[object]:
-    """Return whatever an action might change."""
-    viewer, session, its = driver.viewer, driver.session, driver.window
-    camera = its.canvas._painters[0].camera
-    told: list[object] = [
-        viewer.view.layers.copy(),
-        viewer.view.theme,
-        viewer.view.fades_trajectories,
-        viewer.view.has_panel,
-        viewer.tool,
-        viewer.active_pane,
-    ]
-    told += [
-        viewer.inspection.selected,
-        viewer.message,
-        viewer.files.map_name,
-        session.playback.is_playing,
-        session.displayed.time,
-        session.timeline.end_time,
-    ]
-    told += [
-        session.timeline.past_version,
-        session.playback.clock.speed,
-        session.playback.stop_when_settled,
-        session.displayed.environment,
-    ]
-    told += [
-        session.timeline.scenario,
-        len(session.timeline.panes),
-        [pane.controller for pane in session.timeline.panes],
-        camera,
-    ]
-    told += [
-        viewer.tool.build_draw_state(session),
-        session.displayed.get_setup(session.timeline.panes[0]),
-        its.is_help_open,
-        its.dialogs.is_open,
-        its.lesson.player,
-        its.panel.tab,
-    ]
-    return told
-
-
-@pytest.mark.slow
-def test_every_action_does_something(shared: Driver) -> None:
-    for action in shared.window.commands.commands:
-        if action.name in HARMLESS or action.argument is not None:
-            continue
-        driver = prepared(shared)
-        before = state_of(driver)
-        driver.window.do(action.name)
-        assert state_of(driver) != before, action.name
-
-
-def test_every_key_does_its_action(shared: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
-    done: list[str] = []
-    shared.window.dialogs.close()
-    shared.window.panel.ui.stop_typing()
-    monkeypatch.setattr(shared.window, "do", done.append)
-    for action in shared.window.commands.commands:
-        for key in action.keys:
-            shared.post(pygame.KEYDOWN, **build_key_event(key))
-            shared.post(pygame.KEYUP, **build_key_event(key))
-    shared.window.advance(0.0)
-    assert done == [action.name for action in shared.window.commands.commands for _ in action.keys]
-
-
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory: pytest.TempPathFactory):
-    with open_viewer(tmp_path_factory.mktemp("window")) as driver:
-        yield driver
-
-
-def prepared(driver: Driver) -> Driver:
-    """Bring a window into a state in which every action has something to do."""
-    its, viewer, session = driver.window, driver.viewer, driver.session
-    its.is_help_open = False
-    its.dialogs.close()
-    its.lesson.end()
+def prepare(driver: Driver) -> None:
+    """Bring a window into a state in which every command changes something."""
+    window = driver.window
+    viewer = driver.viewer
+    session = driver.session
+    window.is_help_open = False
+    window.dialogs.close()
+    window.lesson.end()
     viewer.attempt(lambda: viewer.files.open_map("square"))
     while len(session.timeline.panes) > 1:
         session.remove_pane(session.timeline.panes[-1])
@@ -221,23 +160,80 @@ def prepared(driver: Driver) -> Driver:
     viewer.tool.move(session, build_event((6.5, 7.5)))
     session.playback.step()
     session.show_time(0.7)
-    its.canvas.fit()
-    its.canvas.zoom(1.4, (200, 200))
-    its.canvas.pan(20, 20)
+    window.canvas.fit()
+    window.canvas.zoom(1.4, (200, 200))
+    window.canvas.pan(20, 20)
     viewer.message = ""
-    return driver
+
+
+def list_state(driver: Driver) -> list[object]:
+    """Return the parts of the state that commands change."""
+    viewer = driver.viewer
+    session = driver.session
+    window = driver.window
+    return [
+        viewer.view.layers.copy(),
+        viewer.view.theme,
+        viewer.view.fades_trajectories,
+        viewer.view.has_panel,
+        viewer.tool,
+        viewer.tool.build_draw_state(session),
+        viewer.active_pane,
+        viewer.inspection.selected,
+        viewer.message,
+        viewer.files.map_name,
+        session.playback.is_playing,
+        session.playback.clock.speed,
+        session.playback.stop_when_settled,
+        session.displayed.time,
+        session.displayed.environment,
+        session.displayed.get_setup(session.timeline.panes[0]),
+        session.timeline.end_time,
+        session.timeline.past_version,
+        session.timeline.scenario,
+        [pane.controller for pane in session.timeline.panes],
+        window.canvas._painters[0].camera,
+        window.is_help_open,
+        window.dialogs.is_open,
+        window.lesson.player,
+        window.panel.tab,
+    ]
+
+
+@pytest.mark.slow
+def test_every_command_changes_something(shared: Driver) -> None:
+    for command in shared.window.commands.commands:
+        if command.name in UNTRIED or command.argument is not None:
+            continue
+        prepare(shared)
+        before = list_state(shared)
+        shared.window.do(command.name)
+        assert list_state(shared) != before, command.name
+
+
+def test_every_key_runs_its_command(shared: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    shared.window.dialogs.close()
+    shared.window.panel.ui.stop_typing()
+    monkeypatch.setattr(shared.window, "do", done.append)
+    for command in shared.window.commands.commands:
+        for key in command.keys:
+            shared.post(pygame.KEYDOWN, **build_key_event(key))
+            shared.post(pygame.KEYUP, **build_key_event(key))
+    shared.window.advance(0.0)
+    assert done == [command.name for command in shared.window.commands.commands for _ in command.keys]
 
 
 @given(st.text(max_size=30))
-def test_what_is_found_holds_all_words_typed(actions: list[Command], typed: str) -> None:
-    found = find_commands(actions, typed)
-    for action in actions:
-        assert (action in found) == all(
-            word in f"{action.title} {action.name}".lower() for word in typed.lower().split()
-        )
+def test_found_commands_contain_all_typed_words(commands: list[Command], typed: str) -> None:
+    found = find_commands(commands, typed)
+    for command in commands:
+        text = f"{command.title} {command.name}".lower()
+        assert (command in found) == all(word in text for word in typed.lower().split())
 
 
-def test_what_begins_with_the_words_comes_first(actions: list[Command]) -> None:
-    found = [action.title for action in find_commands(actions, "re")]
+def test_titles_that_start_with_the_text_come_first(commands: list[Command]) -> None:
+    found = [command.title for command in find_commands(commands, "re")]
     first = [title for title in found if title.lower().startswith("re")]
-    assert first and found[: len(first)] == first
+    assert first
+    assert found[: len(first)] == first

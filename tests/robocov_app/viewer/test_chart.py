@@ -1,4 +1,4 @@
-"""The plot of the costs, and where time is on it."""
+"""Chart of the costs: times and columns, colors of curves, events."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def driver(tmp_path: Path) -> Iterator[Driver]:
         yield opened_driver
 
 
-def played(driver: Driver, frames: int = 60) -> None:
+def play(driver: Driver, frames: int = 60) -> None:
     driver.session.playback.is_playing = True
     driver.frames(frames)
     driver.session.playback.is_playing = False
@@ -31,28 +31,29 @@ def played(driver: Driver, frames: int = 60) -> None:
 
 
 @pytest.mark.parametrize("width", [480, 900])
-def test_times_keep_apart_in_a_narrow_chart(
+def test_times_do_not_overlap_in_a_narrow_chart(
     tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ends: list[tuple[float, float]] = []
-    write = Canvas.draw_text
+    draw_text = Canvas.draw_text
 
-    def noted(canvas: Canvas, text: str, at: Any, **how: Any) -> int:
-        wide = write(canvas, text, at, **how)
-        if how.get("anchor") == "middle":
-            ends.append((at[0] - wide / 2, at[0] + wide / 2))
-        return wide
+    def draw_and_list(canvas: Canvas, text: str, position: Any, **options: Any) -> int:
+        width = draw_text(canvas, text, position, **options)
+        if options.get("anchor") == "middle":
+            ends.append((position[0] - width / 2, position[0] + width / 2))
+        return width
 
-    monkeypatch.setattr(Canvas, "draw_text", noted)
+    monkeypatch.setattr(Canvas, "draw_text", draw_and_list)
     with open_viewer(tmp_path, size=(width, 1200), scale=3.0) as driver:
         ends.clear()
         driver.window.chart._page = None
         driver.frames(1)
-    assert ends and all(one[1] <= other[0] for one, other in pairwise(ends))
+    assert ends
+    assert all(left[1] <= right[0] for left, right in pairwise(ends))
 
 
-def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
-    played(driver)
+def test_columns_correspond_to_times(driver: Driver) -> None:
+    play(driver)
     chart = driver.window.chart
     for time in (0.0, 0.3, driver.session.timeline.end_time):
         assert chart.to_time(chart.to_column(time)) == pytest.approx(time, abs=1e-9)
@@ -61,7 +62,7 @@ def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
 
 
 def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> None:
-    played(driver)
+    play(driver)
     window = driver.window
     left, top, width, height = window.layout.chart
     picture = copy_pixels(window.screen)[top : top + height, left : left + width].astype(int)
@@ -70,7 +71,7 @@ def test_curves_are_drawn_in_the_colors_of_their_controllers(driver: Driver) -> 
         assert (np.abs(picture - color).max(axis=2) < 12).sum() > 20, pane.controller.name
 
 
-def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
+def test_panes_with_equal_controllers_have_different_colors(tmp_path: Path) -> None:
     with open_viewer(
         tmp_path,
         ControllerChoice("rapf"),
@@ -82,8 +83,8 @@ def test_the_same_controller_twice_has_two_colors(tmp_path: Path) -> None:
         assert len(colors) == 4
 
 
-def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
-    played(driver)
+def test_an_event_is_drawn_at_its_time(driver: Driver) -> None:
+    play(driver)
     window = driver.window
     before = copy_pixels(window.screen).copy()
     driver.viewer.attempt(lambda: driver.session.fail_robot(1))
@@ -97,25 +98,26 @@ def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
     assert changed[: column - 60].max() == 0
 
 
-def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> None:
-    played(driver)
+def test_values_are_compared_at_a_time_that_all_curves_contain(driver: Driver) -> None:
+    play(driver)
     first, second = driver.session.timeline.panes
     last = first.distance_curve.last_time
     values = {pane.number: pane.distance_curve.values[-1] for pane in (first, second)}
     second.distance_curve.add(last + 0.01, 99.0)
     driver.session.timeline.run.step += 60
-    time, known = driver.session.displayed.get_costs()
+    time, costs = driver.session.displayed.get_costs()
     assert time == last
-    assert known == pytest.approx(values)
+    assert costs == pytest.approx(values)
 
 
-def test_what_is_of_the_past_is_shown_at_once_also_at_one_second(driver: Driver) -> None:
-    played(driver, 100)
+def test_values_of_the_past_are_shown_at_once(driver: Driver) -> None:
+    play(driver, 100)
     _, top, width, height = driver.window.layout.chart
     live = copy_pixels(driver.window.screen)[top : top + height, width - 150 : width].copy()
-    # one second exactly is as true as true is
+    # 1.0 equals True, which must not be taken for an unchanged key of the page.
     driver.session.show_time(1.0)
-    assert driver.session.displayed.time == 1.0 and not driver.session.timeline.is_live
+    assert driver.session.displayed.time == 1.0
+    assert not driver.session.timeline.is_live
     driver.frames(1)
     assert not np.array_equal(
         copy_pixels(driver.window.screen)[top : top + height, width - 150 : width], live

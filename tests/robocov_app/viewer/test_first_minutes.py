@@ -1,4 +1,4 @@
-"""The first minutes: the offer of the lesson, suggestions, numbers that match, files and branches."""
+"""First use of the viewer: the offered lesson, suggestions, consistent values, files and branches."""
 
 from __future__ import annotations
 
@@ -27,41 +27,46 @@ FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoi
 
 
 @pytest.fixture
-def words(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Everything that is written on canvases from now on."""
-    written: list[str] = []
-    text = Canvas.draw_text
+def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """List of all texts that canvases draw during the test."""
+    texts: list[str] = []
+    draw_text = Canvas.draw_text
 
-    def noted(canvas: Canvas, words: str, *args: object, **kwargs: object) -> float:
-        written.append(words)
-        return text(canvas, words, *args, **kwargs)  # type: ignore[arg-type]
+    def draw_and_list(canvas: Canvas, text: str, *args: object, **kwargs: object) -> float:
+        texts.append(text)
+        return draw_text(canvas, text, *args, **kwargs)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Canvas, "draw_text", noted)
-    return written
+    monkeypatch.setattr(Canvas, "draw_text", draw_and_list)
+    return texts
 
 
-def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, words: list[str]) -> None:
+def test_captions_show_the_values_of_the_chart_with_their_time(
+    tmp_path: Path, drawn_texts: list[str]
+) -> None:
     with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session = driver.session
         driver.frames(2)
-        driver.window._cost_curves.update = lambda: None  # type: ignore[method-assign]  # no answer comes any more
+        # The curves get no further values.
+        driver.window._cost_curves.update = lambda: None  # type: ignore[method-assign]
         for _ in range(90):
             session.playback.step()
-        words.clear()
+        drawn_texts.clear()
         driver.settle()
         for pane in session.timeline.panes:
             value = f"{pane.distance_curve.values[-1]:.3f}"
             assert session.timeline.end_time - pane.distance_curve.last_time > 1.0
             caption = f"mean distance {value} m at {pane.distance_curve.last_time:.1f} s"
-            assert caption in words and any(value in each and each != caption for each in words)
+            assert caption in drawn_texts
+            assert any(value in text and text != caption for text in drawn_texts)
 
 
-def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: Path) -> None:
+def test_curves_begin_at_time_0_even_if_the_worker_started_late(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
-        session, window = driver.session, driver.window
-        wanted = {pane.number: pane.distance_curve.interpolate(0.0) for pane in session.timeline.panes}
+        session = driver.session
+        window = driver.window
+        first_values = {pane.number: pane.distance_curve.interpolate(0.0) for pane in session.timeline.panes}
         for pane in session.timeline.panes:
-            pane.curves["distance"].__init__()  # as if the worker had not begun yet
+            pane.curves["distance"].__init__()  # as if the worker had not started yet
         for _ in range(90):
             session.playback.step()
         window.update(0.0)
@@ -69,86 +74,89 @@ def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: 
             session.playback.is_playing = playing
             for _ in range(12):
                 window.update(1 / 50)
-                assert all(
-                    abs(each.time - session.displayed.time) < 0.1
-                    for each in window.viewer.costs.known.values()
-                )
+                for answer in window.viewer.costs.known.values():
+                    assert abs(answer.time - session.displayed.time) < 0.1
         for pane in session.timeline.panes:
-            times, values = pane.distance_curve.times, pane.distance_curve.values
-            assert times[0] == 0.0 and np.diff(times).max() < 0.7 and values[0] == wanted[pane.number]
+            times = pane.distance_curve.times
+            values = pane.distance_curve.values
+            assert times[0] == 0.0
+            assert np.diff(times).max() < 0.7
+            assert values[0] == first_values[pane.number]
 
 
-def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
+def test_the_cursor_is_described_in_the_pane_below_it_and_on_the_present_map(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         other = driver.session.timeline.panes[1]
         other.simulation = other.simulation.with_changes(positions=other.simulation.positions + [0.3, 0.0])
         driver.viewer.costs.forget()
-        said = []
+        texts = []
         for pane in (0, 1):
             driver.move(*driver.pixel(MIDDLE, pane))
             driver.frames(2)
             assert driver.viewer.active_pane == 0
-            said.append(describe_cursor(driver.viewer))
-        assert said[0] != said[1]
+            texts.append(describe_cursor(driver.viewer))
+        assert texts[0] != texts[1]
         before = driver.viewer.inspection.cursor
         driver.viewer.files.open_map("square")
         driver.frames(2)
-        assert driver.viewer.inspection.cursor != before  # the same pixel is another place there
+        # The same pixel is another point of the new map.
+        assert driver.viewer.inspection.cursor != before
         assert driver.viewer.inspection.cursor == driver.window.canvas.to_world(driver.at, 1)
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])
-def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size: tuple[int, int]) -> None:
+def test_each_of_four_panes_shows_its_cost(
+    tmp_path: Path, drawn_texts: list[str], size: tuple[int, int]
+) -> None:
     with open_viewer(tmp_path, *FOUR, size=size) as driver:
         boxes = driver.window.layout.panes
         driver.frames(2)
-        words.clear()
+        drawn_texts.clear()
         driver.settle()
         for pane in driver.session.timeline.panes:
             value = f"{pane.distance_curve.interpolate(0.0):.3f} m"
-            assert any(value in each for each in words), (size, boxes)
+            assert any(value in text for text in drawn_texts), (size, boxes)
         columns = len({left for left, *_ in boxes})
         assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
         low, high = (
             driver.window.canvas.to_pixel((0.0, y), 0)[1]
             for y in driver.session.displayed.environment.region.bounds[1::2]
         )
-        across = (
-            driver.window.canvas.to_pixel((1.0, 0.0), 0)[0] - driver.window.canvas.to_pixel((0.0, 0.0), 0)[0]
-        )
+        origin = driver.window.canvas.to_pixel((0.0, 0.0), 0)
+        pixels_per_m = driver.window.canvas.to_pixel((1.0, 0.0), 0)[0] - origin[0]
         bounds = driver.session.displayed.environment.region.bounds
-        assert low - high > 0.65 * boxes[0][3] or across * (bounds[2] - bounds[0]) > 0.85 * boxes[0][2]
-        (left, _, width, _), scale = driver.window.layout.chart, driver.window.layout.scale
-        room = left + width - driver.window.chart.times.right - 9 * scale
+        map_width = pixels_per_m * (bounds[2] - bounds[0])
+        assert low - high > 0.65 * boxes[0][3] or map_width > 0.85 * boxes[0][2]
+        left, _, width, _ = driver.window.layout.chart
+        scale = driver.window.layout.scale
+        free_width = left + width - driver.window.chart.times.right - 9 * scale
         name = max((pane.controller.label for pane in driver.session.timeline.panes), key=len)
-        assert (
-            measure_text(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True)
-            <= room
-        )
+        text_size = round(driver.window.theme.small_text * scale)
+        assert measure_text(f"{name}  8.888  +88.8 %", text_size, True) <= free_width
 
 
-def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
-    tmp_path: Path, words: list[str]
-) -> None:
+def test_a_controller_name_is_not_cut_beside_a_large_cost(tmp_path: Path, drawn_texts: list[str]) -> None:
     with open_viewer(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
         for pane, value in zip(driver.session.timeline.panes, (1.856, 4.023), strict=True):
             pane.distance_curve.add(0.0, value)
-        words.clear()
+        drawn_texts.clear()
         driver.window.draw()
-        assert "RAPF  4.023  +117 %" in words
+        assert "RAPF  4.023  +117 %" in drawn_texts
 
 
-def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
+def test_a_low_frame_rate_comes_before_the_cursor_in_the_status_line(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.move(*driver.pixel(MIDDLE))
-        slow, fast = list_facts(driver.viewer, 9.0, 60.0, None), list_facts(driver.viewer, 60.0, 60.0, None)
+        slow = list_facts(driver.viewer, 9.0, 60.0, None)
+        fast = list_facts(driver.viewer, 60.0, 60.0, None)
         assert slow.index("9 fps") < slow.index(describe_cursor(driver.viewer))
         assert fast.index("60 fps") > fast.index(describe_cursor(driver.viewer))
 
 
-def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) -> None:
+def test_actions_are_suggested_once_the_team_has_settled(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
-        viewer, session = driver.viewer, driver.session
+        viewer = driver.viewer
+        session = driver.session
         assert suggest_actions(viewer) == ""
         session.timeline.is_settled = True
         assert suggest_actions(viewer).startswith(
@@ -159,19 +167,21 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
         driver.settle()
         assert not driver.same(before)
         session.timeline.is_settled = False
-        assert suggest_actions(viewer), "it does not blink while somebody sways"
+        assert suggest_actions(viewer), "a swaying robot does not make the suggestion blink"
         session.fail_robot(2)
-        assert suggest_actions(viewer) == ""  # something is going on again
+        assert suggest_actions(viewer) == ""
         session.timeline.is_settled = True
-        assert "fail" not in suggest_actions(viewer)  # that is known now
+        assert "fail" not in suggest_actions(viewer), "an action that was used is not suggested again"
         session.show_time(0.0)
         driver.window.do("suggestions")
         session.show_time(session.timeline.end_time)
         assert suggest_actions(viewer) == ""
 
 
-def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> ViewerLauncher:
-    """Return how a window opens that somebody would watch, on a display that nobody sees."""
+def build_visible_launcher(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object
+) -> ViewerLauncher:
+    """Build a launcher that treats its invisible display like a visible one."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
     monkeypatch.setattr(
         opening, "open_display", lambda headless, missing_message: open_display(headless=True)
@@ -179,32 +189,28 @@ def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options
     return ViewerLauncher(start_session(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 
-def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    for chosen, lesson in (("return", True), ("escape", False)):
-        folder = tmp_path / chosen
-        launcher = opened_for_a_person(monkeypatch, folder, offers_lesson=True)
+def test_new_users_are_offered_the_lesson_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for key, starts_lesson in ((pygame.K_RETURN, True), (pygame.K_ESCAPE, False)):
+        folder = tmp_path / pygame.key.name(key)
+        launcher = build_visible_launcher(monkeypatch, folder, offers_lesson=True)
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.current, Question)
-            assert [answer.text for answer in window.dialogs.current.answers] == [
-                "Lesson 1",
-                "Just let me play",
-            ]
+            texts = [answer.text for answer in window.dialogs.current.answers]
+            assert texts == ["Lesson 1", "Just let me play"]
             window.run_frame(0.5)
-            assert window.viewer.session.displayed.time == 0.0  # nobody looks at the team yet
-            key = pygame.K_RETURN if chosen == "return" else pygame.K_ESCAPE
+            assert window.viewer.session.displayed.time == 0.0, "the session waits for the answer"
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
             window.run_frame(0.0)
-            assert window.dialogs.current is None and (window.lesson.player is not None) is lesson
+            assert window.dialogs.current is None
+            assert (window.lesson.player is not None) is starts_lesson
             window.run_frame(0.5)
             assert window.viewer.session.displayed.time > 0.0
-        with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
+        with build_visible_launcher(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.current is None
 
 
-def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
+def test_drafts_are_offered_and_the_session_waits_for_the_answer(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
@@ -213,38 +219,39 @@ def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
         workspace.session.fail_robot(2)
         workspace.save_draft({})
         workspace.close()
-    everybody = (1, 2, 3)
-    for chosen, left, numbers in (
-        (pygame.K_l, 2, everybody),
-        (pygame.K_d, 1, everybody),
+    for key, remaining_drafts, numbers in (
+        (pygame.K_l, 2, (1, 2, 3)),
+        (pygame.K_d, 1, (1, 2, 3)),
         (pygame.K_r, 0, (1, 3)),
     ):
-        launcher = opened_for_a_person(monkeypatch, tmp_path, offers_lesson=True)
+        launcher = build_visible_launcher(monkeypatch, tmp_path, offers_lesson=True)
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.current, Question)
             assert "1 edit, never saved" in window.dialogs.current.text
             window.run_frame(0.5)
             assert window.viewer.session.displayed.time == 0.0
-            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=chosen, mod=0, unicode="", scancode=0))
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
             window.run_frame(0.0)
             assert window.viewer.session.displayed.numbers == numbers
-            assert (window.dialogs.current is not None) is (left == 1)  # the next one is offered
-            assert len(find_recoverable_drafts(tmp_path / "drafts")) == left
+            # After a draft was discarded, the next one is offered.
+            assert (window.dialogs.current is not None) is (remaining_drafts == 1)
+            assert len(find_recoverable_drafts(tmp_path / "drafts")) == remaining_drafts
 
 
-def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    with opened_for_a_person(monkeypatch, tmp_path).window() as window:
+def test_the_lesson_is_not_offered_with_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with build_visible_launcher(monkeypatch, tmp_path).window() as window:
         assert window.dialogs.current is None
 
 
-def test_a_scale_takes_the_window_that_it_needs_or_says_so(
+def test_a_scale_enlarges_the_window_or_is_reduced_with_a_message(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(opening, "fit_to_screen", lambda size: (min(size[0], 1500), min(size[1], 1000)))
-    with opened_for_a_person(monkeypatch, tmp_path, scale=1.5).window() as window:
-        assert window.layout.scale == 1.5 and window.screen.get_size() == (1350, 900)
-    with opened_for_a_person(monkeypatch, tmp_path, scale=2.0).window() as window:
+    with build_visible_launcher(monkeypatch, tmp_path, scale=1.5).window() as window:
+        assert window.layout.scale == 1.5
+        assert window.screen.get_size() == (1350, 900)
+    with build_visible_launcher(monkeypatch, tmp_path, scale=2.0).window() as window:
         assert window.layout.scale == 1.625
         assert window.viewer.message == "scale 2 needs a window of 1800 × 1200; using 1.625"
 
@@ -257,14 +264,15 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         viewer.files.save_session(tmp_path / "second.robocov")
         (tmp_path / "notes.txt").touch()
         driver.key("ctrl+o")
-        asked = driver.window.dialogs.current
-        assert isinstance(asked, Choice)
-        offered = [each.text for each in asked.options("")]
+        dialog = driver.window.dialogs.current
+        assert isinstance(dialog, Choice)
+        offered = [option.text for option in dialog.options("")]
         assert offered[:2] == [str(tmp_path / "second.robocov"), str(tmp_path / "first.robocov")]
         assert offered[2:] == ["first.robocov", "other.json", "second.robocov", "../"]
         driver.type("oth")
         driver.key("return")
-        assert not driver.window.dialogs.is_open and viewer.files.map_name == str(tmp_path / "other.json")
+        assert not driver.window.dialogs.is_open
+        assert viewer.files.map_name == str(tmp_path / "other.json")
         driver.key("ctrl+o")
         driver.key("down")
         driver.key("return")
@@ -272,10 +280,12 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         assert viewer.files.recent[0] == str(tmp_path / "first.robocov")
         driver.key("ctrl+o")
         driver.type("nothing.robocov")
-        driver.key("return")  # an error stays in the dialog, with what was typed
-        asked = driver.window.dialogs.current
-        assert isinstance(asked, Choice) and "nothing.robocov" in asked.error
-        assert asked.text == "nothing.robocov"
+        driver.key("return")
+        # The dialog stays open with the typed text and the error.
+        dialog = driver.window.dialogs.current
+        assert isinstance(dialog, Choice)
+        assert "nothing.robocov" in dialog.error
+        assert dialog.text == "nothing.robocov"
 
 
 def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
@@ -286,45 +296,38 @@ def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
         viewer.files.save_session(tmp_path / "story.robocov")
         (tmp_path / "bad.robocov").write_text("{}")
 
-        def dropped(name: str) -> None:
+        def drop(name: str) -> None:
             pygame.event.post(pygame.event.Event(pygame.DROPFILE, file=str(tmp_path / name)))
             driver.settle()
 
-        dropped("other.json")
-        assert viewer.files.map_name == str(tmp_path / "other.json") and viewer.session.displayed.numbers == (
-            1,
-            2,
-            3,
-        )
-        dropped("story.robocov")
-        assert (
-            viewer.session.displayed.numbers == (1, 3)
-            and viewer.files.workspace.path == tmp_path / "story.robocov"
-        )
-        dropped("bad.robocov")
-        assert (
-            viewer.has_error_message
-            and "bad.robocov" in viewer.message
-            and viewer.session.displayed.numbers == (1, 3)
-        )
+        drop("other.json")
+        assert viewer.files.map_name == str(tmp_path / "other.json")
+        assert viewer.session.displayed.numbers == (1, 2, 3)
+        drop("story.robocov")
+        assert viewer.session.displayed.numbers == (1, 3)
+        assert viewer.files.workspace.path == tmp_path / "story.robocov"
+        drop("bad.robocov")
+        assert viewer.has_error_message
+        assert "bad.robocov" in viewer.message
+        assert viewer.session.displayed.numbers == (1, 3)
 
 
-def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    with opened_for_a_person(monkeypatch, tmp_path).window() as window:
+def test_recent_sessions_are_saved_in_the_settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with build_visible_launcher(monkeypatch, tmp_path).window() as window:
         window.viewer.files.save_session(tmp_path / "mine.robocov")
         window.viewer.view.has_suggestions = False
     settings, _ = load_settings(ViewerSettings, find_settings_file())
-    assert settings.recent == (str(tmp_path / "mine.robocov"),) and not settings.suggests
-    with opened_for_a_person(monkeypatch, tmp_path).window() as window:
-        assert (
-            window.viewer.files.recent == [str(tmp_path / "mine.robocov")]
-            and not window.viewer.view.has_suggestions
-        )
+    assert settings.recent == (str(tmp_path / "mine.robocov"),)
+    assert not settings.suggests
+    with build_visible_launcher(monkeypatch, tmp_path).window() as window:
+        assert window.viewer.files.recent == [str(tmp_path / "mine.robocov")]
+        assert not window.viewer.view.has_suggestions
 
 
 def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
-        viewer, session = driver.viewer, driver.session
+        viewer = driver.viewer
+        session = driver.session
         session.playback.is_playing = True
         driver.frames(20)
         session.fail_robot(2)
@@ -334,15 +337,16 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         session.fail_robot(3)
         driver.frames(20)
         driver.key("ctrl+b")
-        asked = driver.window.dialogs.current
-        assert isinstance(asked, Choice)
-        lines = asked.options("")
-        assert [line.text for line in lines][-1].endswith("robot 3 failed  (here)")
-        assert all("RAPF" in line.note and " m" in line.note for line in lines)
-        ends = np.array(
-            [pane.distance_curve.interpolate(session.timeline.end_time) for pane in session.timeline.panes]
-        )
-        assert lines[-1].note == f"{session.timeline.end_time:.1f} s · RAPF {ends[0]:.3f} m"
+        dialog = driver.window.dialogs.current
+        assert isinstance(dialog, Choice)
+        options = dialog.options("")
+        assert options[-1].text.endswith("robot 3 failed  (here)")
+        for option in options:
+            assert "RAPF" in option.note
+            assert " m" in option.note
+        end_time = session.timeline.end_time
+        end_value = session.timeline.panes[0].distance_curve.interpolate(end_time)
+        assert options[-1].note == f"{end_time:.1f} s · RAPF {end_value:.3f} m"
         driver.type("robot 2")
         driver.key("return")
         assert session.timeline.head is failed

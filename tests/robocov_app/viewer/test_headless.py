@@ -1,4 +1,4 @@
-"""Sessions made again without a window: `robocov run SESSION.robocov`."""
+"""Saved sessions that are replayed without a window: `robocov run SESSION.robocov`."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from robocov_app.viewer.session.session import Session
 SMALL = ["--lattice", "16", "--size", "320x240"]
 
 
-def saved(session: Session, folder: Path) -> str:
+def save_session_file(session: Session, folder: Path) -> str:
     session.timeline.cache_present()
     path = folder / "story.robocov"
     save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     return str(path)
 
 
-def played() -> Session:
-    """A robot fails; in another branch a circle is drawn and a robot joins."""
+def build_branched_session() -> Session:
+    """Build a session in which a robot fails; in another branch a circle is drawn and a robot joins."""
     session = advance_session(start_session(RAPF, LLOYD), 12)
     session.fail_robot(2)
     advance_session(session, 12)
@@ -45,45 +45,47 @@ def played() -> Session:
     return advance_session(session, 12)
 
 
-def test_a_run_that_nobody_touched_is_saved_byte_for_byte_as_run_does(tmp_path: Path) -> None:
+def test_a_session_without_edits_is_saved_byte_for_byte_like_a_run(tmp_path: Path) -> None:
     from robocov.mapfile import load_map
 
     session = advance_session(start_session(RAPF, environment=load_map("rooms"), robots=6), 30)
-    plain = ["run", "rooms", "--duration", "0.5", *SMALL, "--out", str(tmp_path / "plain")]
+    plain = ["run", "rooms", "--duration", "0.5", *SMALL, "--out", str(tmp_path / "run")]
     assert main(plain) == 0
-    assert main(["run", saved(session, tmp_path), *SMALL, "--out", str(tmp_path / "again")]) == 0
+    assert (
+        main(["run", save_session_file(session, tmp_path), *SMALL, "--out", str(tmp_path / "replayed")]) == 0
+    )
     for name in ("run.json", "record.npz", "cost.csv", "trajectories.png", "cost.svg"):
-        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes(), name
-    assert (tmp_path / "again" / "session.robocov").is_file()
+        assert (tmp_path / "replayed" / name).read_bytes() == (tmp_path / "run" / name).read_bytes(), name
+    assert (tmp_path / "replayed" / "session.robocov").is_file()
 
 
 @pytest.mark.slow
-def test_a_story_is_saved_with_its_parts_costs_and_film(
+def test_a_branch_is_saved_with_its_parts_costs_and_video(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    session, out = played(), tmp_path / "out"
-    command = ["run", saved(session, tmp_path), *SMALL, "--out", str(out), "--video", "--json"]
+    session = build_branched_session()
+    out = tmp_path / "out"
+    command = ["run", save_session_file(session, tmp_path), *SMALL, "--out", str(out), "--video", "--json"]
     assert main([*command, "--fps", "10", "--film-speed", "1"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert [part["words"] for part in answer["parts"]] == ["started", "circle drawn", "robot 4 joined"]
     assert [part["from_s"] for part in answer["parts"]] == pytest.approx([0.0, 0.2, 0.4])
     last = Record.load(out / "03-robot-4-joined" / "lloyd")
     np.testing.assert_array_equal(last.positions[-1], session.timeline.panes[1].simulation.positions)
-    assert len(last.team) == 4 and last.session["began_at_s"] == pytest.approx(0.4)
+    assert len(last.team) == 4
+    assert last.session["began_at_s"] == pytest.approx(0.4)
     rows = (out / "cost.csv").read_text().splitlines()
-    assert rows[0].startswith("controller,time_s,") and {row.split(",")[0] for row in rows[1:]} == {
-        "rapf",
-        "lloyd",
-    }
+    assert rows[0].startswith("controller,time_s,")
+    assert {row.split(",")[0] for row in rows[1:]} == {"rapf", "lloyd"}
     assert (out / "comparison.mp4").stat().st_size > 1000
     assert load_session(out / "session.robocov").step == session.timeline.step
 
 
 @pytest.mark.slow
-def test_each_branch_is_a_story_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = saved(played(), tmp_path)
+def test_each_branch_is_saved_in_its_own_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = save_session_file(build_branched_session(), tmp_path)
     assert main(["run", path, *SMALL, "--out", str(tmp_path / "all"), "--all-branches"]) == 0
-    assert sorted(each.name for each in tmp_path.glob("all-*")) == ["all-1", "all-2"]
+    assert sorted(path.name for path in tmp_path.glob("all-*")) == ["all-1", "all-2"]
     assert main(["run", path, *SMALL, "--out", str(tmp_path / "one"), "--branch", "1"]) == 0
     assert (tmp_path / "one" / "02-robot-2-failed").is_dir()
     capsys.readouterr()
@@ -95,39 +97,46 @@ def test_each_branch_is_a_story_of_its_own(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.slow
-def test_a_report_takes_stories_and_sessions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = saved(played(), tmp_path)
-    assert main(["run", path, *SMALL, "--out", str(tmp_path / "told")]) == 0
-    assert main(["report", str(tmp_path / "told")]) == 0
-    page = (tmp_path / "told" / "report.html").read_text()
+def test_reports_contain_saved_branches_and_sessions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = save_session_file(build_branched_session(), tmp_path)
+    assert main(["run", path, *SMALL, "--out", str(tmp_path / "branch")]) == 0
+    assert main(["report", str(tmp_path / "branch")]) == 0
+    page = (tmp_path / "branch" / "report.html").read_text()
     titles = ["0.0 to 0.2 s, begun", "0.2 to 0.4 s, circle drawn", "0.4 to 0.6 s, robot 4 joined"]
     assert all(f" · {title}</h2>" in page for title in titles)
     capsys.readouterr()
     assert main(["report", path]) == 0
-    assert capsys.readouterr().out.startswith(f"{Path(path).stem}"), "not the temporary folder of its parts"
+    assert capsys.readouterr().out.startswith(Path(path).stem)
     page = (tmp_path / "story.html").read_text()
-    assert "0.2 to 0.4 s, robot 2 failed</h2>" in page and titles[2] in page, "all branches are there"
-    assert str(tmp_path) not in page and "/robocov-" not in page, "no place of a machine"
-    (tmp_path / "told" / "story.json").write_text('{"format": "robocov-story"}')
+    assert "0.2 to 0.4 s, robot 2 failed</h2>" in page
+    assert titles[2] in page, "the report contains all branches"
+    assert str(tmp_path) not in page
+    assert "/robocov-" not in page, "the report contains no path of a temporary folder"
+    (tmp_path / "branch" / "story.json").write_text('{"format": "robocov-story"}')
     capsys.readouterr()
-    assert main(["report", str(tmp_path / "told")]) == 2
+    assert main(["report", str(tmp_path / "branch")]) == 2
     assert "story.json: cannot be read" in capsys.readouterr().err
 
 
-def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) -> None:
-    session, film = played(), VideoSettings(size=(640, 360), fps=10, speed=1.0)
+def test_a_video_has_a_legend_and_names_the_edits(tmp_path: Path) -> None:
+    session = build_branched_session()
+    settings = VideoSettings(size=(640, 360), fps=10, speed=1.0)
     branch = select_present_branch(session)
-    frames = list(draw_branch_frames(branch, split_branch(branch), [], film))
+    frames = list(draw_branch_frames(branch, split_branch(branch), [], settings))
     assert {frame.shape for frame in frames} == {(360, 640, 3)}
-    first, last = frames[0].astype(int), frames[-1].astype(int)
+    first = frames[0].astype(int)
+    last = frames[-1].astype(int)
     header = first[:20]
-    assert (header.min(axis=2) < 100).sum() > 100 and (header == last[:20]).all(), "one legend for all of it"
-    strip = slice(360 - 14, 360)
-    assert (first[strip].min(axis=2) > 200).all(), "nothing was done yet"
-    assert (last[strip].min(axis=2) < 100).sum() > 50
+    assert (header.min(axis=2) < 100).sum() > 100
+    assert (header == last[:20]).all(), "all frames have the same legend"
+    bottom = slice(360 - 14, 360)
+    assert (first[bottom].min(axis=2) > 200).all(), "the first frame names no edit"
+    assert (last[bottom].min(axis=2) < 100).sum() > 50
 
 
-def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
+def test_a_drag_belongs_to_the_part_before_and_is_recorded_there() -> None:
     session = advance_session(start_session(RAPF), 6)
     session.playback.is_playing = True
     for k in range(6):
@@ -137,64 +146,73 @@ def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
     advance_session(session, 6)
     (part,) = split_branch(select_present_branch(session))
     record = build_record(session)
-    assert part.first_step == 0 and len(record) == 19
-    (touch,) = record.session["touched"]
-    assert touch["robots"] == [2] and touch["from_s"] == pytest.approx(0.1)
+    assert part.first_step == 0
+    assert len(record) == 19
+    (drag,) = record.session["touched"]
+    assert drag["robots"] == [2]
+    assert drag["from_s"] == pytest.approx(0.1)
     assert record.session["repeatable"] is False
     assert have_same_arrays(record, build_record(session))
 
 
-def test_what_was_plotted_is_there_again(tmp_path: Path) -> None:
+def test_cost_curves_are_saved_and_loaded(tmp_path: Path) -> None:
     session = start_session(RAPF)
     advance_with_costs(session, 200)
     session.fail_robot(1)
     advance_with_costs(session, 30)
-    again = Session.open(load_session(Path(saved(session, tmp_path))))
-    curve = again.timeline.panes[0].distance_curve
-    assert 30 < len(curve) <= 61 and curve.last_time == pytest.approx(229 / 60, abs=1e-3)
+    loaded = Session.open(load_session(Path(save_session_file(session, tmp_path))))
+    curve = loaded.timeline.panes[0].distance_curve
+    assert 30 < len(curve) <= 61
+    assert curve.last_time == pytest.approx(229 / 60, abs=1e-3)
     assert curve.interpolate(2.0) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_replay_shows_a_session_from_its_beginning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from robocov_app.commands import replay
 
-    path, seen = saved(played(), tmp_path), []
-    monkeypatch.setattr(replay, "_open_window", lambda _, session, file: seen.append((session, file)) or 0)
+    path = save_session_file(build_branched_session(), tmp_path)
+    opened = []
+    monkeypatch.setattr(replay, "_open_window", lambda _, session, file: opened.append((session, file)) or 0)
     assert main(["replay", path]) == 0
-    ((session, file),) = seen
-    assert str(file) == path and session.displayed.time == 0.0 and session.playback.is_playing
+    ((session, file),) = opened
+    assert str(file) == path
+    assert session.displayed.time == 0.0
+    assert session.playback.is_playing
     for _ in range(60):
         session.playback.advance(1 / 60)
-    assert session.timeline.is_at_record_end and not session.playback.is_playing, (
-        "it stops where the story does"
-    )
+    assert session.timeline.is_at_record_end
+    assert not session.playback.is_playing, "the playback stops at the end of the record"
     assert main(["replay", path, "--video", "--out", str(tmp_path / "film")]) == 2
 
 
 @pytest.mark.slow
-def test_a_run_is_saved_by_another_process_and_nothing_else_stays(
+def test_a_run_is_saved_by_another_process_without_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (aside := tmp_path / "aside").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(aside))
+    temporary_folder = tmp_path / "temporary"
+    temporary_folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary_folder))
     saver = RunSaver(16)
-    words = saver.save(played(), tmp_path)
-    assert words == f"saving the run: {tmp_path / 'hall-comparison-1'}/" and saver.poll() == []
+    message = saver.save(build_branched_session(), tmp_path)
+    assert message == f"saving the run: {tmp_path / 'hall-comparison-1'}/"
+    assert saver.poll() == []
     saver.finish()
-    ((words, trouble),) = saver.poll()
-    assert words.startswith("run saved: ") and not trouble
+    ((message, is_error),) = saver.poll()
+    assert message.startswith("run saved: ")
+    assert not is_error
     assert (tmp_path / "hall-comparison-1" / "session.robocov").is_file()
-    assert not list(aside.iterdir())
+    assert not list(temporary_folder.iterdir())
 
 
-def test_a_robot_that_is_put_elsewhere_does_not_travel_there() -> None:
+def test_the_path_length_excludes_placing_a_robot() -> None:
     session = advance_session(start_session(RAPF), 12)
     session.apply(PlaceRobot(2, (5.0, 3.0)), "hand", "robot 2 placed")
     advance_session(session, 12)
     record = build_record(session)
     assert len(record) == 25
     (placed,) = record.session["placed"]
-    assert placed["robots"] == [2] and placed["time_s"] == pytest.approx(0.2)
+    assert placed["robots"] == [2]
+    assert placed["time_s"] == pytest.approx(0.2)
     jump = np.hypot(*np.diff(record.positions[:, 1], axis=0).T)
     assert jump.max() > 1.0
     assert compute_path_lengths(record.positions, record.traveled)[1] < 0.5

@@ -1,4 +1,4 @@
-"""Opening the window from the command line, with a display or without."""
+"""Opening the window from the command line, with and without a display."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ SHORT = ("--lattice", "8", "--size", "900x600")
 @pytest.fixture(autouse=True)
 def _no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, "")
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # so that it is as before afterwards
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # restored after the test
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a display can be missing on Linux only")
-def test_without_a_display_it_says_so_in_one_line(
+def test_a_missing_display_is_reported_in_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
@@ -44,51 +44,54 @@ def test_without_a_display_it_says_so_in_one_line(
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="X11")
-def test_a_display_that_does_not_answer_is_none(tmp_path: Path) -> None:
-    kept = {
-        key: value for key, value in os.environ.items() if key not in ("WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
-    }
+def test_a_display_that_does_not_answer_is_reported(tmp_path: Path) -> None:
+    environment = dict(os.environ)
+    environment.pop("WAYLAND_DISPLAY", None)
+    environment.pop("SDL_VIDEODRIVER", None)
+    environment |= {"DISPLAY": ":987654", FOLDER_VARIABLE: "", "XDG_RUNTIME_DIR": str(tmp_path)}
     done = subprocess.run(
         [*COMMAND, "demo", "square"],
-        env={**kept, "DISPLAY": ":987654", FOLDER_VARIABLE: "", "XDG_RUNTIME_DIR": str(tmp_path)},
+        env=environment,
         capture_output=True,
         text=True,
         timeout=60,
         check=False,
     )
-    assert done.returncode == 2 and done.stdout == ""
+    assert done.returncode == 2
+    assert done.stdout == ""
     assert done.stderr.splitlines() == [f"robocov: error: {NO_DISPLAY}"]
 
 
-def frames_of(folder: Path, *words: str) -> list[np.ndarray]:
-    assert main(["demo", "square", *SHORT, "--frames", "3", "--out", str(folder), *words]) == 0
+def save_frames(folder: Path, *options: str) -> list[np.ndarray]:
+    """Save three frames of the demo, and return their pixels."""
+    assert main(["demo", "square", *SHORT, "--frames", "3", "--out", str(folder), *options]) == 0
     paths = sorted(folder.glob("[!.]*"))
     assert [path.name for path in paths] == ["000000.png", "000001.png", "000002.png"]
     return [np.asarray(Image.open(path).convert("RGB")) for path in paths]
 
 
-def test_frames_without_a_display(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    frames = frames_of(tmp_path / "frames", "--robots", "2")
+def test_frames_are_saved_without_a_display(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frames = save_frames(tmp_path / "frames", "--robots", "2")
     assert capsys.readouterr().out.splitlines() == [f"saved {tmp_path / 'frames'}"]
     assert all(frame.shape == (600, 900, 3) for frame in frames)
     assert not np.array_equal(frames[0], frames[2])
 
 
 @pytest.mark.slow
-def test_the_same_words_give_the_same_frames_bit_for_bit(tmp_path: Path) -> None:
-    words = ("--controllers", "rapf", "rpf", "--robots", "3", "--show", "scan", "distances", "--seed", "4")
-    first = frames_of(tmp_path / "first", *words)
-    second = frames_of(tmp_path / "second", *words)
-    for one, other in zip(first, second, strict=True):
-        assert np.array_equal(one, other)
-    other = frames_of(tmp_path / "other", *words[:-1], "5")
-    assert not np.array_equal(first[0], other[0])
+def test_equal_options_lead_to_equal_frames(tmp_path: Path) -> None:
+    options = ("--controllers", "rapf", "rpf", "--robots", "3", "--show", "scan", "distances", "--seed")
+    first = save_frames(tmp_path / "first", *options, "4")
+    second = save_frames(tmp_path / "second", *options, "4")
+    for first_frame, second_frame in zip(first, second, strict=True):
+        assert np.array_equal(first_frame, second_frame)
+    other_seed = save_frames(tmp_path / "other", *options, "5")
+    assert not np.array_equal(first[0], other_seed[0])
 
 
-def test_a_video_has_all_frames_and_the_size_that_was_asked_for(tmp_path: Path) -> None:
+def test_a_video_has_all_frames_and_the_requested_size(tmp_path: Path) -> None:
     path = tmp_path / "window.mp4"
-    words = ["demo", "square", *SHORT, "--frames", "8", "--video", str(path), "--theme", "dark"]
-    assert main([*words, "--robots", "1", "--speed", "4"]) == 0
+    command = ["demo", "square", *SHORT, "--frames", "8", "--video", str(path), "--theme", "dark"]
+    assert main([*command, "--robots", "1", "--speed", "4"]) == 0
     assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 8
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
 
@@ -99,23 +102,21 @@ def test_frames_neither_read_nor_write_settings(tmp_path: Path, monkeypatch: pyt
     (folder / "window.json").write_text('{"theme": "dark", "width": 1000}')
     before = (folder / "window.json").read_text()
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
-    (first, *_) = frames_of(tmp_path / "frames", "--robots", "1")
+    (first, *_) = save_frames(tmp_path / "frames", "--robots", "1")
     assert first.mean() > 190
     assert [path.name for path in folder.iterdir()] == ["window.json"]
     assert (folder / "window.json").read_text() == before
 
 
-def test_a_folder_that_has_frames_already_is_not_written_over(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_existing_frames_are_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "000000.png").write_text("mine")
-    said = complaint(capsys, "demo", "square", *SHORT, "--frames", "2", "--out", str(tmp_path))
-    assert str(tmp_path) in said
+    message = complaint(capsys, "demo", "square", *SHORT, "--frames", "2", "--out", str(tmp_path))
+    assert str(tmp_path) in message
     assert (tmp_path / "000000.png").read_text() == "mine"
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted"),
+    ("arguments", "part"),
     [
         (("nowhere",), "nowhere"),
         (("square", "--robots", "0"), "--robots"),
@@ -143,33 +144,40 @@ def test_a_folder_that_has_frames_already_is_not_written_over(
         (("square", "--frames", "2", "--video", "x.gif"), ".mp4"),
     ],
 )
-def test_bad_options_are_told_in_one_line(
-    words: tuple[str, ...], wanted: str, capsys: pytest.CaptureFixture[str], monkeypatch, tmp_path: Path
+def test_invalid_options_are_reported_in_one_line(
+    arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str], monkeypatch, tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("SDL_VIDEODRIVER")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.setenv(name, ":987654")  # were it opened all the same, that would fail
-    assert wanted in complaint(capsys, "demo", *words)
+        monkeypatch.setenv(name, ":987654")  # a display that cannot be opened
+    assert part in complaint(capsys, "demo", *arguments)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_session_starts_with_the_options() -> None:
-    given = {"robots": 4, "start": "kitchen", "seed": 7, "dt": 0.05, "radius": 0.15, "speed": 2.0}
-    options = Arguments(controllers=("rpf", "lloyd"), gains=("k_rep=2",), paused=True, **given)
+    options = Arguments(
+        controllers=("rpf", "lloyd"),
+        gains=("k_rep=2",),
+        paused=True,
+        robots=4,
+        start="kitchen",
+        seed=7,
+        dt=0.05,
+        radius=0.15,
+        speed=2.0,
+    )
     session = build_session(options)
     assert [pane.controller.name for pane in session.timeline.panes] == ["rpf", "lloyd"]
     assert session.timeline.panes[0].controller.get_value("k_rep") == 2.0
     scenario = session.timeline.scenario
     assert (scenario.robots, scenario.start_name, scenario.seed, scenario.dt) == (4, "kitchen", 7, 0.05)
-    assert (
-        scenario.properties.radius == 0.15
-        and session.playback.clock.speed == 2.0
-        and not session.playback.is_playing
-    )
+    assert scenario.properties.radius == 0.15
+    assert session.playback.clock.speed == 2.0
+    assert not session.playback.is_playing
 
 
-def test_the_display_ends_also_when_something_fails() -> None:
+def test_the_display_is_closed_after_an_error() -> None:
     with pytest.raises(ZeroDivisionError), open_display(headless=True):
         assert pygame.display.get_init()
         1 / 0
@@ -179,13 +187,13 @@ def test_the_display_ends_also_when_something_fails() -> None:
 @pytest.mark.parametrize(
     ("height", "scale"), [(768, 1.0), (1080, 1.0), (1440, 1.25), (2160, 2.0), (4320, 3.0)]
 )
-def test_text_is_as_large_as_suits_the_screen(height: int, scale: float, monkeypatch) -> None:
+def test_the_scale_depends_on_the_screen(height: int, scale: float, monkeypatch) -> None:
     monkeypatch.setattr(pygame.display, "get_desktop_sizes", lambda: [(height * 16 // 9, height)])
     assert get_screen_scale() == scale
     assert fit_to_screen((3000, 500)) == (min(3000, height * 16 // 9), 500)
 
 
-def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, monkeypatch) -> None:
+def test_unreadable_settings_are_reported_and_replaced(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     (tmp_path / "window.json").write_text("{ nonsense")
     with ViewerLauncher(start_session(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
@@ -194,23 +202,33 @@ def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, mo
     assert '"theme": "light"' in (tmp_path / "window.json").read_text()
 
 
-def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> None:
+def test_options_are_not_saved_in_the_settings(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    kept = tmp_path / "window.json"
-    kept.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
-    asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "shown_layers": frozenset({"scan"})}
-    asked["hidden_layers"] = frozenset({"cells"})
-    with ViewerLauncher(start_session(), "hall", tmp_path, lattice=4, **asked).window() as window:
-        assert window.viewer.view.layers == {"robots", "scan"} and window.viewer.view.theme == "dark"
-        assert window.viewer.session.playback.clock.budget == FRAME_BUDGET_S, "people look at it"
+    file = tmp_path / "window.json"
+    file.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
+    launcher = ViewerLauncher(
+        start_session(),
+        "hall",
+        tmp_path,
+        lattice=4,
+        theme="dark",
+        size=(900, 600),
+        scale=2.0,
+        shown_layers=frozenset({"scan"}),
+        hidden_layers=frozenset({"cells"}),
+    )
+    with launcher.window() as window:
+        assert window.viewer.view.layers == {"robots", "scan"}
+        assert window.viewer.view.theme == "dark"
+        assert window.viewer.session.playback.clock.budget == FRAME_BUDGET_S
         window.viewer.view.layers.add("trails")
-    settings = json.loads(kept.read_text())
+    settings = json.loads(file.read_text())
     assert [settings[name] for name in ("theme", "width", "height", "scale")] == ["light", 1000, 700, None]
     assert settings["shown"] == ["cells", "robots", "trails"]
 
 
-def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
-    asked = ViewerLauncher(
+def test_layers_are_shown_and_hidden_by_options(tmp_path: Path) -> None:
+    launcher = ViewerLauncher(
         start_session(),
         "hall",
         tmp_path,
@@ -219,7 +237,8 @@ def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
         shown_layers=frozenset({"scan"}),
         hidden_layers=frozenset({"cells"}),
     )
-    with asked.window() as window:
-        assert "scan" in window.viewer.view.layers and "cells" not in window.viewer.view.layers
-        assert math.isinf(window.viewer.session.playback.clock.budget), "nobody does"
+    with launcher.window() as window:
+        assert "scan" in window.viewer.view.layers
+        assert "cells" not in window.viewer.view.layers
+        assert math.isinf(window.viewer.session.playback.clock.budget), "nobody waits for the frames"
         window.close()

@@ -1,4 +1,4 @@
-"""The legend that panes share tells what any of them shows."""
+"""The legend that the panes share."""
 
 from __future__ import annotations
 
@@ -13,20 +13,23 @@ from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
 
 
-def words(tmp_path: Path, *laws: str) -> list[str]:
-    session = Session(SessionScenario(load_map("square"), tuple(ControllerChoice(law) for law in laws)))
+def list_legend_texts(tmp_path: Path, *controllers: str) -> list[str]:
+    choices = tuple(ControllerChoice(name) for name in controllers)
+    session = Session(SessionScenario(load_map("square"), choices))
     with ViewerLauncher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
         for _ in range(10):
             window.run_frame(1 / 30)
         return [entry.text for entry in window.canvas._list_legend_entries()]
 
 
-@pytest.mark.parametrize("laws", [("rpf", "lloyd"), ("lloyd", "rpf")])
-def test_centroids_are_explained_whoever_heads_for_them(tmp_path: Path, laws: tuple[str, str]) -> None:
-    assert "cell centroid" in words(tmp_path, *laws)
+@pytest.mark.parametrize("controllers", [("rpf", "lloyd"), ("lloyd", "rpf")])
+def test_the_legend_explains_centroids_in_any_order_of_panes(
+    tmp_path: Path, controllers: tuple[str, str]
+) -> None:
+    assert "cell centroid" in list_legend_texts(tmp_path, *controllers)
 
 
-def test_each_thing_is_explained_once(tmp_path: Path) -> None:
-    found = words(tmp_path, "rpf", "lloyd", "atlas")
-    assert {"cell centroid", "goal"} < set(found)
-    assert len(found) == len(set(found))
+def test_the_legend_explains_each_symbol_once(tmp_path: Path) -> None:
+    texts = list_legend_texts(tmp_path, "rpf", "lloyd", "atlas")
+    assert {"cell centroid", "goal"} < set(texts)
+    assert len(texts) == len(set(texts))

@@ -1,4 +1,4 @@
-"""Which of two quantities the plot shows, and where it is chosen."""
+"""The plotted quantity, distance or time, and its choice."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ SLOW = Team.homogeneous(1, max_speed=0.25)
 MIXED = RobotProperties.from_team(Team.concatenate([FAST, SLOW]))
 
 
-def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path: Path) -> None:
+def test_teams_with_different_speeds_have_a_curve_of_the_mean_time(tmp_path: Path) -> None:
     with open_viewer(tmp_path, properties=MIXED) as driver:
-        session, pane = driver.session, driver.session.timeline.panes[0]
+        session = driver.session
+        pane = driver.session.timeline.panes[0]
         np.testing.assert_array_equal(session.displayed.get_setup(pane).speed_limits, [1.0, 1.0, 0.25])
         session.playback.is_playing = True
         driver.frames(20)
         session.playback.is_playing = False
         driver.frames(2)
-        places = session.displayed.get_positions(pane)
-        expected = CoverageCost(session.displayed.environment, 16)(
-            places, np.array([1.0, 1.0, 0.25])
-        ).mean_time
+        positions = session.displayed.get_positions(pane)
+        cost = CoverageCost(session.displayed.environment, 16)
+        expected = cost(positions, np.array([1.0, 1.0, 0.25])).mean_time
         assert pane.curves["time"].values[-1] == expected
         assert session.displayed.get_costs("time") == (
             session.displayed.time,
             {pane.number: pytest.approx(expected)},
         )
-        # who has failed does not come, but who is left is still told of
+        # The remaining robots are equally fast, and the curve of the time continues.
         session.fail_robot(3)
         driver.frames(2)
         assert session.displayed.get_setup(pane).speed_limits.tolist() == [1.0, 1.0]
         assert pane.curves["time"].values[-1] == pytest.approx(pane.distance_curve.values[-1])
 
 
-def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
+def test_the_plotted_quantity_is_chosen_by_key_and_click(tmp_path: Path) -> None:
     with open_viewer(tmp_path, properties=MIXED) as driver:
         chart = driver.window.chart
         driver.session.playback.is_playing = True
@@ -58,11 +58,10 @@ def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
         left, top, width, _ = chart.switch_box
         driver.click(left + width / 2, top + 6)
         assert chart.plotted is DISTANCE
-        # the click was none on the time line
-        assert driver.session.timeline.is_live
+        assert driver.session.timeline.is_live, "the click does not reach the time line"
 
 
-def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
+def test_both_quantities_have_ghost_curves(tmp_path: Path) -> None:
     with open_viewer(tmp_path, properties=MIXED) as driver:
         driver.session.playback.is_playing = True
         driver.frames(60)
@@ -71,10 +70,11 @@ def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
         driver.session.branch()
         assert [ghost.quantity for ghost in driver.session.timeline.ghosts] == ["distance", "time"]
         pane = driver.session.timeline.panes[0]
-        assert pane.distance_curve.last_time <= 0.4 + 1e-6 and pane.curves["time"].last_time <= 0.4 + 1e-6
+        assert pane.distance_curve.last_time <= 0.4 + 1e-6
+        assert pane.curves["time"].last_time <= 0.4 + 1e-6
 
 
-def test_where_all_are_equally_fast_there_is_no_choice(tmp_path: Path) -> None:
+def test_teams_with_equal_speeds_have_no_choice(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.frames(3)
         assert driver.session.displayed.get_setup(driver.session.timeline.panes[0]).speed_limits is None

@@ -1,4 +1,4 @@
-"""What the inspector's page draws beside its words."""
+"""Arrows beside the lines of a robot's report."""
 
 import numpy as np
 import pygame
@@ -11,11 +11,12 @@ from robocov_app.viewer.explanation.lines import ReportLine
 from robocov_app.viewer.panel import show_report
 
 SIZE = (320, 300)
-ARROWS = 33  # pixels from the left: arrows are before, words behind
+ARROWS = 33
+"""Width of the column of arrows, left of the texts, px."""
 
 
-def drawn(*lines: ReportLine) -> np.ndarray:
-    """Return which pixels of a page are not its background, (x, y)."""
+def draw_lines(*lines: ReportLine) -> np.ndarray:
+    """Draw a report with these lines, and return the mask of its drawn pixels, (x, y)."""
     screen = pygame.Surface(SIZE)
     theme = THEMES["light"]
     screen.fill(theme.panel)
@@ -26,13 +27,13 @@ def drawn(*lines: ReportLine) -> np.ndarray:
     return np.any(pygame.surfarray.array3d(screen) != np.array(theme.panel), axis=2)
 
 
-@pytest.mark.parametrize(("size", "arrow"), [(2.0, True), (0.001, True), (0.0004, False), (0.0, False)])
-def test_what_is_written_as_no_force_has_no_arrow(size: float, arrow: bool) -> None:
-    page = drawn(ReportLine("the text of a force", (size, 0.0), "resultant"))
-    below = page[:, 45:]
-    assert below[:ARROWS].any() == arrow
-    assert below[ARROWS:].any()
+@pytest.mark.parametrize(("size", "has_arrow"), [(2.0, True), (0.001, True), (0.0004, False), (0.0, False)])
+def test_negligible_forces_have_no_arrow(size: float, has_arrow: bool) -> None:
+    page = draw_lines(ReportLine("the text of a force", (size, 0.0), "resultant"))
+    below_title = page[:, 45:]
+    assert below_title[:ARROWS].any() == has_arrow
+    assert below_title[ARROWS:].any()
 
 
-def test_a_line_that_is_no_force_begins_at_the_left() -> None:
-    assert drawn(ReportLine("hears 4 robots", None, ""))[:ARROWS, 45:].any()
+def test_lines_without_a_force_start_at_the_left() -> None:
+    assert draw_lines(ReportLine("hears 4 robots", None, ""))[:ARROWS, 45:].any()

@@ -1,4 +1,4 @@
-"""What the status line says."""
+"""Texts of the status line."""
 
 from __future__ import annotations
 
@@ -24,39 +24,41 @@ def viewer() -> Presenter:
     return viewer
 
 
-def test_it_tells_time_cost_and_speed(viewer: Presenter) -> None:
-    said = list_facts(viewer, 60.0, 60.0, None)
-    assert said[0] == "t = 0.00 s"
-    assert said[1].startswith("J = ") and said[1].endswith(" m³")
-    assert said[-3:] == ["1×", "60 steps/s", "60 fps"]
+def test_the_status_line_contains_time_cost_and_speed(viewer: Presenter) -> None:
+    facts = list_facts(viewer, 60.0, 60.0, None)
+    assert facts[0] == "t = 0.00 s"
+    assert facts[1].startswith("J = ")
+    assert facts[1].endswith(" m³")
+    assert facts[-3:] == ["1×", "60 steps/s", "60 fps"]
 
 
-def test_an_old_cost_tells_its_time(viewer: Presenter) -> None:
+def test_an_old_cost_is_shown_with_its_time(viewer: Presenter) -> None:
     for _ in range(60):
         viewer.session.playback.step()
     assert list_facts(viewer, 60.0, 60.0, None)[1].endswith("(at 0.0 s)")
 
 
-def test_it_tells_of_pausing_filming_and_being_behind(viewer: Presenter) -> None:
+def test_the_status_line_contains_pauses_videos_and_delays(viewer: Presenter) -> None:
     viewer.session.playback.is_playing = False
-    said = list_facts(viewer, 60.0, 0.0, 12.4)
-    assert said[0].startswith("paused · ")
-    assert "● video 12 s" in said
+    facts = list_facts(viewer, 60.0, 0.0, 12.4)
+    assert facts[0].startswith("paused · ")
+    assert "● video 12 s" in facts
     viewer.session.playback.is_playing = True
     viewer.session.playback.clock.is_behind = True
     assert "1× (running at 0.5×)" in list_facts(viewer, 60.0, 30.0, None)
 
 
-def test_the_cursor_tells_distance_robot_and_share(viewer: Presenter) -> None:
-    place = viewer.session.timeline.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
-    viewer.inspection.cursor = float(place[0]), float(place[1])
-    words = describe_cursor(viewer)
-    assert words.startswith(f"({place[0]:.2f}, {place[1]:.2f}) m: ")
-    assert "robot 4" in words and words.endswith("× the mean")
+def test_the_cursor_is_described_by_robot_and_distance(viewer: Presenter) -> None:
+    x, y = viewer.session.timeline.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
+    viewer.inspection.cursor = float(x), float(y)
+    text = describe_cursor(viewer)
+    assert text.startswith(f"({x:.2f}, {y:.2f}) m: ")
+    assert "robot 4" in text
+    assert text.endswith("× the mean")
 
 
-def test_the_cursor_in_a_wall_or_outside_says_so(viewer: Presenter) -> None:
-    viewer.inspection.cursor = 1.0, 8.5  # in the block of the upper left corner
+def test_the_cursor_in_a_wall_or_outside_is_described(viewer: Presenter) -> None:
+    viewer.inspection.cursor = 1.0, 8.5  # in the obstacle in the upper left corner
     assert describe_cursor(viewer).endswith(": inside an obstacle")
     viewer.inspection.cursor = -3.0, -3.0
     assert describe_cursor(viewer).endswith(": outside the map")
@@ -64,7 +66,7 @@ def test_the_cursor_in_a_wall_or_outside_says_so(viewer: Presenter) -> None:
     assert describe_cursor(viewer) == ""
 
 
-def test_a_closed_room_is_told() -> None:
+def test_cut_off_rooms_are_reported() -> None:
     from robocov.environment import Environment, WallObstacle
 
     closed = Environment("two", ((0, 0), (4, 0), (4, 2), (0, 2)), (WallObstacle(((2, 0), (2, 2)), 0.1),))

@@ -147,14 +147,16 @@ def test_the_present_stays_until_a_long_seek_is_complete() -> None:
     forget_cached_states(session)
     run = timeline.run
     timeline.seek(timeline.document.nodes[1], seconds=0.0)
-    assert timeline.is_seeking and timeline.run is run
+    assert timeline.is_seeking
+    assert timeline.run is run
     calls = 0
     while timeline.is_seeking:
         assert timeline.run is run
         timeline.continue_seek(0.0)
         calls += 1
     assert calls > 10
-    assert timeline.run is not run and timeline.head.number == 1
+    assert timeline.run is not run
+    assert timeline.head.number == 1
 
 
 def test_an_edit_completes_a_seek_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -174,7 +176,9 @@ def test_a_timeline_starts_with_the_first_node() -> None:
     document = SessionDocument.start(start_session().timeline.scenario)
     timeline = Timeline(document)
     assert (timeline.head, timeline.step) == (document.nodes[0], 0)
-    assert timeline.is_live and timeline.is_reproducible and not timeline.is_at_record_end
+    assert timeline.is_live
+    assert timeline.is_reproducible
+    assert not timeline.is_at_record_end
 
 
 def test_unlimited_ranges_stay_unlimited_in_a_file() -> None:
