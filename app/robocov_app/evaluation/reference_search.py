@@ -140,7 +140,7 @@ def answer_queries(
         if reply is None:
             raise OutputError(f"reference of map {name!r}: the process of the search has ended")
         if reply.answer is None:
-            raise OutputError(f"reference of map {name!r}: {reply.trouble}")
+            raise OutputError(f"reference of map {name!r}: {reply.problem}")
         return name, reply.answer
 
     pool = ThreadPoolExecutor(min(workers, len(queries)), initializer=start_thread_process)

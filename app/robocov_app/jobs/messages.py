@@ -69,7 +69,7 @@ class Reply:
         Number of the question.
     answer : object
         The answer; None if there is none. Of a reply that is not final, the progress.
-    trouble : str
+    problem : str
         Reason why there is no answer.
     is_final : bool
         Whether it is the answer, rather than progress.
@@ -77,7 +77,7 @@ class Reply:
 
     number: int
     answer: Any
-    trouble: str = ""
+    problem: str = ""
     is_final: bool = True
 
 

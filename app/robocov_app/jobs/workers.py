@@ -25,7 +25,7 @@ class LatestWorker(Generic[_Answer]):
     ----------
     service : str
         ``package.module:Class``.
-    doing : str
+    task : str
         Its work as a verb phrase for messages, such as ``measures the map``.
     wire : type
         Translates questions and answers.
@@ -34,17 +34,17 @@ class LatestWorker(Generic[_Answer]):
 
     Attributes
     ----------
-    trouble : str
-        Why there is no answer to the last question; empty if there is one.
+    problem : str
+        Reason why there is no answer to the last question; empty if there is one.
     process : subprocess.Popen or None
         One thread writes to it, and another one reads from it.
     """
 
-    def __init__(self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
-        self.trouble = ""
+    def __init__(self, service: str, task: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
+        self.problem = ""
         self.process: subprocess.Popen[bytes] | None = None
         self._service = service
-        self._doing = doing
+        self._task = task
         self._wire = wire
         self._patience = patience
         self._waiting_since = 0.0
@@ -64,7 +64,7 @@ class LatestWorker(Generic[_Answer]):
         return self.process is not None and not self._has_ended
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """Whether the newest question has no answer yet."""
         return self._answered_number < self._number
 
@@ -82,7 +82,7 @@ class LatestWorker(Generic[_Answer]):
         question : object
         """
         now = time.monotonic()
-        if not self.busy:
+        if not self.is_busy:
             self._waiting_since = now
         if not self.is_alive or now - self._waiting_since > self._patience:
             self.close()
@@ -94,7 +94,7 @@ class LatestWorker(Generic[_Answer]):
                 self._number += 1
                 self._answered_number = self._number
                 reason = error.strerror or error
-                self.trouble = f"the process that {self._doing} cannot be started: {reason}"
+                self.problem = f"the process that {self._task} cannot be started: {reason}"
                 return
         self._number += 1
         self._questions.append((self._number, question))
@@ -119,7 +119,7 @@ class LatestWorker(Generic[_Answer]):
         Returns
         -------
         object or None
-            While the worker is `busy`, it is the answer to an older question. None if there is none.
+            While the worker is `is_busy`, it is the answer to an older question. None if there is none.
         """
         if self.process is None:
             return None
@@ -127,11 +127,11 @@ class LatestWorker(Generic[_Answer]):
         reply = self._replies.pop() if self._replies else None
         if reply is not None:
             self._answered_number = reply.number
-            self.trouble = reply.trouble
+            self.problem = reply.problem
             self._waiting_since = time.monotonic()
-        if has_ended and self.busy:
+        if has_ended and self.is_busy:
             self._answered_number = self._number
-            self.trouble = f"the process that {self._doing} has ended{self._describe_end()}"
+            self.problem = f"the process that {self._task} has ended{self._describe_end()}"
             return None
         return None if reply is None else reply.answer
 
@@ -186,7 +186,7 @@ class LatestWorker(Generic[_Answer]):
                         self._progress = reply
                         continue
                     if reply.answer is not None:
-                        reply = Reply(reply.number, wire.decode(reply.answer), reply.trouble)
+                        reply = Reply(reply.number, wire.decode(reply.answer), reply.problem)
                     self._replies.append(reply)
         except Exception:
             # Nor must an answer that cannot be read be waited for.
@@ -206,16 +206,16 @@ class DirectWorker(Generic[_Answer]):
 
     Attributes
     ----------
-    trouble : str
-        Why there is no answer to the last question; empty if there is one.
+    problem : str
+        Reason why there is no answer to the last question; empty if there is one.
     """
 
-    busy = False
+    is_busy = False
     is_alive = True
     progress = None
 
     def __init__(self, service: Service, wire: Wire | None = None) -> None:
-        self.trouble = ""
+        self.problem = ""
         self._service = service
         self._wire = wire or Wire()
         self._answer: Any = None
@@ -223,7 +223,7 @@ class DirectWorker(Generic[_Answer]):
     def put(self, question: object) -> None:
         """Ask a question, and wait for the answer."""
         reply = answer_questions(self._service, [(0, self._wire.encode(question))], Channel())
-        self.trouble = reply.trouble
+        self.problem = reply.problem
         self._answer = reply.answer
 
     def poll(self) -> _Answer | None:

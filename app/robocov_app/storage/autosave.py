@@ -80,14 +80,14 @@ class Autosaver:
 
     Attributes
     ----------
-    trouble : str
+    problem : str
         Why the draft cannot be written; empty if it can.
     """
 
     def __init__(
         self, folder: Path | None, kind: str, path: Path | None = None, resumed: Path | None = None
     ) -> None:
-        self.trouble = ""
+        self.problem = ""
         self._kind = kind
         self._path = path
         self._lock = ExitStack()
@@ -148,7 +148,7 @@ class Autosaver:
             self._changed.wait_for(
                 lambda: not (self._is_writing or (self._pending and self._is_hurried)), timeout
             )
-            return self._pending is None and not self._is_writing and not self.trouble
+            return self._pending is None and not self._is_writing and not self.problem
 
     def close(self, *, discard: bool) -> None:
         """Stop, and unlock the draft.
@@ -185,11 +185,11 @@ class Autosaver:
                 folder = parent / f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(4)}"
                 folder.mkdir(mode=0o700)
                 self._lock.enter_context(lock_folder(folder))
-                self.trouble = ""
+                self.problem = ""
                 return folder
             except (OSError, OutputError) as error:
                 # Another program may be looking for abandoned folders at this moment.
-                self.trouble = f"drafts cannot be saved: {error}"
+                self.problem = f"drafts cannot be saved: {error}"
         return None
 
     def _write_drafts(self) -> None:
@@ -200,17 +200,17 @@ class Autosaver:
             if job is None:
                 return
             start = time.perf_counter()
-            trouble = ""
+            problem = ""
             try:
                 self._write(*job)
             except Exception as error:
                 # The thread continues, because the next draft may succeed.
-                trouble = f"drafts cannot be saved: {error}"
+                problem = f"drafts cannot be saved: {error}"
             pause = max(_MIN_PAUSE_S, _PAUSE_FACTOR * (time.perf_counter() - start))
             with self._changed:
                 self._is_writing = False
-                self.trouble = trouble
-                if trouble and self._pending is None and not self._is_closed:
+                self.problem = problem
+                if problem and self._pending is None and not self._is_closed:
                     self._pending = job
                     pause = _RETRY_S
                 self._changed.notify_all()

@@ -190,14 +190,14 @@ class Costs:
         answers: list[tuple[int, KnownCost]] = []
         while self._asked is not None or self._ask_next():
             answer = self._worker.poll()
-            if self._worker.busy:
+            if self._worker.is_busy:
                 self._show_progress()
                 break
             asked = self._asked
             self._asked = None
             if asked is self._map_question:
                 self._is_prepared = answer is not None
-                self.state = "" if self._is_prepared else f"no cost: {self._worker.trouble}"
+                self.state = "" if self._is_prepared else f"no cost: {self._worker.problem}"
             elif isinstance(answer, KnownCost):
                 if self._asked_pane is not None:
                     answers.append((self._asked_pane, answer))

@@ -139,7 +139,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     with pytest.raises(RobocovError, match="no-such-folder"):
         document.save(tmp_path / "no-such-folder" / "plan.json")
     assert not document.history.has_unsaved_changes
-    assert document.autosaver.trouble == ""
+    assert document.autosaver.problem == ""
 
 
 def test_naming_a_map_at_save_keeps_what_was_undone(tmp_path):

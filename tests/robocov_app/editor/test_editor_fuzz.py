@@ -59,7 +59,7 @@ SHEETS: dict[str, Callable[[], object]] = {
 class SeldomReadings:
     """Measures now and then: the measurement has tests of its own."""
 
-    busy = False
+    is_busy = False
 
     def __init__(self) -> None:
         self._asked, self._count = None, 0

@@ -44,7 +44,7 @@ def dialog(path: Path, kind: str = "svg") -> ImportDialog:
 
 def free_area(asked: ImportDialog) -> float:
     asked.poll()
-    assert asked.imported is not None and asked.trouble == ""
+    assert asked.imported is not None and asked.problem == ""
     return asked.imported.environment.free_area
 
 

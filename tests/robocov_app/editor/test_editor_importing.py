@@ -41,7 +41,7 @@ def question(path: Path, worker: Any = None, taken: Any = None) -> ImportDialog:
 
 def free(asked: ImportDialog) -> float:
     asked.poll()
-    assert asked.imported is not None and asked.trouble == ""
+    assert asked.imported is not None and asked.problem == ""
     return asked.imported.environment.free_area
 
 
@@ -69,7 +69,7 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
 
 def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
     asked = question(plan)
-    assert "--cell" in asked.trouble and not asked.ready
+    assert "--cell" in asked.problem and not asked.is_ready
     asked.form.set("cell", "0.1")
     assert free(asked) == pytest.approx(80 - 1)
     asked.form.set("invert", "yes")
@@ -78,14 +78,14 @@ def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
     asked.form.set("threshold", "0.3")
     assert free(asked) == pytest.approx(80)
     asked.form.set("threshold", "0.3x")
-    assert asked.trouble == "threshold: expected a number, got '0.3x'"
+    assert asked.problem == "threshold: expected a number, got '0.3x'"
     asked.form.set("threshold", "")
     asked.form.set("keep", "all")
     assert free(asked) == pytest.approx(80 + 56 - 1)
     asked.form.keep_inside((15.0, 5.0))
     assert free(asked) == pytest.approx(56)
     asked.form.keep_inside((11.5, 5.0))
-    assert "is solid, expected a free position" in asked.trouble
+    assert "is solid, expected a free position" in asked.problem
     asked.form.set("inside", "")
     assert free(asked) == pytest.approx(80 - 1)
     assert asked.form.entries == {"cell": "0.1"}
@@ -93,10 +93,10 @@ def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
 
 def waited(asked: ImportDialog) -> None:
     end = time.monotonic() + PATIENCE
-    while asked.busy and time.monotonic() < end:
+    while asked.is_busy and time.monotonic() < end:
         asked.poll()
         time.sleep(0.005)
-    assert not asked.busy
+    assert not asked.is_busy
 
 
 @pytest.mark.slow
@@ -186,7 +186,7 @@ def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path)
     asked, _ = shown(hands)
     hands.key("return")
     hands.frames(2)
-    assert hands.editor.dialogs.current is asked and "--cell" in asked.trouble
+    assert hands.editor.dialogs.current is asked and "--cell" in asked.problem
     hands.type("0.1")
     hands.frames(2)
     assert hands.editor.dialogs.current is asked, "an old Enter counts no more"

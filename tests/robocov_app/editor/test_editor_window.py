@@ -392,7 +392,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
 
 
 class NoReadings:
-    busy = False
+    is_busy = False
 
     def put(self, question) -> None:
         pass

@@ -53,7 +53,7 @@ def test_it_says_what_the_function_says_after_every_change():
             for each in (worker, direct):
                 each.put((sketch, 0.2))
                 result, end = each.poll(), time.monotonic() + PATIENCE
-                while each.busy and time.monotonic() < end:
+                while each.is_busy and time.monotonic() < end:
                     result = each.poll()
                     time.sleep(0.002)
                 assert same(result, measure(sketch, 0.2))

@@ -33,7 +33,7 @@ def until(condition):
 def answer_of(worker, question):
     worker.put(question)
     answer = None
-    while worker.busy:
+    while worker.is_busy:
         answer = worker.poll()
         time.sleep(0.002)
     return answer
@@ -46,19 +46,19 @@ def worker():
 
 
 def test_questions_are_answered_by_one_process(worker):
-    assert (worker.poll(), worker.busy, worker.is_alive) == (None, False, False)
+    assert (worker.poll(), worker.is_busy, worker.is_alive) == (None, False, False)
     assert answer_of(worker, 4) == 8
-    assert (worker.poll(), worker.is_alive, worker.trouble) == (None, True, "")
+    assert (worker.poll(), worker.is_alive, worker.problem) == (None, True, "")
     pid = answer_of(worker, "print")
     assert pid == worker.process.pid != os.getpid()
     assert answer_of(worker, "bad") is None
-    assert worker.trouble == "bad: it is"
+    assert worker.problem == "bad: it is"
     assert answer_of(worker, None) is None
-    assert worker.trouble.startswith("it could not be doubled: unsupported operand")
+    assert worker.problem.startswith("it could not be doubled: unsupported operand")
     for number in range(2000):
         worker.put(number)
     until(lambda: worker.poll() == 3998)
-    assert (worker.busy, worker.trouble) == (False, "")
+    assert (worker.is_busy, worker.problem) == (False, "")
     heard = answer_of(worker, "heard")
     assert len(heard) < 1000
     assert answer_of(worker, "print") == pid
@@ -90,12 +90,12 @@ def test_a_process_that_dies_is_said_and_replaced(worker):
     assert answer_of(worker, 1) == 2
     worker.put("sleep")
     worker.process.kill()
-    trouble = until(lambda: worker.poll() or worker.trouble)
-    assert trouble.startswith("the process that doubles has ended")
-    assert not trouble.endswith("while starting")
-    assert not worker.busy and not worker.is_alive
+    problem = until(lambda: worker.poll() or worker.problem)
+    assert problem.startswith("the process that doubles has ended")
+    assert not problem.endswith("while starting")
+    assert not worker.is_busy and not worker.is_alive
     assert answer_of(worker, 2) == 4
-    assert worker.trouble == ""
+    assert worker.problem == ""
 
 
 def test_no_call_waits(monkeypatch, worker):
@@ -128,7 +128,7 @@ def test_each_process_has_its_own_wire():
         assert answer_of(worker, 1) == -2
     direct = DirectWorker(Doubling(), Counting())
     direct.put(10)
-    assert (direct.poll(), direct.poll(), direct.busy) == (-20, None, False)
+    assert (direct.poll(), direct.poll(), direct.is_busy) == (-20, None, False)
 
 
 def test_in_this_process(capsys):
@@ -138,7 +138,7 @@ def test_in_this_process(capsys):
     assert (worker.poll(), worker.poll()) == (8, None)
     worker.put(None)
     assert worker.poll() is None
-    assert worker.trouble.startswith("it could not be doubled: ")
+    assert worker.problem.startswith("it could not be doubled: ")
     assert "TypeError" in capsys.readouterr().err
     worker.close()
 
@@ -154,7 +154,7 @@ def test_closing_twice_or_without_a_process_is_no_fault(worker):
 def test_one_that_waits_asks_one_after_the_other():
     process = start_process(SERVICE)
     assert [ask_process(process, number).answer for number in (1, 2)] == [2, 4]
-    assert ask_process(process, "bad").trouble == "bad: it is"
+    assert ask_process(process, "bad").problem == "bad: it is"
     process.kill()
     assert ask_process(process, 1) is None
     assert end_process(process) != 0

@@ -188,10 +188,10 @@ def test_trouble_is_told_of_and_tried_again(folder, monkeypatch):
 
     keeper.save_draft(work)
     assert not keeper.flush()
-    assert "No space left" in keeper.trouble
+    assert "No space left" in keeper.problem
     full.clear()
     end = time.monotonic() + 60.0
-    while keeper.trouble and time.monotonic() < end:
+    while keeper.problem and time.monotonic() < end:
         time.sleep(0.01)
     assert keeper.flush()
     keeper.close(discard=False)
@@ -201,13 +201,13 @@ def test_trouble_is_told_of_and_tried_again(folder, monkeypatch):
 def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
     (tmp_path / "file").write_text("")
     keeper = Autosaver(tmp_path / "file" / "drafts", KIND)
-    assert "cannot be saved" in keeper.trouble
+    assert "cannot be saved" in keeper.problem
     keeper.save_draft(dict)
     assert not keeper.flush()
     keeper.close(discard=False)
     nothing = Autosaver(None, KIND)
     nothing.save_draft(dict)
-    assert nothing.trouble == ""
+    assert nothing.problem == ""
     assert nothing.flush()
     nothing.mark_saved(None)
     nothing.close(discard=True)
@@ -250,9 +250,9 @@ def test_a_draft_for_which_reading_raises_anything_is_left_alone(folder):
 def test_work_that_cannot_be_written_does_not_stop_the_thread(folder):
     keeper = Autosaver(folder, KIND)
     keeper.save_draft(lambda: {"work": "\udcff"})
-    assert not keeper.flush() and "cannot be saved" in keeper.trouble
+    assert not keeper.flush() and "cannot be saved" in keeper.problem
     keeper.save_draft(lambda: {"work": 2})
-    assert keeper.flush() and keeper.trouble == ""
+    assert keeper.flush() and keeper.problem == ""
     keeper.close(discard=False)
     assert works(folder) == [2]
 
@@ -317,7 +317,7 @@ def test_a_program_that_is_disturbed_while_it_begins_takes_another_folder(folder
 
     monkeypatch.setattr(autosave, "lock_folder", disturbed)
     keeper = Autosaver(folder, KIND)
-    assert keeper.trouble == ""
+    assert keeper.problem == ""
     assert keeper.flush()
     assert len(times) == 2
     keeper.close(discard=True)

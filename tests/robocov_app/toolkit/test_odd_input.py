@@ -117,11 +117,11 @@ def test_a_question_that_cannot_be_sent_is_reported(capfd: pytest.CaptureFixture
         worker.put(lambda: None)  # a lambda cannot be pickled
         for _ in range(2000):
             worker.poll()
-            if not worker.busy:
+            if not worker.is_busy:
                 break
             pygame.time.wait(10)
-        assert not worker.busy
-        assert "has ended" in worker.trouble
+        assert not worker.is_busy
+        assert "has ended" in worker.problem
     finally:
         worker.close()
 
@@ -133,6 +133,6 @@ def test_a_process_that_cannot_be_started_is_reported(monkeypatch: pytest.Monkey
     monkeypatch.setattr("robocov_app.jobs.workers.start_process", refuse)
     worker = LatestWorker[object]("slow_service:Slow", "works")
     worker.put(1)
-    assert not worker.busy
+    assert not worker.is_busy
     assert worker.poll() is None
-    assert worker.trouble == "the process that works cannot be started: Resource temporarily unavailable"
+    assert worker.problem == "the process that works cannot be started: Resource temporarily unavailable"

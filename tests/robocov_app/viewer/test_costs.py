@@ -55,28 +55,28 @@ class StubWorker:
 
     def __init__(self) -> None:
         self.questions = []
-        self.busy = False
+        self.is_busy = False
         self.is_alive = True
         self.progress = None
-        self.trouble = ""
+        self.problem = ""
         self._service = DirectWorker(CostService(), module._CostWire())
         self._answer = None
 
     def put(self, question) -> None:
         self.questions.append(question)
-        self.busy = True
+        self.is_busy = True
         self.progress = None
         self._service.put(question)
 
     def answer(self) -> None:
         self._answer = self._service.poll()
-        self.trouble = self._service.trouble
-        self.busy = False
+        self.problem = self._service.problem
+        self.is_busy = False
 
     def die(self) -> None:
         self._answer = None
-        self.trouble = "it has ended"
-        self.busy = False
+        self.problem = "it has ended"
+        self.is_busy = False
         self.is_alive = False
 
     def poll(self):
@@ -299,7 +299,7 @@ def test_a_robot_in_an_obstacle_does_not_block_other_questions(ready):
     costs.ask(1, 1.0, POSITIONS)
     costs.poll()
     worker.answer()
-    assert "outside the free space" in worker.trouble
+    assert "outside the free space" in worker.problem
     assert costs.poll() == []
     assert costs.state == ""
     worker.answer()

@@ -116,28 +116,28 @@ class ImportDialog(Dialog):
     def poll(self) -> Imported | None:
         """Return the imported map once the user has accepted it and it is ready."""
         imported = self._worker.poll()
-        if imported is not None and not self._worker.busy:
+        if imported is not None and not self._worker.is_busy:
             self.imported = imported
-        if self.trouble:
+        if self.problem:
             self.accepted = False
-        return self.imported if self.accepted and self.ready else None
+        return self.imported if self.accepted and self.is_ready else None
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """Whether an import is running."""
-        return not self._mistake and self._worker.busy
+        return not self._mistake and self._worker.is_busy
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """Why the file cannot be imported with the present settings; empty while that is not known."""
         if self._mistake:
             return self._mistake
-        return "" if self._worker.busy else self._worker.trouble
+        return "" if self._worker.is_busy else self._worker.problem
 
     @property
-    def ready(self) -> bool:
+    def is_ready(self) -> bool:
         """Whether the map has been imported with the present settings."""
-        return self.imported is not None and not self.busy and not self.trouble
+        return self.imported is not None and not self.is_busy and not self.problem
 
     def handle_key(self, name: str, ui: Ui) -> bool:
         """Accept the map with Enter; return whether the key was used."""
@@ -178,7 +178,7 @@ class ImportDialog(Dialog):
         if self.imported is None:
             ui.space(MAPS_GAP_PX)
             if ui.surface is not None:
-                text = "nothing to show" if self.trouble else "reading…"
+                text = "nothing to show" if self.problem else "reading…"
                 words = render_text(text, ui.px(13), ui.theme.faint)
                 ui.surface.blit(words, words.get_rect(center=box.center))
             return
@@ -192,7 +192,7 @@ class ImportDialog(Dialog):
 
     def _draw_preview(self, surface: Surface, ui: Ui, imported: Imported) -> None:
         self.preview.draw(surface, imported, ui.scale, ui.theme, self._shown_sheet)
-        if self.trouble:
+        if self.problem:
             # The maps are those of earlier settings.
             self.preview.veil(surface, ui.theme)
             return
@@ -266,7 +266,7 @@ class ImportDialog(Dialog):
         self.form.show_help(ui, foot - HELP_MARGIN_PX)
         ui.y = foot - BUTTONS_HEIGHT_PX
         ui.row(92, 92, height=BUTTONS_HEIGHT_PX, below=0)
-        if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
+        if ui.button("Import", chosen=self.is_ready, key="import", tip=self.problem):
             self.accepted = True
         if ui.button("Cancel", key="cancel"):
             self.is_done = True
@@ -274,8 +274,8 @@ class ImportDialog(Dialog):
         ui.end_row()
 
     def _list_report_lines(self) -> list[str]:
-        if self.trouble:
-            return [self.trouble]
+        if self.problem:
+            return [self.problem]
         return self.imported.report.format_lines() if self.imported is not None else []
 
     def _draw_report(self, ui: Ui, foot: float) -> None:
@@ -287,12 +287,12 @@ class ImportDialog(Dialog):
             lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
         ui.row(height=REPORT_LINE_PX, below=0)
         if ui.surface is not None:
-            color = ui.theme.trajectory if self.trouble else ui.theme.ink
+            color = ui.theme.trajectory if self.problem else ui.theme.ink
             for line in lines:
                 ui.surface.blit(render_text(line, ui.px(SMALL_TEXT_PX), color), ui.cell())
         ui.end_row()
         ui.y = foot - REPORT_LINE_PX
         hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOR]
-        is_importing_again = self.busy and self.imported is not None
+        is_importing_again = self.is_busy and self.imported is not None
         ui.label("importing…" if is_importing_again else hint, style="unit")
         ui.end_row()

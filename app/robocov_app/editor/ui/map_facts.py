@@ -117,7 +117,7 @@ def list_status(editor: Editor, frame_rate: float, team: Team | None) -> list[st
     if is_selecting and not editor.selection:
         texts.append(editor.tool.hint)
     texts.append(_describe_snapping(editor))
-    if editor.measurement_worker.busy:
+    if editor.measurement_worker.is_busy:
         texts.append("measuring …")
     texts.append(f"{frame_rate:.0f} fps")
     return texts

@@ -153,7 +153,7 @@ class EditorWindow(CommandWindow):
         editor = self.editor
         canvas = self.canvas
         dialog = editor.dialogs.current
-        is_importing = isinstance(dialog, ImportDialog) and dialog.busy
+        is_importing = isinstance(dialog, ImportDialog) and dialog.is_busy
         if self.panel.ui.needs_redraw or editor.moves_since is not None or is_importing:
             return None
         return (
@@ -161,7 +161,7 @@ class EditorWindow(CommandWindow):
             editor.message,
             editor.has_error_message,
             editor.typed,
-            editor.measurement_worker.busy,
+            editor.measurement_worker.is_busy,
             editor.problem,
             editor.sketch,
             editor.selection,
@@ -203,9 +203,9 @@ class EditorWindow(CommandWindow):
         if not self.pointer.is_busy:
             self.documents.poll()
             self._update_team()
-        if not (self.pointer.is_busy and editor.measurement_worker.busy):
+        if not (self.pointer.is_busy and editor.measurement_worker.is_busy):
             editor.request_measurement()
-        editor.show_message(editor.document.autosaver.trouble, is_error=True)
+        editor.show_message(editor.document.autosaver.problem, is_error=True)
         if self.documents.leaving:
             self.closed = True
             return
