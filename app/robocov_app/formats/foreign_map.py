@@ -60,8 +60,8 @@ class ForeignMap:
     format : str
         Name of the format.
     boundary : Polygon or MultiPolygon or None, m
-        Outer boundary. What is in it and not free becomes obstacles. Without it, or if walls separate the
-        free space from it, the outline of the free space is the boundary.
+        Outer boundary. Everything in it that is not free becomes an obstacle. Without it, or if walls
+        separate the free space from it, the outline of the free space is the boundary.
     has_named_boundary : bool
         Whether the file names the boundary, which is then kept even if walls separate it.
     boundary_source : str
@@ -71,7 +71,7 @@ class ForeignMap:
     cell : float or None, m
         Longer side of a cell of a raster.
     specks : float, m²
-        Smaller obstacles are noise of the way in which such maps are made.
+        Smaller obstacles are noise of the sensors or the compression by which such maps are made.
     cut_corners : bool
         Whether corners are cut by a step or two of a grid; `geometry.cells.corners` completes them.
     primitives : tuple of Primitive

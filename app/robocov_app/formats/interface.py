@@ -28,8 +28,8 @@ class Importer:
         ``sniff(path, head)`` returns whether a file that starts with the bytes `head` has this format. It is
         fast and never raises. `head` has `files.HEAD_BYTES` bytes, or is the whole file.
     reader : callable
-        ``reader(path, options)`` returns the map in a file, and raises a MapError of one line for whatever it
-        cannot use, within a second and 200 MB.
+        ``reader(path, options)`` returns the map in a file, or raises a MapError of one line, within a second
+        and 200 MB.
     options : frozenset of str
         The fields of `ReadOptions` that apply to the format.
     """

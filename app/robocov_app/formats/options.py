@@ -77,7 +77,7 @@ def _list_words(hint: Any) -> list[str]:
 
 @dataclass(frozen=True)
 class ReadOptions(Options):
-    """Options for reading a map that its file does not contain; the format chooses what is not given."""
+    """Options for reading a map, in addition to its file; the format has its own defaults."""
 
     cell: float | None = None
     """Side of a cell, pixel or tile, m (default: 1 for MovingAI and Tiled)."""
@@ -190,7 +190,7 @@ class ReadOptions(Options):
 
 @dataclass(frozen=True)
 class WriteOptions(Options):
-    """Options for writing a map; the format chooses what is not given."""
+    """Options for writing a map; the format has its own defaults."""
 
     cell: float | None = None
     """Side of a cell or pixel, m (default: 0.05); thinner walls stay connected."""

@@ -256,13 +256,13 @@ def import_map(
         Name of the format. By default the file is inspected.
     options : ReadOptions
     shaping : Shaping
-        Changes on the way to an environment, such as simplification.
+        Parameters of the conversion to an environment, such as simplification.
 
     Returns
     -------
     environment : Environment
     report : ImportReport
-        What was done to the map.
+        Repairs, losses and changes.
     foreign : ForeignMap
         The map as it was read.
 

@@ -1,4 +1,4 @@
-"""Reports of imports and exports: what was read and written, and what changed."""
+"""Reports of imports and exports: sizes, losses and changes."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class ExportReport(_Report):
     area, area_written : float, m²
         Free area of the map and of the written file.
     dropped : tuple of str
-        What the format cannot contain.
+        Properties of the map that the format cannot express.
     notes : tuple of str
         Remarks.
     warnings : tuple of str

@@ -13,7 +13,7 @@ _ROS_MAP = "drive a robot through it, or open it in RViz, and save a map with ma
 _UNPACK = "unpack it first"
 _PNG = "save it as a PNG"
 _FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
-# How a file starts, what it is, and how to get a map from it.
+# The start of a file, its kind, and how to get a map from it.
 _KINDS = [
     (r"\Z", "empty", "is it the right file?"),
     (_FORMAT + r"map\"", "a map of robocov already", "robocov check, run and edit take it as it is"),

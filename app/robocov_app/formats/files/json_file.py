@@ -1,4 +1,4 @@
-"""JSON files, with the line and column of what is wrong in them."""
+"""JSON files, with the line and column of errors in them."""
 
 from pathlib import Path
 from typing import Any

@@ -12,7 +12,7 @@ MAX_CELLS = 64_000_000
 MAX_VERTICES = 500_000
 """Largest number of vertices of a foreign map."""
 MAX_SHAPES = 20_000
-"""Largest number of shapes in a file: each takes a quarter of a millisecond, whatever its size."""
+"""Largest number of shapes in a file: each takes a quarter of a millisecond, even if it is small."""
 MAX_DEPTH = 32
 """Deepest nesting of collections, groups, blocks and lists."""
 

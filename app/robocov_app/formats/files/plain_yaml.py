@@ -1,6 +1,6 @@
 """YAML without tags: mappings, lists and text.
 
-Text never stands for anything but text here: the caller decides what a value means. Aliases may repeat a
+Text is always text here: the caller decides whether it is a number or a word. Aliases may repeat a
 value, within a limit on all values together.
 """
 
@@ -25,7 +25,7 @@ MAX_YAML_DEPTH = 12
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
     """Return the mapping in a YAML text.
 
-    Anchors and aliases, and the merge key ``<<``, mean what they mean in YAML 1.1.
+    Anchors and aliases, and the merge key ``<<``, are those of YAML 1.1.
 
     Parameters
     ----------

@@ -208,7 +208,7 @@ class _Reader:
             self._refuse("entities that stand for too much")
 
     def _check_entity(self, name: str, is_parameter: bool, value: str | None, *rest: object) -> None:
-        """Check an entity: it may stand for a few words, which expat inserts wherever it is used."""
+        """Check an entity: it may stand for a few words, which expat inserts at every use."""
         self._count_declaration()
         stands = f"an entity {quote(name)} that stands"
         if value is None:

@@ -1,1 +1,1 @@
-"""Formats of coordinates on the globe: GeoJSON, OpenStreetMap and IMDF, and what they share."""
+"""Formats of coordinates on the globe: GeoJSON, OpenStreetMap and IMDF, and their common parts."""

@@ -40,7 +40,7 @@ def convert_to_meters(
     may_be_degrees: bool = False,
     origin: Point | None = None,
 ) -> list[SourceGeometry]:
-    """Return geometries with coordinates in meters; the notes of `shapes` say what was done to them.
+    """Return geometries with coordinates in meters, and add notes on the conversion to `shapes`.
 
     The option ``units`` overrules the file; ``scale`` is the size of a unit in meters if the file has none.
 
@@ -88,7 +88,7 @@ def _join_points(geometries: Sequence[SourceGeometry]) -> Array:
 
 
 def _replace_points(geometries: Sequence[SourceGeometry], points: Array) -> list[SourceGeometry]:
-    """Return geometries with other points, given as by `_join_points`."""
+    """Return geometries with other points, in the order of `_join_points`."""
     lengths = [len(ring) for geometry in geometries for ring in geometry.rings]
     rings = iter(np.split(points, np.cumsum(lengths)[:-1]))
     replaced = []

@@ -146,7 +146,7 @@ def _write_lines(layout: ImportPage) -> None:
 
 
 def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport, theme: Theme) -> None:
-    """Draw the map as it was read, what was lost, and the positions of parts that were left out."""
+    """Draw the map as it was read, the lost free space, and the positions of parts that were left out."""
     outside = shapely.difference(comparison.region, comparison.before)
     _draw_area(axes, outside, theme.obstacle, theme.obstacle_edge)
     # Free space has an edge also where it ends at the edge of the arena.

@@ -139,7 +139,7 @@ class OsmData:
         return point
 
     def get_ways(self, element: OsmElement) -> list[OsmElement | None]:
-        """Return the ways of a relation, or a way itself; None stands for one that the file lacks."""
+        """Return the ways of a relation, or a way itself; None for one that is missing in the file."""
         if element.kind == "relation":
             return [self.ways.get(number) for number in element.members]
         return [element]

@@ -85,7 +85,7 @@ def build_grid_map(
     unknown : "obstacle", "free" or "cut"
         What unknown cells are; with "cut" the map ends around the known ones.
     unknown_name : str
-        What the report calls unknown cells.
+        Name of unknown cells in the report.
     noise_cells : float
         Obstacles of fewer cells are noise.
     repaired, notes : tuple of str

@@ -25,7 +25,7 @@ DEFAULT_CELL_M = 0.05
 _MIN_PART_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
 """Parts of the free space without space for a robot do not count."""
 _MAX_TRIED_CELLS = 16_000_000
-"""Size of the largest grid that is tried to keep what a coarser one loses."""
+"""Size of the largest grid that is tried to keep passages that a coarser one loses."""
 _DIGITS = 6
 """Decimals of a grid's corner: a micrometer."""
 

@@ -124,13 +124,13 @@ def _select_long(geometry: BaseGeometry, length: float) -> Array:
 
 
 def _close(area: BaseGeometry, width: float) -> BaseGeometry:
-    """Fill what is narrower than a width in meters."""
+    """Fill gaps that are narrower than a width, m."""
     closed: BaseGeometry = buffer_with_mitres(buffer_with_mitres(area, width / 2), -width / 2)
     return closed
 
 
 def _open(area: BaseGeometry, width: float) -> BaseGeometry:
-    """Remove what is narrower than a width in meters."""
+    """Remove parts that are narrower than a width, m."""
     opened: BaseGeometry = buffer_with_mitres(buffer_with_mitres(area, -width / 2), width / 2)
     return opened
 

@@ -28,7 +28,7 @@ class ImportComparison:
     before, after : shapely geometry, m
         The free space.
     lost, opened : shapely geometry, m
-        What was free and is not, and the other way around, except for walls that have moved.
+        Free space that became solid, and the reverse, except for walls that have moved.
     region : shapely geometry, m
         Convex, around all of it.
     gap : Gap or None

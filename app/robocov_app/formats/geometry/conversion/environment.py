@@ -1,4 +1,4 @@
-"""Conversion of a foreign map, whatever its format, to an environment."""
+"""Conversion of a foreign map of any format to an environment."""
 
 import numpy as np
 import shapely
@@ -55,7 +55,7 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
     -------
     environment : Environment
     report : ImportReport
-        What was repaired, dropped and changed.
+        Repairs, losses and changes.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _build_report(
 
 
 def _remove_hairs(free: MultiPolygon, conversion: Conversion) -> Cleaned:
-    """Remove what is thinner than the decimals of a map; cells have no such parts."""
+    """Remove parts that are thinner than the decimals of a map; cells have none."""
     if conversion.foreign.cell is not None:
         return Cleaned(free)
     width = 2 * conversion.grid
@@ -148,13 +148,13 @@ def _choose_boundary(
     selection: PartSelection,
     conversion: Conversion,
 ) -> Polygon | None:
-    """Return the boundary around the parts that stay; None where it is the outline of these.
+    """Return the boundary around the parts that remain, or None if it is the outline of these.
 
-    A boundary counts as far as the free space reaches it. Where walls separate all of the free space from
-    it, what is behind them is no concern of the robots: the known region would be larger than what they
-    can cover, and draw them to the walls. So the boundary is then the inner edge of the walls, in all
-    formats. Only a boundary that the file or the user names stays, unless the user chooses another
-    part of the free space.
+    A boundary counts as far as the free space reaches it. If walls separate all of the free space from it,
+    the area behind them does not matter: it would make the known region larger than the area that robots can
+    cover, and draw them to the walls. The boundary is then the inner edge of the walls, in all formats. Only
+    a boundary that the file or the user names remains, unless the user chooses another part of the free
+    space.
     """
     foreign = conversion.foreign
     shaping = conversion.shaping
@@ -231,5 +231,5 @@ def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversio
         starts=build_starts(free, conversion),
         description=foreign.description[:_MAX_DESCRIPTION_CHARACTERS],
     )
-    # The rules of map files are applied: what is imported can be saved and loaded.
+    # The rules of map files are applied, so that every imported map can be saved and loaded.
     return from_json(to_json(environment), conversion.where)

@@ -26,7 +26,7 @@ from robocov_app.formats.geometry.simplification.simplify import SimplifiedSpace
 
 
 class MapLayout(NamedTuple):
-    """A boundary and what is solid in it.
+    """A boundary and the obstacles in it.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class MapLayout(NamedTuple):
     solid : list of Polygon, m
     primitives : list of circles and walls
     deviation : Deviation
-        By how much walls have moved.
+        Distance by which walls have moved, and the area that changed.
     """
 
     boundary: Polygon
@@ -117,7 +117,7 @@ def build_boundary(
     -------
     boundary : Polygon, m
     solid : list of Polygon, m
-        What is solid inside the boundary.
+        Solid areas inside the boundary.
     """
     parts = list(free.geoms)
     if base is None and len(parts) == 1 and not hull and margin == 0.0:

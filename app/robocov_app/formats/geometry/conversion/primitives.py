@@ -1,4 +1,4 @@
-"""Circles and walls of a file that stay such, instead of the polygons that they cover."""
+"""Circles and walls of a file that remain circles and walls instead of polygons."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -75,7 +75,7 @@ def restore_primitives(
         # Removes the vertices at which polygons started that are gone.
         boundary = round_polygons(candidate.boundary.simplify(0.0), conversion.digits).geoms[0]
         deviation = measure_deviation(before, candidate.compute_free())
-        # A circle stays within its sagitta, whatever number of sides it is drawn with.
+        # A circle stays within its sagitta, for any number of sides.
         limit = conversion.tolerance + conversion.grid + MAX_SAGITTA_M
         if deviation.distance > max(limit, layout.deviation.distance):
             return layout

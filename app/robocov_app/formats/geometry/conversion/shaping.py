@@ -1,4 +1,4 @@
-"""Parameters of the conversion of a foreign map, and what is known while it is converted."""
+"""Parameters of the conversion of a foreign map, and its state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid polygons from whatever a reader has found."""
+"""Valid polygons from the polygons of a reader, which may cross themselves or each other."""
 
 import numpy as np
 import shapely
@@ -35,7 +35,7 @@ def build_valid_free_space(conversion: Conversion, boundary: MultiPolygon | None
     ----------
     conversion : Conversion
     boundary : MultiPolygon or None, m
-        What is outside of it is dropped, and reported.
+        Free space outside of it is dropped, and reported.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Search for the boundary of a drawing: by its name, by what lies in it, or around everything."""
+"""Search for the boundary of a drawing: by its name, by the shapes in it, or around everything."""
 
 from collections.abc import Sequence
 
@@ -84,7 +84,7 @@ def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozen
 
 
 def _find_outer_edge(drawing: Drawing, floors: frozenset[ClosedOutline]) -> Polygon | None:
-    """Return what the walls of a drawing enclose, if that is mostly open and contains most of them."""
+    """Return the area within the walls of a drawing, if it is mostly open and contains most of them."""
     edges = [edge for outline in drawing.outlines if outline in floors for edge in outline.edges]
     lines = [line for line in (*drawing.lines, *edges) if line.role != "free"]
     areas = [outline.area for outline in drawing.outlines if outline not in floors]
@@ -101,11 +101,11 @@ def _find_outer_edge(drawing: Drawing, floors: frozenset[ClosedOutline]) -> Poly
 
 
 def _find_named_boundary(drawing: Drawing) -> Boundary | None:
-    """Return what is called the boundary; MapError if the user names one that encloses nothing."""
+    """Return the boundary with that name. Raises MapError if the one that the user names has no area."""
     given_name = drawing.options.boundary
     name = given_name or BOUNDARY
-    outlines = frozenset(each for each in drawing.outlines if _has_label(each.labels, name))
-    lines = frozenset(each for each in drawing.lines if _has_label(each.labels, name))
+    outlines = frozenset(outline for outline in drawing.outlines if _has_label(outline.labels, name))
+    lines = frozenset(line for line in drawing.lines if _has_label(line.labels, name))
     # In the order of the file, as the order of a set differs from run to run.
     paths = [LineString(line.points) for line in drawing.lines if line in lines]
     noded = shapely.union_all(join_line_ends(paths, drawing.snap))
@@ -207,7 +207,7 @@ def _find_outermost_outlines(drawing: Drawing) -> Boundary | None:
 
 
 def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[ClosedOutline]) -> Boundary:
-    """Return a boundary of several outlines, one of which is the largest, or of that one alone."""
+    """Return a boundary of several outlines, or of the largest one alone."""
     if len(members) == 1:
         source = "the only closed outline"
         if len(drawing.outlines) > 1:

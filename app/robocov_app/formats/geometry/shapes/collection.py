@@ -1,4 +1,4 @@
-"""Collection of the shapes that a reader finds in a file, and the map that they stand for."""
+"""Collection of the shapes in a file, and the map that they describe."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -54,7 +54,7 @@ class Shapes:
     outlines : list of ClosedOutline
     lines : list of WallLine
     pillars : list of CircleObstacle
-        Obstacles whatever outlines are.
+        Obstacles, also if outlines are free.
     labels : LabelFilter
     tally : ImportTally
     vertices : int
@@ -136,7 +136,7 @@ class Shapes:
         at : str
             Position in the file, for messages.
         thing : str
-            What is counted as left out if the rings enclose no area; may be empty.
+            Kind of shape, for the count of those left out because they enclose no area. Not counted if empty.
         whole : str
             See `SourceGeometry`.
         paint : Paint
@@ -249,7 +249,7 @@ class Shapes:
         return points[:, :2]
 
     def leave_out(self, kind: str, reason: str = "", count: int = 1) -> None:
-        """Count things that are no part of the map, for the report."""
+        """Count shapes that are left out of the map, for the report."""
         self.tally.left_out[kind, reason] += count
 
     @property

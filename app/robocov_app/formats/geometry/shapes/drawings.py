@@ -1,4 +1,4 @@
-"""Drawings and what they stand for: the input and the result of an interpretation."""
+"""Drawings and their meaning: the input and the result of an interpretation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -54,7 +54,7 @@ class Drawing:
     outlines : sequence of ClosedOutline
     lines : sequence of WallLine
     pillars : sequence of CircleObstacle
-        Obstacles whatever outlines are.
+        Obstacles, also if outlines are free.
     options : ReadOptions
     world : MultiPolygon or None, m
         The free space without the shapes, if the format defines it.

@@ -31,7 +31,7 @@ class Floors:
     ----------
     outlines : frozenset of ClosedOutline
     layers : sequence of PaintLayer
-        Paint that uncovers what is below it.
+        Paint that uncovers the ground below it.
     is_slab : bool
         Whether the boundary is solid itself, except for the floors on it.
     """
@@ -52,7 +52,7 @@ class NestedAreas:
 def find_floors(
     drawing: Drawing, boundary: Boundary | None, report: InterpretationReport, *, are_solid: bool
 ) -> Floors:
-    """Find the floors of a drawing: what was declared free, and where nothing was, what is pale.
+    """Find the floors of a drawing: fills of a color that is declared free, or else pale ones.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def find_nested_areas(
 
 
 def build_ground(boundary: Boundary | None, region: MultiPolygon, floors: Floors) -> PaintLayer | None:
-    """Return the region as a layer of paint if only what is painted as a floor is free."""
+    """Return the region as a layer of paint if only floors are free."""
     if boundary is None:
         return None
     has_declared = any(outline.role == "free" for outline in floors.outlines)

@@ -1,4 +1,4 @@
-"""Counts of what an import leaves out and repairs, for its report."""
+"""Counts of shapes that an import leaves out or repairs, for its report."""
 
 from collections import Counter
 
@@ -9,12 +9,12 @@ from robocov.errors import format_count
 
 
 class ImportTally:
-    """Counts of things that are left out or repaired.
+    """Counts of shapes that are left out or repaired.
 
     Attributes
     ----------
     left_out, mended : Counter of (str, str)
-        Number of things of a kind, by the kind and the reason.
+        Number of shapes of a kind, by the kind and the reason.
     """
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class ImportTally:
         return tuple(lines)
 
     def describe_omissions(self) -> tuple[str, ...]:
-        """Return the lines of the report about what was left out."""
+        """Return the lines of the report about shapes that were left out."""
         lines = [
             f"{format_plural(count, kind)} {reason}".strip()
             for (kind, reason), count in sorted(self.left_out.items())

@@ -3,25 +3,25 @@
 Closed outlines are either *free space*, all of them together; or they are *solid*, except for the boundary.
 Lines and pillars are obstacles in both cases. The boundary is, in this order,
 
-1. the shape whose name, id, class or layer the option ``boundary`` gives, or that is called so. Lines of that
-   name are one if they enclose an area. Outlines around it are frames, and left out;
-2. the largest closed outline, together with what continues it, if it is the only shape, or if more than half
-   of the others lie in it. What continues it are the other parts of its geometry, as of one that is cut at
-   the antimeridian, and outlines next to it, edge to edge, in which other outlines lie;
-3. the outer edge of the walls, if they close and what they enclose is mostly open;
+1. the shape with the name, id, class or layer of the option ``boundary``, or "boundary". Lines of that name
+   are the boundary if they enclose an area. Outlines around it are frames, and left out;
+2. the largest closed outline, with its continuations, if it is the only shape, or if it contains more than
+   half of the others. Continuations are the other parts of its geometry, if this is cut at the antimeridian,
+   for example, and outlines next to it, edge to edge, that contain other outlines;
+3. the outer edge of the walls, if they enclose an area that is mostly open;
 4. a rectangle around everything, at the distance of the option ``around``.
 
-If the colors of a drawing are known, what is painted later covers what was painted before, and what was
-declared free is so. Pale fills with something darker painted on them are floors, and so are others of their
+If the colors of a drawing are known, a fill covers the shapes that were painted before it, and colors that
+the user declares free are free. Floors are pale fills with something darker painted on them, and others of their
 color or of the size of a room; pale fills in the color of the ground, without a stroke; and all pale fills
 on a dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free and
 solid in turns, from the outside in.
 
-In drawings whose outlines are free by default, 2 is: all outlines that do not lie in a larger one, if any
-does; then those that do are obstacles.
+In drawings whose outlines are free by default, 2 is different: if an outline is in a larger one, the boundary
+is all outlines that are in no other, and those that are in another one are obstacles.
 
-Where walls separate the free space from the boundary, it ends at the walls: see
-`robocov_app.formats.geometry.conversion.environment`.
+If walls separate the free space from the boundary, it ends at the walls: see
+`geometry.conversion.environment`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -263,7 +263,7 @@ def _describe(
     *,
     are_solid: bool,
 ) -> None:
-    """Report what the boundary is, and what the other shapes were taken for."""
+    """Report the boundary, and the meaning of the other shapes."""
     if boundary is not None and boundary.gaps:
         report.repaired.append(boundary.gaps)
     # Where the format defines the whole boundary, outlines need no note.

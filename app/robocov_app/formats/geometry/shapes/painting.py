@@ -47,7 +47,7 @@ def is_pale(color: Color | None) -> bool:
 
 
 def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
-    """Decide which filled shapes are floors by what is painted on them.
+    """Decide which filled shapes are floors, by the paint on them.
 
     Furniture and walls are not painted onto a pale obstacle. So a pale fill with something darker on it is a
     floor, and so are fills of its color, and pale fills of the size of a room: rooms often have different

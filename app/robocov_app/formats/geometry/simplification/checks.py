@@ -120,7 +120,7 @@ class SimplificationCheck:
         if not len(thin.areas):
             return wrong
         changes = self._measure_area_changes()
-        # A side counts once, whatever number of the part's vertices it stands for.
+        # A side counts once, also if it replaces several vertices of the part.
         pairs = np.unique(np.column_stack([thin.part, self.side[thin.vertex]]), axis=0)
         change = np.bincount(pairs[:, 0], changes[pairs[:, 1]], minlength=len(thin.areas))
         limit = MAX_OUTLINE_CHANGE * thin.areas + _THIN_AREA_SLACK * self.tolerance**2
@@ -132,7 +132,7 @@ class SimplificationCheck:
         return wrong & (self.allowed > 0.0)
 
     def _measure_area_changes(self) -> Array:
-        """Return by how much each side of the drawing changes the area of its ring, (m,) m².
+        """Return the change of the area of its ring by each side of the drawing, (m,) m².
 
         This is the signed area between the side and the run of the outline that it stands for. The sum over a
         ring is the difference of the areas of the rings.

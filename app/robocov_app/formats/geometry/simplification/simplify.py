@@ -1,9 +1,9 @@
-"""Simplification of a free space: fewer vertices, while everything that matters stays.
+"""Simplification of a free space: fewer vertices, with the same passages and sizes.
 
 Walls move by at most the tolerance. Afterwards it is checked that no outline meets another one or
 itself, that every obstacle and every part that is as thin as the tolerance keeps its size, and that a robot
-passes wherever it passed. Where a check fails, the tolerance is reduced around that place, and the import
-report mentions it.
+passes through the same passages as before. If a check fails, the tolerance is reduced around that position,
+and the import report mentions it.
 
 The outline of cells along a wall at an angle consists of stairs, which are replaced by the midpoints of their
 steps (see `stairs`). Then the algorithm of Douglas and Peucker drops the vertices that are within
@@ -70,7 +70,7 @@ def simplify_free_space(
     cell : float or None, m
         Side of the cells that the free space consists of, if it does.
     radius : float, m
-        Radius of a robot; it passes wherever it passed.
+        Radius of a robot, which passes through the same passages as before.
 
     Returns
     -------

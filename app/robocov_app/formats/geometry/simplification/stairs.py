@@ -45,7 +45,7 @@ def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> Ring
     is_loose = (tolerance >= _MIN_STAIRS_TOLERANCE * cell) & is_large[outline.ring]
     is_short = outline.lengths <= cell * (1 + 1e-6)
     is_step = is_short & (turn * turn[after] < 0) & is_loose & is_loose[after]
-    # Each vertex is followed by the midpoint of the side after it, of which one or none stays.
+    # Each vertex is followed by the midpoint of the side after it; at most one of both remains.
     is_kept = np.column_stack([~(is_step | is_step[outline.before]), is_step]).ravel()
     with_midpoints = np.stack([points, (points + points[after]) / 2], axis=1).reshape(-1, 2)
     source = np.column_stack([outline.source, outline.source + 0.5]).ravel()

@@ -1,6 +1,6 @@
 """Decoding PGM and PPM: https://netpbm.sourceforge.net/doc/pgm.html.
 
-Pillow is not used for them: it scales other largest values than 255 to it by rounding, which changes what the
+Pillow is not used for them: it scales other maximum values than 255 to it by rounding, which changes what the
 thresholds of ROS give, and takes half a second for a million pixels.
 """
 

@@ -68,7 +68,7 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Bri
     except PIL.Image.DecompressionBombError:
         millions = files.MAX_CELLS // 1_000_000
         raise MapError(f"{where}: expected at most {millions} million pixels, got more") from None
-    except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
+    except Exception as error:  # Pillow raises exceptions of any type for damaged chunks
         reason = to_one_line(error).partition(" <")[0][:100]
         raise MapError(f"{where}: expected a complete {name}, got a broken one: {reason}") from None
 

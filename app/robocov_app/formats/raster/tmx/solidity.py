@@ -31,5 +31,5 @@ def is_robot_name(name: str) -> bool:
 
 
 def _fold_name(name: str) -> str:
-    """Return the letters of a name in lower case, as "blocktile" for "Block_Tile 2"."""
+    """Return the alphabetic characters of a name in lower case, as "blocktile" for "Block_Tile 2"."""
     return re.sub(r"[\W\d_]", "", name.casefold())

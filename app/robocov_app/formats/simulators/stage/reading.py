@@ -1,8 +1,8 @@
 """Worlds of the simulator Stage: https://player-stage-manual.readthedocs.io/en/latest/WORLDFILES/.
 
 A world file is a tree of models with properties, of macros that others are based on, and of files that it
-includes. A model has the size of its property ``size``, whatever its bitmap or its blocks measure: the box
-around them is scaled to it.
+includes. A model has the size of its property ``size``, independent of that of its bitmap or its blocks: the
+box around them is scaled to it.
 
 R. Vaughan, Massively multi-robot simulation in Stage, Swarm Intelligence 2 (2008), 189-208.
 

@@ -53,7 +53,7 @@ def load_document(path: Path, where: str) -> Any:
         recover = import_optional("ezdxf.recover", "dxf")
     except RobocovError as error:
         raise MapError(f"{where}: {error}") from None
-    # ezdxf logs what it repairs, which would appear among the messages of a command.
+    # ezdxf logs its repairs, which would appear among the messages of a command.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
     def repair(path: Path) -> Any:

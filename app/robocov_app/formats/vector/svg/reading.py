@@ -140,7 +140,7 @@ class _DrawingReader:
             self._draw_element(child, state)
 
     def describe(self) -> list[str]:
-        """Return notes about what was simplified or ignored."""
+        """Return notes about simplified or ignored elements."""
         counts = {
             "dashed strokes taken as whole": self.shape_reader.dashed,
             "clip paths and masks not applied": self.clipped,
@@ -162,7 +162,7 @@ class _DrawingReader:
         require_shapes(counts[1], self.root.where)
 
     def find_target(self, element: Element) -> Element | None:
-        """Return what a ``use`` element uses, if it is in this file."""
+        """Return the element that a ``use`` element refers to, or None if it is not in this file."""
         if element.tag != "use":
             return None
         return self._elements_by_id.get(element.attributes.get("href", "").strip().removeprefix("#"))

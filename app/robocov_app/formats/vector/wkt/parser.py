@@ -81,7 +81,7 @@ class WktParser:
     where : str
         The file, for messages.
     shapes : Shapes
-        Counts what is left out or mended.
+        Counts geometries that are left out or mended.
 
     Attributes
     ----------
