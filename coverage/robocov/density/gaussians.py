@@ -285,8 +285,8 @@ def _is_positive_definite(matrix: Matrix) -> bool:
     """Return whether a matrix is symmetric, positive definite, and not nearly singular."""
     (a, b), (c, d) = matrix
     is_symmetric = b == c
-    is_finite = a + d < math.inf
-    has_positive_diagonal = a > 0.0 and d > 0.0
+    has_positive_diagonal = a > 0.0 and d > 0.0 and a + d < math.inf
+    if not (is_symmetric and has_positive_diagonal):
+        return False
     determinant = a * d - b * c
-    is_regular = determinant > _MIN_RELATIVE_DETERMINANT * a * d
-    return is_symmetric and is_finite and has_positive_diagonal and is_regular
+    return determinant > _MIN_RELATIVE_DETERMINANT * a * d

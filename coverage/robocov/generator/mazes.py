@@ -70,12 +70,12 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     """
     shape = _choose_grid_shape(request)
     walls = find_inner_walls(shape) & ~grow_passages(shape, rng)
-    min_count = (1.0 - _MAX_REMOVED_FRACTION) * walls.sum()
+    min_wall_count = (1.0 - _MAX_REMOVED_FRACTION) * walls.sum()
     opened_fraction = rng.uniform(_MIN_OPENED_FRACTION, _MAX_OPENED_FRACTION)
     for _ in range(round(walls.sum() * opened_fraction)):
         _remove_wall(walls, rng)
     max_area_error = _USED_AREA_TOLERANCE * request.width * request.height
-    while walls.any() and walls.sum() >= min_count:
+    while walls.any() and walls.sum() >= min_wall_count:
         trails = list(trace_trails(walls))
         thickness = _choose_thickness(request, shape, trails)
         if _compute_corridor_width(request, shape, thickness) < request.gap - _GAP_TOLERANCE_M:
@@ -83,6 +83,7 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
         obstacles = _build_walls(request, shape, trails, thickness)
         area_error = abs(_compute_union_area(obstacles) - request.blocked_area)
         if _clear_disc(request, shape, walls, thickness, corner_disc):
+            # With fewer walls, their thickness is chosen again.
             continue
         if area_error <= max_area_error:
             return [*obstacles]
@@ -252,7 +253,7 @@ def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
     np.add.at(wall_counts, starts, 1)
     np.add.at(wall_counts, ends, 1)
     is_attached = wall_counts > 1
-    # Posts on the boundary.
+    # Walls that end at the boundary are attached to it.
     is_attached[[0, -1]] = True
     is_attached[:, [0, -1]] = True
     is_candidate = is_attached[starts] & is_attached[ends]

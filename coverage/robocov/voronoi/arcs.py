@@ -154,9 +154,9 @@ def _split_piece(piece: list[float], max_deviation: float) -> Array:
 def _count_chords(length: float, half_angle: float, max_deviation: float) -> int:
     """Return the number of chords that replace an arc whose ends are `length` meters apart."""
     radius = 0.5 * length / max(abs(np.sin(half_angle)), _MIN_LENGTH_M)
+    # A chord of half angle x deviates from its arc by r (1 - cos x), which is at most r x² / 2.
     if radius * half_angle**2 < 2.0 * max_deviation:
         return 1
-    # A chord of half angle x deviates from its arc by r (1 - cos x), which is at most r x² / 2.
     ratio = min(max_deviation / max(radius, _MIN_LENGTH_M), 0.5)
     max_half_angle = np.sqrt(2.0 * ratio)
     return int(np.ceil(abs(half_angle) / max(max_half_angle, _MIN_CHORD_HALF_ANGLE)))
