@@ -1,4 +1,4 @@
-"""Files: strict reading, and writing that is complete or does not happen.
+"""Files: strict reading, and atomic writing.
 
 - `strictjson`: JSON and TOML, with the line and the column of each mistake
 - `array_files`: arrays in .npz files, and a cache of them

@@ -144,7 +144,7 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, smallest: Ar
             for b in range(a + 1, len(radius)):
                 j = order[t, b]
                 min_gap = positions[t, j, 0] - positions[t, i, 0] - max_diameter
-                # Robots further along x are not closer; the comparison is false for nan.
+                # Robots farther along x are not closer; the comparison is false for nan.
                 if not min_gap <= max(smallest[t], MAX_CONTACT_GAP_M):
                     break
                 radii = radius[i] + radius[j]

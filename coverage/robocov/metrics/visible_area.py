@@ -135,13 +135,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
     walls.can_hide[:] = True
     index = AngularWallIndex.allocate(1, _BINS, _INITIAL_ENTRIES_PER_BIN * _BINS)
     for position in grid.snap(positions):
-        while True:
-            x, y = position
-            entries = add_walls(walls, index, 0, x, y, np.inf, 0)
-            if entries >= 0:
-                break
-            # The index is full.
-            index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_wall))
+        index, entries = _index_walls(walls, index, position)
         sectors = _find_sectors(walls, index, entries, position)
         walls_from_robot = walls.ends[sectors.wall] - np.tile(position, 2)
         first_corners = _intersect(walls_from_robot, sectors.start)
@@ -150,6 +144,16 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
         view = shapely.Polygon(grid.to_meters(position + corners))
         # The polygon may touch itself where corners are in line with the robot.
         yield view if shapely.is_valid(view) else shapely.make_valid(view)
+
+
+def _index_walls(walls: Walls, index: AngularWallIndex, position: Array) -> tuple[AngularWallIndex, int]:
+    """Index the walls around a position; return the index, enlarged if needed, and its number of entries."""
+    x, y = position
+    entries = add_walls(walls, index, 0, x, y, np.inf, 0)
+    while entries < 0:
+        index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_wall))
+        entries = add_walls(walls, index, 0, x, y, np.inf, 0)
+    return index, entries
 
 
 def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position: Array) -> _Sectors:

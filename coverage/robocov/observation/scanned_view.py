@@ -81,7 +81,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
 
     Seen at a low angle, a wall also becomes deeper from ray to ray. Along a straight wall, 1/distance is a
     sinusoid of the angle, so two rays predict where the next one meets the wall. Only a ray that goes
-    further than predicted is a window.
+    farther than predicted is a window.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Collects the steps of a simulation into a record."""
+"""The recorder, which collects the steps of a simulation into a record."""
 
 from __future__ import annotations
 
