@@ -137,16 +137,16 @@ def _count_crossings(is_in_graph: BoolArray, row: int, column: int, neighbor_ste
     """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it."""
     crossings = 0
     for k in range(0, 8, 2):
-        has_side = _is_in_graph(is_in_graph, row, column, neighbor_steps[k])
-        has_corner = _is_in_graph(is_in_graph, row, column, neighbor_steps[(k + 1) % 8])
-        has_next_side = _is_in_graph(is_in_graph, row, column, neighbor_steps[(k + 2) % 8])
+        has_side = _is_neighbor_in_graph(is_in_graph, row, column, neighbor_steps[k])
+        has_corner = _is_neighbor_in_graph(is_in_graph, row, column, neighbor_steps[(k + 1) % 8])
+        has_next_side = _is_neighbor_in_graph(is_in_graph, row, column, neighbor_steps[(k + 2) % 8])
         if not has_side and (has_corner or has_next_side):
             crossings += 1
     return crossings
 
 
 @kernel
-def _is_in_graph(is_in_graph: BoolArray, row: int, column: int, step: IntArray) -> bool:
+def _is_neighbor_in_graph(is_in_graph: BoolArray, row: int, column: int, step: IntArray) -> bool:
     """Return whether the cell one step away belongs to the graph."""
     return bool(is_in_graph[row + step[_UP], column + step[_RIGHT]])
 
