@@ -633,15 +633,15 @@ def _list_others(teammates: Teammates, position: Array, time: float, *, is_agree
     """Return the other robots, first those that a robot at `position`, (2,) m, plans for."""
     is_fixed = (time - teammates.rest_times >= MIN_REST_S) | (teammates.heard_times < time)
     is_quiet = bool(is_fixed.all())
-    is_not_planned_for = np.full(len(teammates.robots), not is_agreed)
+    is_outside_group = np.full(len(teammates.robots), not is_agreed)
     squared_distances = ((teammates.positions - position) ** 2).sum(axis=1)
     nearest = np.argsort(squared_distances, kind="stable")[: MAX_PLANNING_GROUP - 1]
-    is_not_planned_for[nearest] = False
-    order = np.argsort(is_not_planned_for, kind="stable")
+    is_outside_group[nearest] = False
+    order = np.argsort(is_outside_group, kind="stable")
     return _Others(
         robots=teammates.robots[order],
         positions=teammates.positions[order],
-        is_fixed=(is_fixed | is_not_planned_for)[order],
+        is_fixed=(is_fixed | is_outside_group)[order],
         is_quiet=is_quiet,
     )
 

@@ -215,10 +215,10 @@ def _update_tracks(
         Assumed maximum speed of others.
     """
     tracks = Tracks(
-        previous.sent_times.copy(),
-        previous.counts.copy(),
-        previous.positions.copy(),
-        previous.velocities.copy(),
+        sent_times=previous.sent_times.copy(),
+        counts=previous.counts.copy(),
+        positions=previous.positions.copy(),
+        velocities=previous.velocities.copy(),
     )
     is_heard = np.zeros(tracks.sent_times.shape, np.bool_)
     for m in range(len(messages.receiver)):

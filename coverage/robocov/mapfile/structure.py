@@ -98,29 +98,34 @@ def validate_document(document: object, where: str) -> MapModel:
 def _build_mistake(detail: ErrorDetails) -> Mistake:
     """Return the mistake for an error of pydantic."""
     path = list(detail["loc"])
-    value = detail["input"]
     key = str(path[0])
     if key == "starts" and path[2:] == ["[key]"]:
-        text = f"starts: name: {describe_mismatch(LABEL_EXPECTED, value)}"
+        text = f"starts: name: {describe_mismatch(LABEL_EXPECTED, detail['input'])}"
         return Mistake(tuple(path[:-1]), text, at_key=True)
-    model: type[Model] = MapModel
     kinds = MODELS_BY_KIND.get(key, {})
     # Length of the path of an object with a kind: of the density itself, or of an item of a list.
     object_length = 1 if key == "density" else 2
-    if kinds and len(path) == object_length:
-        return _build_kind_mistake(tuple(path), value, list(kinds))
-    if kinds and len(path) > object_length:
-        # The path of pydantic contains the kind after the object; the path in the file does not.
-        model = kinds[str(path[object_length])]
-        path = path[:object_length] + path[object_length + 1 :]
+    if not kinds or len(path) < object_length:
+        return _build_member_mistake(path, detail, MapModel)
+    if len(path) == object_length:
+        return _build_kind_mistake(tuple(path), detail["input"], list(kinds))
+    # The path of pydantic contains the kind after the object; the path in the file does not.
+    model = kinds[str(path[object_length])]
+    path = path[:object_length] + path[object_length + 1 :]
+    if len(path) > object_length + 1:
+        # The mistake is in a part of the object, such as a peak of a density.
+        model = PARTS.get(str(path[object_length]), model)
+    return _build_member_mistake(path, detail, model)
+
+
+def _build_member_mistake(path: list[int | str], detail: ErrorDetails, model: type[Model]) -> Mistake:
+    """Return the mistake in a member of an object with a model, by its path in the file."""
     if detail["type"] == "extra_forbidden":
-        if kinds and len(path) > object_length + 1:
-            model = PARTS.get(str(path[object_length]), model)
         return _build_unknown_key_mistake(path, model)
     last_key = max(k for k, step in enumerate(path) if isinstance(step, str))
     nesting_depth = len(path) - 1 - last_key
     expected = _EXPECTED[str(path[last_key])][nesting_depth]
-    message = describe_mismatch(expected, value, is_missing=detail["type"] == "missing")
+    message = describe_mismatch(expected, detail["input"], is_missing=detail["type"] == "missing")
     return Mistake.at_path(tuple(path), message)
 
 

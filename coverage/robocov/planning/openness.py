@@ -98,11 +98,11 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
     block_rows = _count_blocks(rows, block_side)
     block_columns = _count_blocks(columns, block_side)
     blocks = _BlockGrid(
-        np.zeros((block_rows, block_columns)),
-        np.zeros((block_rows, block_columns)),
-        np.zeros((block_rows, block_columns)),
-        np.zeros((block_rows + 1, block_columns + 1)),
-        np.zeros((block_rows + 1, block_columns + 1)),
+        unknown_counts=np.zeros((block_rows, block_columns)),
+        free_side_counts=np.zeros((block_rows, block_columns)),
+        wall_side_counts=np.zeros((block_rows, block_columns)),
+        link_counts_up=np.zeros((block_rows + 1, block_columns + 1)),
+        link_counts_right=np.zeros((block_rows + 1, block_columns + 1)),
     )
     for row in range(rows):
         i = row // block_side

@@ -179,10 +179,10 @@ def compute_drive_command(
         # The wheels grip, so that no sideways velocity remains.
         motion = _Motion(max(vx * hx + vy * hy, 0.0), steering[i, 1])
         limits = _WheelLimits(
-            0.5 * wheels.track_width[i],
-            response.max_speed[i],
-            response.max_velocity_change[i],
-            wheels.max_turning_rate[i],
+            half_track=0.5 * wheels.track_width[i],
+            max_speed=response.max_speed[i],
+            max_change=response.max_velocity_change[i],
+            max_turning_rate=wheels.max_turning_rate[i],
         )
 
         # The change of velocity of a point robot, along the heading and across it.
@@ -207,7 +207,11 @@ def compute_drive_command(
         new_forces[i, 0] = (motion.speed * math.cos(new_steering[i, 0]) - vx) * force_per_velocity
         new_forces[i, 1] = (motion.speed * math.sin(new_steering[i, 0]) - vy) * force_per_velocity
     new_response = MotionResponse(
-        velocity_loss, velocity_per_force, response.force_per_velocity, max_velocity_change, max_speed
+        velocity_loss=velocity_loss,
+        velocity_per_force=velocity_per_force,
+        force_per_velocity=response.force_per_velocity,
+        max_velocity_change=max_velocity_change,
+        max_speed=max_speed,
     )
     return DriveCommand(new_forces, new_steering, new_response)
 
