@@ -31,8 +31,9 @@ from robocov_app.figures.files import figure_png
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.render.density import mean_label
-from robocov_app.render.distance_field import Field, FieldLattice
+from robocov_app.render.density_text import get_cost_name
+from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.field_lattice import FieldLattice
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import PictureFrame, draw_map
 from robocov_app.report.replay import build_replay_html, read_asset
@@ -247,12 +248,12 @@ def plot_result(
     team = Team.homogeneous(robots)
     if radius is not None:
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (robots,)))
-    facts = f"{format_count(robots, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
+    facts = f"{format_count(robots, 'robot')}, {get_cost_name(environment)} {result.mean_distance:.3f} m"
     if sites.lattice < MIN_FIGURE_LATTICE:
         finer_cost = build_cost(environment, MIN_FIGURE_LATTICE, quiet=True)
         sites = finer_cost.sites
         result = finer_cost(result.positions)
-    field = Field(FieldLattice(sites), result)
+    field = DistanceField(FieldLattice(sites), result)
     moment = Moment(environment, team, field, environment.name, facts)
     if axes is None:
         return plot_coverage([], [moment], theme, size, "Coverage cost").axes[-1]

@@ -14,7 +14,7 @@ import numpy as np
 
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.display import open_display
 from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.costs import Costs
@@ -38,7 +38,7 @@ def main(minutes: int, robots: int) -> None:
     """Use the window for so long, and tell how its memory grows."""
     rng = np.random.default_rng(0)
     session = Session(SessionScenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, "uniform"))
-    layers = {layer.name for layer in standard_layers() if layer.default}
+    layers = {layer.name for layer in build_standard_layers() if layer.is_default}
     with tempfile.TemporaryDirectory() as folder, open_display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
         viewer = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")

@@ -4,7 +4,8 @@ import numpy as np
 import shapely
 
 from robocov_app.look.theme import LIGHT
-from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.render.painter import Painter
 
 SIZE = (480, 360)
 ONE = np.array([[4.0, 4.0]])
@@ -13,7 +14,7 @@ TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
 
 def layer_named(name, layers=None):
     """Return a layer by its name."""
-    return next(layer for layer in layers or standard_layers() if layer.name == name)
+    return next(layer for layer in layers or build_standard_layers() if layer.name == name)
 
 
 def drawn(scene, *names, size=SIZE, theme=LIGHT, layers=None):

@@ -12,7 +12,7 @@ import pygame
 from sample_sessions import HALL, RAPF, start_session
 
 from robocov.environment import Environment
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.command import CommandTable
 from robocov_app.toolkit.display import open_display
 from robocov_app.toolkit.input import split_key_name
@@ -63,7 +63,7 @@ def open_viewer(
     with open_display(headless=True):
         session = start_session(*(controllers or (RAPF,)), robots=robots, environment=environment, **changes)
         if shown is None:
-            shown = {layer.name for layer in standard_layers() if layer.default}
+            shown = {layer.name for layer in build_standard_layers() if layer.default}
         viewer = Presenter(session, Costs(lattice, direct=True), shown, folder, map_name)
         driver = Driver(ViewerWindow(viewer, size, scale, is_unattended=True))
         driver.settle()
@@ -85,7 +85,7 @@ def build_key_event(name: str) -> dict[str, Any]:
 
 def build_command_table(viewer: Presenter) -> CommandTable:
     """Build the table of the commands that need no window."""
-    titles = {layer.name: layer.title for layer in standard_layers()}
+    titles = {layer.name: layer.title for layer in build_standard_layers()}
     commands = list_viewer_commands(viewer, titles)
     return CommandTable(commands, viewer.attempt, lambda: list_parameter_commands(viewer))
 

@@ -14,7 +14,7 @@ from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.environment import Environment
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
-from robocov_app.render.density import density_kind, density_lines
+from robocov_app.render.density_text import get_density_kind, list_density_lines
 from robocov_app.report.embedding import embed_map
 from robocov_app.report.pictures import build_density_image
 
@@ -37,15 +37,15 @@ def told(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def test_the_line() -> None:
-    assert list(density_lines(PLAIN)) == list(density_lines(PLAIN.with_density(Uniform(2.0)))) == []
-    assert list(density_lines(HEAVY)) == ["weighed by φ    gaussians, 0.5 to 4.5"]
-    assert density_kind(PLAIN) is None and density_kind(HEAVY) == "gaussians"
+    assert list(list_density_lines(PLAIN)) == list(list_density_lines(PLAIN.with_density(Uniform(2.0)))) == []
+    assert list_density_lines(HEAVY) == ["weighted by φ   gaussians, 0.5 to 4.5"]
+    assert get_density_kind(PLAIN) is None and get_density_kind(HEAVY) == "gaussians"
 
 
 def test_cost(maps, capsys) -> None:
     plain, heavy, robots = maps
     assert "φ" not in told(capsys, "cost", plain, "--positions", robots)
-    assert "weighed by φ    gaussians, 0.5 to 4.5" in told(capsys, "cost", heavy, "--positions", robots)
+    assert "weighted by φ   gaussians, 0.5 to 4.5" in told(capsys, "cost", heavy, "--positions", robots)
     answer = json.loads(told(capsys, "cost", heavy, "--positions", robots, "--json"))
     result = CoverageCost(HEAVY)([[1.0, 1.0], [4.0, 4.5]])
     assert answer["mean_distance_m"] == pytest.approx(result.mean_distance)
@@ -73,7 +73,7 @@ def test_a_run_keeps_the_density_and_says_so(maps, capsys, tmp_path) -> None:
     said = told(
         capsys, "run", heavy, "--robots", "3", "--duration", "1", "--lattice", "16", "--out", str(out)
     )
-    assert "weighed by φ    gaussians, 0.5 to 4.5" in said
+    assert "weighted by φ   gaussians, 0.5 to 4.5" in said
     run = json.loads((out / "run.json").read_text())
     assert run["map"]["density"]["kind"] == "gaussians"
     from robocov.record import Record
@@ -86,7 +86,7 @@ def test_a_run_keeps_the_density_and_says_so(maps, capsys, tmp_path) -> None:
 def test_the_optimum_by_another_density_is_another(maps, capsys) -> None:
     plain, heavy, _ = maps
     words = ("--robots", "2", "--restarts", "2", "--lattice", "16")
-    assert "weighed by φ" in told(capsys, "optimum", heavy, *words)
+    assert "weighted by φ" in told(capsys, "optimum", heavy, *words)
     first = json.loads(told(capsys, "optimum", heavy, *words, "--json"))
     second = json.loads(told(capsys, "optimum", plain, *words, "--json"))
     assert first["density"] == "gaussians" and second["density"] is None

@@ -6,7 +6,7 @@ import pygame
 from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import render_text
-from robocov_app.render.picture import Painter
+from robocov_app.render.painter import Painter
 
 
 def places(frame, words, size, theme, color):

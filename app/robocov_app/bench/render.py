@@ -14,7 +14,7 @@ from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov_app.bench.measure import Call, Case, Row, measure_in_alternation
-from robocov_app.render.picture import Painter
+from robocov_app.render.painter import Painter
 from robocov_app.render.record_scene import build_record_scene
 from robocov_app.runs.encoding import encode_png, save_video
 from robocov_app.runs.frames import draw_frames

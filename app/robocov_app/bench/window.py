@@ -13,7 +13,7 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Row, measure_in_alternation
 from robocov_app.bench.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.display import collect_garbage_rarely, open_display
 from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.costs import Costs
@@ -58,7 +58,7 @@ def list_cases(*, quick: bool = False) -> list[Case]:
 def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
     session = _build_session(robots)
     with open_display(headless=True):
-        layers = {layer.name for layer in standard_layers() if layer.default}
+        layers = {layer.name for layer in build_standard_layers() if layer.is_default}
         presenter = Presenter(session, Costs(DEFAULT_LATTICE), layers, Path(), "rooms")
         window = ViewerWindow(presenter, SIZE_PX, 1.0)
         try:

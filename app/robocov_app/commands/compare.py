@@ -46,7 +46,7 @@ def command(options: Arguments) -> int:
     """Run `robocov compare`, and return its exit status."""
     from robocov.mapfile import load_map
     from robocov_app.commands.gain_options import select_gains
-    from robocov_app.render.density import density_lines
+    from robocov_app.render.density_text import list_density_lines
     from robocov_app.runs.artifacts import build_comparison_rows, execute_comparison
     from robocov_app.runs.saved_runs import name_folders
 
@@ -69,7 +69,7 @@ def command(options: Arguments) -> int:
     ending = "Interrupted. Partial results are in" if is_interrupted else "saved in"
     saved = f"{ending} {out}/: {list_files(out)}{options.describe_record()}"
     answer = {"out": str(out), "interrupted": is_interrupted, "runs": rows}
-    print_answer(options, answer, *density_lines(environment), *notes, saved)
+    print_answer(options, answer, *list_density_lines(environment), *notes, saved)
     return INTERRUPTED if is_interrupted else 0
 
 

@@ -15,7 +15,7 @@ from robocov.errors import InputError, ParameterError, describe_error, is_number
 from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import load_map
 from robocov_app.commands.options import FigureOptions
-from robocov_app.render.density import density_kind, density_lines, mean_label
+from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_distance_figure
 from robocov_app.terminal.output import print_answer
 
@@ -62,7 +62,7 @@ def command(options: Arguments) -> None:
     if options.sites is not None:
         _save_sites(options.sites, cost, result, timed_result)
     if options.plot is not None:
-        text = f"{mean_label(environment)} {result.mean_distance:.3f} m"
+        text = f"{get_cost_name(environment)} {result.mean_distance:.3f} m"
         if timed_result is not None:
             text = f"mean time {timed_result.mean_time:.3f} s"
         save_distance_figure(
@@ -106,7 +106,7 @@ def _build_answer(
     answer["uncovered_area_m2"] = result.uncovered_area
     answer["robots"] = len(result.positions)
     answer["sites"] = len(cost.points)
-    answer["density"] = density_kind(environment)
+    answer["density"] = get_density_kind(environment)
     return answer
 
 
@@ -120,7 +120,7 @@ def _describe_result(
     lines += [
         f"coverage cost   {result.value:.3f} m³",
         f"uncovered area  {result.uncovered_area:.3f} m²",
-        *density_lines(environment),
+        *list_density_lines(environment),
         f"on {len(cost.points)} sites, {len(result.positions)} robots",
     ]
     return lines

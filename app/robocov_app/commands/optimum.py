@@ -21,7 +21,7 @@ from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, Optimum, find_optimum
 from robocov_app.commands.options import FigureOptions
-from robocov_app.render.density import density_kind, density_lines, mean_label
+from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
 from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost, save_distance_figure
 from robocov_app.runs.saved_runs import SavedRun, load_saved_runs
 from robocov_app.terminal.output import check_output_file, print_answer
@@ -198,7 +198,7 @@ def _save_figure(options: Arguments, path: Path, problem: _Problem, best: Optimu
         path,
         build_cost(environment, MIN_FIGURE_LATTICE, quiet=True),
         best.positions,
-        f"{mean_label(environment)} {best.mean_distance:.3f} m",
+        f"{get_cost_name(environment)} {best.mean_distance:.3f} m",
         title="Best positions found",
         theme=options.theme,
         radius=problem.radius,
@@ -216,7 +216,7 @@ def _build_answer(
         "mean_distance_m": best.mean_distance,
         "cost_m3": best.value,
         "uncovered_area_m2": best.uncovered_area,
-        "density": density_kind(problem.environment),
+        "density": get_density_kind(problem.environment),
         "robots": problem.robots,
         "positions_m": best.positions.tolist(),
         "restarts": len(best.costs),
@@ -236,7 +236,7 @@ def _describe_best(environment: Environment, best: Optimum, bound: LowerBound | 
         f"mean distance   {best.mean_distance:.4f} m",
         f"coverage cost   {best.value:.3f} m³",
         f"uncovered area  {best.uncovered_area:.3f} m²",
-        *density_lines(environment),
+        *list_density_lines(environment),
     ]
     if bound is not None:
         lines.append(

@@ -81,9 +81,9 @@ class LayerOptions:
         ParameterError
             If there is no layer of a name.
         """
-        from robocov_app.render.picture import checked_layers
+        from robocov_app.render.layer_catalog import check_layer_names
 
-        return checked_layers("--show", self.show), checked_layers("--hide", self.hide)
+        return check_layer_names("--show", self.show), check_layer_names("--hide", self.hide)
 
 
 @dataclass(kw_only=True)

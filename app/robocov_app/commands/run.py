@@ -69,7 +69,7 @@ def command(options: Arguments) -> int:
 
 def _describe_run(run: Run) -> list[str]:
     """Return the results of a run as lines of text."""
-    from robocov_app.render.density import density_lines
+    from robocov_app.render.density_text import list_density_lines
 
     record = run.record
     history = run.history
@@ -86,7 +86,7 @@ def _describe_run(run: Run) -> list[str]:
             f"  mean time       {summary['mean_time_s']:.3f} s   (at the start {history.mean_time[0]:.3f} s)"
         )
     lines.append(f"  coverage cost   {summary['cost_m3']:.2f} m³")
-    lines += [f"  {line}" for line in density_lines(record.environment)]
+    lines += [f"  {line}" for line in list_density_lines(record.environment)]
     if summary["uncovered_area_m2"] > 0:
         lines.append(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
     lines += [

@@ -23,8 +23,9 @@ from robocov_app.look.axes import TICK_FACTORS
 from robocov_app.look.colors import Color, choose_text_color, mix
 from robocov_app.look.robot_colors import ColorScheme, choose_robot_hues, choose_trail_colors
 from robocov_app.look.theme import Theme
-from robocov_app.render.density import density_label, shading
-from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
+from robocov_app.render.crowding import choose_width_factor, fit_mark_size, fit_radii
+from robocov_app.render.density_shading import shade_density
+from robocov_app.render.density_text import describe_density
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.render.scene import are_centroids
 
@@ -119,7 +120,7 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
         interpolation="bilinear",
         zorder=1.5,
     )
-    image.set_data(shading(environment, _DENSITY_DOTS, theme))
+    image.set_data(shade_density(environment, _DENSITY_DOTS, theme))
     axes.add_image(image)
     image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
 
@@ -212,7 +213,7 @@ def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> N
     collection = LineCollection(
         trajectories,
         colors=[tone(color) for color in colors],
-        linewidths=1.6 * line_crowding(robots),
+        linewidths=1.6 * choose_width_factor(robots),
         capstyle="round",
         joinstyle="round",
         zorder=4,
@@ -225,7 +226,7 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     present = np.flatnonzero(record.present[-1])
     first_rows = np.argmax(record.present, axis=0)[present]
     starts = record.positions[first_rows, present]
-    size = mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
+    size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
     axes.plot(*starts.T, zorder=5, **_build_start_style(theme, size))
 
 
@@ -285,7 +286,7 @@ def _draw_goals(
         goals = centroids
     goal_points = _to_points(axes, goals)
     distances = np.hypot(*(goal_points - _to_points(axes, record.positions[-1][working])).T)
-    size = mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
+    size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
     # At a goal that is reached, only the ends of the cross would stick out from under the disc.
     is_away = distances > np.array([radii[robot] for robot in working.tolist()])
     axes.plot(*goals[is_away].T, zorder=6, **_build_goal_style(is_centroid, theme, size))
@@ -320,9 +321,7 @@ def draw_robots(
     ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
     points_per_meter = float(ends[1, 0] - ends[0, 0])
     true_radii = radius * points_per_meter
-    radii: list[float] = fitted_radii(
-        _to_points(axes, positions), true_radii, _MIN_DISC_PT, _DISC_PT
-    ).tolist()
+    radii: list[float] = fit_radii(_to_points(axes, positions), true_radii, _MIN_DISC_PT, _DISC_PT).tolist()
     axes.scatter(
         positions[:, 0],
         positions[:, 1],
@@ -421,7 +420,7 @@ def build_map_handles(environment: Environment, theme: Theme, *, has_density: bo
             **_build_path_style(theme),
         )
         handles.append(square)
-    density = density_label(environment) if has_density else ""
+    density = describe_density(environment) if has_density else ""
     if density:
         color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
         handles.append(Patch(facecolor=tone(color), linewidth=0.0, label=density))

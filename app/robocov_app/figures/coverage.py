@@ -22,8 +22,15 @@ from robocov_app.figures.page import SMALL, TEXT, Box, Page, check_some, tone
 from robocov_app.figures.runs import plot_cost
 from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
-from robocov_app.render.density import cost_label, density_label, mean_label
-from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
+from robocov_app.render.density_text import describe_density, format_cost, get_cost_name
+from robocov_app.render.distance_colors import (
+    build_palette,
+    choose_color_limit,
+    compute_color_levels,
+    compute_line_opacities,
+    list_color_ticks,
+)
+from robocov_app.render.distance_field import DistanceField
 
 DOTS_PER_PIXEL = 2
 """Dots of the image of a map for each pixel of the page."""
@@ -64,7 +71,7 @@ class Moment:
 
     environment: Environment
     team: Team
-    field: Field
+    field: DistanceField
     title: str = ""
     facts: str = ""
     numbers: tuple[int, ...] | None = None
@@ -74,7 +81,7 @@ class Moment:
     def last_of(
         cls,
         record: Record,
-        field: Field,
+        field: DistanceField,
         mean_distance: float,
         counted: IntArray | None = None,
         mean_time: float | None = None,
@@ -95,7 +102,7 @@ class Moment:
         -------
         Moment
         """
-        cost = cost_label(mean_label(record.environment), mean_distance, mean_time)
+        cost = format_cost(get_cost_name(record.environment), mean_distance, mean_time)
         # Three maps side by side leave little space.
         cost = cost.replace(", mean time", ", time")
         time = float(record.time[-1])
@@ -207,7 +214,7 @@ def plot_coverage(
     title_end = page.size[0] if is_below else bar_left
     page.title(title, 26, title_end - 2 * page.margin)
     if curves:
-        has_density = any(density_label(moment.environment) for moment in moments)
+        has_density = any(describe_density(moment.environment) for moment in moments)
         _draw_curves(page, curves, times, arrangement.curves, WEIGHED if has_density else DISTANCE)
     boxes = _draw_maps(page, moments, extent, limit, arrangement.maps)
     page.footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
@@ -299,15 +306,15 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
     heat = theme.build_heat_table(256)[:, None]
     bar.imshow(heat, origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit))
-    bar.set(xticks=[], yticks=ticks(limit), ylabel=f"{_BAR_LABEL} (m)")
+    bar.set(xticks=[], yticks=list_color_ticks(limit), ylabel=f"{_BAR_LABEL} (m)")
     bar.yaxis.tick_right()
     bar.yaxis.set_label_position("right")
 
 
 def _choose_limit(moments: Sequence[Moment]) -> float:
     """Return the end of the scale of colors, m."""
-    finite = [moment.field.largest for moment in moments if np.isfinite(moment.field.largest)]
-    return round_limit(max(finite, default=1.0))
+    finite = [moment.field.max_distance for moment in moments if np.isfinite(moment.field.max_distance)]
+    return choose_color_limit(max(finite, default=1.0))
 
 
 def _build_handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
@@ -430,14 +437,14 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
 
 
 def _paint_distances(
-    field: Field, x: Array, y: Array, limit: float, theme: Theme, zoom: float, scale: float
+    field: DistanceField, x: Array, y: Array, limit: float, theme: Theme, zoom: float, scale: float
 ) -> NDArray[np.uint8]:
     """Return the colors of distances and of borders at (w,) x and (h,) y, m, as (h, w, 3)."""
-    pixels = palette(theme)[levels(field, x, y, limit, DOTS_PER_PIXEL * 9)]
+    pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * 9)]
     width = DOTS_PER_PIXEL * _BORDER_WIDTH * scale
-    borders = field.borders(x, y, width / zoom)
-    opacity = strength(borders, zoom, width)[:, None]
-    border_pixels = (borders.row, borders.column)
+    borders = field.compute_borders(x, y, width / zoom)
+    opacity = compute_line_opacities(borders, zoom, width)[:, None]
+    border_pixels = (borders.rows, borders.columns)
     border_color = np.array(theme.geodesic_border)
     pixels[border_pixels] = np.rint((1.0 - opacity) * pixels[border_pixels] + opacity * border_color)
     return pixels
@@ -470,7 +477,7 @@ def _draw_bar(page: Page, limit: float, maps: Box, middle: float, min_left: floa
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for spine in axes.spines.values():
         spine.set(edgecolor=tone(theme.faint), linewidth=0.6)
-    marks = ticks(limit)
+    marks = list_color_ticks(limit)
     labels = [f"{mark:g}" for mark in marks]
     labels[-1] += " m"
     axes.set_xticks(marks, labels, fontsize=SMALL)

@@ -21,8 +21,8 @@ from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, check_some
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme, get_theme
-from robocov_app.render.density import cost_label, mean_label
-from robocov_app.render.layout import columns_for
+from robocov_app.render.density_text import format_cost, get_cost_name
+from robocov_app.render.panel_grid import choose_column_count
 
 MAX_MAPS = 60
 """Maximum number of maps on a sheet. More would be too small to be seen."""
@@ -254,7 +254,7 @@ def _build_captions(
 def _choose_columns(page: Page, captions: _Captions, aspect: float, top: float) -> int:
     """Return how many panels are side by side: as large as possible, with space for their captions."""
     space = (page.size[0], page.size[1] - 2 * top)
-    best = columns_for(len(captions.names), aspect, space, _TWO_LINE_CAPTION * page.scale)
+    best = choose_column_count(len(captions.names), aspect, space, row_margin=_TWO_LINE_CAPTION * page.scale)
     fitting = (page.size[0] - page.margin) / (captions.max_width + page.margin)
     return max(min(best, int(fitting)), 1)
 
@@ -386,7 +386,7 @@ def _format_cost(record: Record, mean_distance: float | None, mean_time: float |
     """Return the cost of the final positions as text; empty if it is not known."""
     if mean_distance is None:
         return ""
-    return cost_label(mean_label(record.environment), mean_distance, mean_time)
+    return format_cost(get_cost_name(record.environment), mean_distance, mean_time)
 
 
 def _format_time(record: Record) -> str:
@@ -423,7 +423,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     scale = page.scale
     above = 26 * scale
     top = (46 if title else 8) * scale
-    columns = columns_for(len(drawn), aspect, (1600, 1200), above)
+    columns = choose_column_count(len(drawn), aspect, (1600, 1200), row_margin=above)
     slot = (_SHEET_WIDTH_PX - page.margin) / columns - page.margin
     rows = -(-len(drawn) // columns)
     panels_height = rows * (above + slot * map_height / map_width + _PANEL_GAP * scale)

@@ -17,7 +17,7 @@ from robocov_app.learning.maps import SEED_LIMIT, MapSampler, build_map
 from robocov_app.learning.task import CoverageTask, change_task
 
 if TYPE_CHECKING:
-    from robocov_app.render.picture import Painter
+    from robocov_app.render.painter import Painter
     from robocov_app.render.scene import Scene
     from robocov_app.runs.encoding import Frame
 
@@ -210,7 +210,7 @@ class EpisodeEnv:
 
     def _get_painter(self, episode: Episode) -> Painter:
         from robocov_app.look.theme import get_theme
-        from robocov_app.render.picture import Painter
+        from robocov_app.render.painter import Painter
 
         if self._painter is None or self._painter.environment is not episode.environment:
             self._painter = Painter(episode.environment, self._size, get_theme(self._theme))

@@ -1,150 +1,146 @@
-"""Annotations around the arena: scale bar, status line and legend, each in a strip of its own."""
+"""Annotations around the arena: scale bar, caption and status line."""
 
-from collections.abc import Iterable, Sequence, Set
-from dataclasses import replace
-
-import numpy as np
-import pygame
-from numpy.typing import NDArray
+from collections.abc import Set
 
 from robocov_app.look.lengths import format_scale_length, round_down
-from robocov_app.look.robot_colors import choose_robot_hues
-from robocov_app.look.theme import Theme
-from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import measure_text, shorten_to_width
+from robocov_app.render.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, TOP_PX
 from robocov_app.render.scene import Scene
-from robocov_app.render.surface_cache import LatestValue
 
-MARGIN = 14.0
-EDGE = MARGIN + 2.0
-LEGEND_ROW = 22.0
-STRIP = 34.0
-_SMALL = 240.0
-_GLYPH = 28.0
-_GAP = 18.0  # pixels at scale 1
+# Lengths in pixels at scale 1.
+EDGE_PX = MARGIN_PX + 2.0
+"""Space at the sides of texts."""
+STRIP_HEIGHT_PX = 34.0
+"""Height of the strip below the arena."""
+_MAX_LOW_PANE_PX = 240.0
+_MIN_BAR_PX = 30.0
+"""Minimum space for the scale bar, px of the surface."""
+_MAX_BAR_PX = 160
+_BAR_TEXT_GAP_PX = 8
+_STATUS_GAP_PX = 16
+"""Space between the scale bar and the status line."""
+_CAPTION_GAP_PX = 12
+_CAPTION_SIZE_FACTOR = 1.15
+_SEPARATOR = "   ·   "
 
 
-def is_small(height: float, scale: float, shown: Set[str]) -> bool:
-    """Return whether a pane is too low for a strip at its foot; its scale bar stands in the caption."""
-    return "caption" in shown and height < _SMALL * scale
+def is_low_pane(height: float, scale: float, visible_layers: Set[str]) -> bool:
+    """Return whether a pane is too low for a strip below the arena; its scale bar is in the caption.
+
+    Parameters
+    ----------
+    height : float, px
+    scale : float
+    visible_layers : set of str
+        Names of the layers that are drawn.
+
+    Returns
+    -------
+    bool
+    """
+    return "caption" in visible_layers and height < _MAX_LOW_PANE_PX * scale
 
 
 def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:
+    """Draw the scale bar in the strip below the arena, unless it is in the caption."""
     height = canvas.surface.get_height()
-    if not is_small(height, canvas.scale, canvas.visible_layers):
-        _draw_bar(canvas, EDGE * canvas.scale, height - 0.5 * STRIP * canvas.scale)
+    if not is_low_pane(height, canvas.scale, canvas.visible_layers):
+        _draw_bar(canvas, EDGE_PX * canvas.scale, height - 0.5 * STRIP_HEIGHT_PX * canvas.scale)
 
 
 def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
-    """Draw a bar of a round length, with its length, and return how wide both are, px."""
-    length = bar_length(canvas)
-    pixels = length * canvas.camera.zoom
-    tick, width = 4.0 * canvas.scale, canvas.scale_width(1.5)
+    """Draw a scale bar with its length, and return the width of both, px."""
+    length = choose_bar_length(canvas)
+    bar_width = length * canvas.camera.zoom
+    tick_height = 4.0 * canvas.scale
+    thickness = canvas.scale_width(1.5)
     ink = canvas.theme.ink
-    for x in (left, left + pixels):
-        canvas.surface.fill(ink, (round(x - width / 2), round(y - tick), width, round(2 * tick)))
-    canvas.surface.fill(ink, (round(left), round(y - width / 2), round(pixels), width))
-    space = pixels + 8 * canvas.scale
-    return space + canvas.draw_text(format_scale_length(length), (left + space, y), bold=True)
+    for x in (left, left + bar_width):
+        tick = (round(x - thickness / 2), round(y - tick_height), thickness, round(2 * tick_height))
+        canvas.surface.fill(ink, tick)
+    canvas.surface.fill(ink, (round(left), round(y - thickness / 2), round(bar_width), thickness))
+    text_left = bar_width + _BAR_TEXT_GAP_PX * canvas.scale
+    return text_left + canvas.draw_text(format_scale_length(length), (left + text_left, y), bold=True)
 
 
-def bar_length(canvas: Canvas) -> float:
-    room = min(max(canvas.surface.get_width() / 8, 30.0), 160 * canvas.scale)
-    return round_down(room / canvas.camera.zoom)
+def choose_bar_length(canvas: Canvas) -> float:
+    """Choose the length of the scale bar.
+
+    Parameters
+    ----------
+    canvas : Canvas
+
+    Returns
+    -------
+    float, m
+        A round length that suits the zoom.
+    """
+    max_width = min(max(canvas.surface.get_width() / 8, _MIN_BAR_PX), _MAX_BAR_PX * canvas.scale)
+    return round_down(max_width / canvas.camera.zoom)
 
 
 def draw_caption(canvas: Canvas, scene: Scene) -> None:
-    left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
-    y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
-    size = 1.15 * canvas.theme.text
-    brief = scene.cost.replace("mean distance by φ ", "").replace("mean distance ", "")
-    costs = [scene.cost, brief, brief.partition(",")[0]]  # the number stays where the words have no room
-    gap = 12 * canvas.scale
-    room = right - left - gap - canvas.measure_text(costs[-1])
-    name = shorten_to_width(scene.label, canvas.scale_text_size(size), room, bold=True)
-    left += canvas.draw_text(name, (left, y), size=size, bold=True) + gap
-    if "scale_bar" in canvas.visible_layers and is_small(
-        canvas.surface.get_height(), canvas.scale, canvas.visible_layers
-    ):
+    """Draw the name of the controller and the coverage cost above a pane."""
+    scale = canvas.scale
+    left = EDGE_PX * scale
+    right = canvas.surface.get_width() - EDGE_PX * scale
+    y = (TOP_PX + 0.5 * ROW_HEIGHT_PX) * scale
+    name_size = _CAPTION_SIZE_FACTOR * canvas.theme.text
+    gap = _CAPTION_GAP_PX * scale
+    costs = _list_shorter_costs(scene.cost)
+    name_width = right - left - gap - canvas.measure_text(costs[-1])
+    name = shorten_to_width(scene.label, canvas.scale_text_size(name_size), name_width, bold=True)
+    left += canvas.draw_text(name, (left, y), size=name_size, bold=True) + gap
+    is_low = is_low_pane(canvas.surface.get_height(), scale, canvas.visible_layers)
+    if is_low and "scale_bar" in canvas.visible_layers:
         left += _draw_bar(canvas, left, y) + gap
-    cost = next((each for each in costs if canvas.measure_text(each) <= right - left), "")
-    canvas.draw_text(cost, (right, y), anchor="right")
+    fitting_costs = [cost for cost in costs if canvas.measure_text(cost) <= right - left]
+    if fitting_costs:
+        canvas.draw_text(fitting_costs[0], (right, y), anchor="right")
+
+
+def _list_shorter_costs(cost: str) -> list[str]:
+    """Return a cost as text, without its name, and without the mean time."""
+    without_name = cost.replace("mean distance by φ ", "").replace("mean distance ", "")
+    return [cost, without_name, without_name.partition(",")[0]]
 
 
 def draw_status(canvas: Canvas, scene: Scene) -> None:
-    bar = bar_length(canvas)
-    taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
-    taken += canvas.measure_text(format_scale_length(bar), bold=True)
-    right = canvas.surface.get_width() - EDGE * canvas.scale
-    y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
+    """Draw the name of the controller, the time, the coverage cost and the map below the arena."""
+    length = choose_bar_length(canvas)
+    bar_width = length * canvas.camera.zoom + canvas.measure_text(format_scale_length(length), bold=True)
+    left = (EDGE_PX + _BAR_TEXT_GAP_PX + _STATUS_GAP_PX) * canvas.scale + bar_width
+    right = canvas.surface.get_width() - EDGE_PX * canvas.scale
+    y = canvas.surface.get_height() - 0.5 * STRIP_HEIGHT_PX * canvas.scale
     size = canvas.scale_text_size(canvas.theme.text)
-    name = shorten_to_width(scene.label, size, right - taken, bold=True)
-    text = fitting_status(scene, size, right - taken - canvas.measure_text(name, bold=True))
+    name = shorten_to_width(scene.label, size, right - left, bold=True)
+    text = fit_status(scene, size, right - left - canvas.measure_text(name, bold=True))
     canvas.draw_text(text, (right, y), anchor="right")
-    left = right - canvas.measure_text(text) if text else right
-    canvas.draw_text(name, (left, y), anchor="right", bold=True)
+    name_right = right - canvas.measure_text(text) if text else right
+    canvas.draw_text(name, (name_right, y), anchor="right", bold=True)
 
 
-def fitting_status(scene: Scene, size: int, room: float) -> str:
-    """Return what follows the controller's name, whole facts only: first the map's name is left out."""
+def fit_status(scene: Scene, size: int, width: float) -> str:
+    """Return the status without the name of the controller; the least important facts are left out.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : int, px
+        Size of the text.
+    width : float, px
+        Maximum width of the text.
+
+    Returns
+    -------
+    str
+    """
     time = f"t = {scene.snapshot.time:.1f} s" if scene.snapshot is not None else ""
-    facts = [text for text in (time, scene.cost, scene.environment.name) if text]
-    lead = "   ·   " if scene.label else ""
-    while len(facts) > 1 and measure_text(lead + "   ·   ".join(facts), size) > room:
+    facts = [fact for fact in (time, scene.cost, scene.environment.name) if fact]
+    if not facts:
+        return ""
+    lead = _SEPARATOR if scene.label else ""
+    while len(facts) > 1 and measure_text(lead + _SEPARATOR.join(facts), size) > width:
         facts.pop()
-    return shorten_to_width(lead + "   ·   ".join(facts), size, room) if facts else ""
-
-
-class LegendStrip:
-    """Glyphs, drawn as the layers draw them, with words; kept until one changes."""
-
-    def __init__(self) -> None:
-        self._strip = LatestValue[pygame.Surface]()
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        width, words = canvas.surface.get_width(), tuple(entry.key for entry in canvas.legend)
-        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.visible_layers)
-        canvas.surface.blit(self._strip.get(None, key, lambda: legend_strip(canvas.legend, canvas)), (0, 0))
-
-
-def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:
-    """Return a strip as wide as the canvas's surface with these entries, for several pictures at once."""
-    rows = legend_rows(canvas, entries)
-    height = round((6.0 + LEGEND_ROW * max(len(rows), 1)) * canvas.scale)
-    strip = pygame.Surface((canvas.surface.get_width(), height), 0, 32)
-    strip.fill(canvas.theme.background)
-    own = replace(canvas, surface=strip)
-    for number, row in enumerate(rows):
-        x = MARGIN * canvas.scale
-        y = (6.0 + LEGEND_ROW * (number + 0.5)) * canvas.scale
-        for entry in row:
-            entry.draw(own, x + 0.5 * (_GLYPH - 6) * canvas.scale, y)
-            x += _GLYPH * canvas.scale
-            x += own.draw_text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
-    return strip
-
-
-def legend_picture(
-    entries: Sequence[LegendEntry], width: int, theme: Theme, scale: float, shown: Set[str] = frozenset()
-) -> NDArray[np.uint8]:
-    """Return entries as an RGB picture of a width, (height, width, 3), for pictures of the layers `shown`."""
-    camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
-    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, choose_robot_hues(1), frozenset(shown))
-    strip = legend_strip(entries, canvas)
-    pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
-    return pixels.reshape(strip.get_height(), width, 3)
-
-
-def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:
-    room = canvas.surface.get_width() - 2 * MARGIN * canvas.scale
-    rows: list[list[LegendEntry]] = []
-    used = 0.0
-    for entry in entries:
-        wide = _GLYPH * canvas.scale + canvas.measure_text(entry.text, canvas.theme.small_text)
-        if not rows or used + wide > room:
-            rows.append([])
-            used = 0.0
-        rows[-1].append(entry)
-        used += wide + _GAP * canvas.scale
-    return rows
+    return shorten_to_width(lead + _SEPARATOR.join(facts), size, width)

@@ -1,297 +1,404 @@
-"""Distances to the nearest robot at every pixel of a picture, and their colors."""
+"""Distances to the nearest robot at every pixel of a picture, and the borders of geodesic cells.
+
+The coverage cost knows the exact distance of each site of a lattice and the last corner of the path to it. A
+pixel in a square between four sites is reached by one of their paths, from the same last corner or directly
+from the robot, so that its distance is nearly always exact.
+"""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
-from robocov_app.look.theme import Theme
+from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
+from robocov_app.render.field_lattice import FieldLattice
 
-_SHALLOW = 0.05  # least angle, rad, at which two distances are taken to grow apart: borders stay thin
-# the squares beside a square: rows up and columns right, and the corners that the two share
-_BESIDE = (((1, 0), (2, 3)), ((-1, 0), (0, 1)), ((0, 1), (1, 3)), ((0, -1), (0, 2)))
-_BLOCK = 4  # pixels along the side of blocks that are looked at as a whole first
-_RIVALS = 5  # different ways that a place may choose from
-
-
-class FieldLattice:
-    """Interpolation lattice of a map: the sites around each place, the same for all results on it."""
-
-    def __init__(self, sites: Sites) -> None:
-        side = sites.lattice
-        self.spacing = sites.spacing
-        number = sites.to_grid(np.arange(len(sites.points)))
-        self.origin = sites.points[0] - np.array(np.divmod(sites.cells[0], side)[::-1]) * sites.spacing
-        # squares between four cells' middles, low left, low right, high left, high right; the rim's stick out
-        rows = np.clip(np.arange(-1, side + 1), 0, side - 1)
-        lower, upper = rows[:-1], rows[1:]
-        around = np.stack([number[np.ix_(y, x)] for y in (lower, upper) for x in (lower, upper)], axis=-1)
-        # a site that is not free speaks as another one of the square, and where none is, as the nearest
-        some = around.max(axis=-1)
-        row, column = distance_transform_edt(number < 0, return_distances=False, return_indices=True)
-        some = np.where(some < 0, number[row, column][np.ix_(upper, upper)], some)
-        self.around: IntArray = np.where(around < 0, some[..., None], around)
-        self.free: BoolArray = around >= 0
-
-    def squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
-        """Return the columns and the rows of the squares that hold coordinates, (w,) and (h,) m."""
-        cells = [(at - low) / self.spacing for at, low in zip((x, y), self.origin, strict=True)]
-        column, row = (np.clip(np.floor(at) + 1, 0, len(self.around) - 1).astype(np.intp) for at in cells)
-        return column, row
+_MIN_BORDER_ANGLE = 0.05
+"""Minimum angle between the directions to two robots, rad, so that borders stay thin."""
+_BLOCK_PX = 4
+"""Side of the blocks of pixels that are evaluated at their middle first."""
+_MAX_CANDIDATES = 5
+"""Maximum number of paths among which a point chooses."""
+_TOLERANCE_STEPS = 1e-9
+_MIN_LENGTH_M = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Borders:
-    """Pixels (row, column) near which the owner changes, (k,) each, and how far the border is, m."""
+class BorderPixels:
+    """Pixels near the border between the geodesic cells of two robots.
 
-    row: IntArray
-    column: IntArray
-    owner: IntArray
-    gap: Array
+    Attributes
+    ----------
+    rows, columns : (k,) int array
+    owners : (k,) int array
+        The nearest robot.
+    distances : (k,) array, m
+        Distance to the border; inf if there is none.
+    """
 
-    def within(self, gap: float) -> "Borders":
-        near = (self.gap <= gap).nonzero()[0]
-        return Borders(self.row[near], self.column[near], self.owner[near], self.gap[near])
+    rows: IntArray
+    columns: IntArray
+    owners: IntArray
+    distances: Array
+
+    def select_within(self, max_distance: float) -> BorderPixels:
+        """Return the pixels within a distance of the border, m."""
+        rows = (self.distances <= max_distance).nonzero()[0]
+        return BorderPixels(self.rows[rows], self.columns[rows], self.owners[rows], self.distances[rows])
 
 
-# Squares whose places may choose from several ways: number of each (s, s), -1 for none; sites (k, r); whether
-# no wall is between a way's end and a square's corner, to which none is shorter, (k, 4, r).
-_Rivals: TypeAlias = tuple[IntArray, IntArray, BoolArray]
+class _Candidates(NamedTuple):
+    """Sites whose paths may lead to the points of some squares.
+
+    Attributes
+    ----------
+    indices : (s, s) int array
+        Row of `sites` for each square; -1 for squares without a choice.
+    sites : (k, r) int array
+    is_free : (k, 4, r) bool array
+        Whether no wall is between the last corner of each path and each corner of the square: through a
+        wall, the path would be shorter than the shortest one.
+    """
+
+    indices: IntArray
+    sites: IntArray
+    is_free: BoolArray
 
 
-class Field:
-    """The distance to the nearest robot, and who that is, for one set of positions."""
+class DistanceField:
+    """The distance to the nearest robot, and its number, for one set of positions.
+
+    Parameters
+    ----------
+    lattice : FieldLattice
+        That of the sites of the result.
+    result : CoverageResult
+
+    Attributes
+    ----------
+    lattice : FieldLattice
+    result : CoverageResult
+    """
 
     def __init__(self, lattice: FieldLattice, result: CoverageResult) -> None:
         self.lattice = lattice
         self.result = result
-        owner, last = result.owner, result.last_corner
-        way = result.positions[owner]
-        bent = (last >= 0).nonzero()[0]
-        way[bent] = result.corners[last[bent]]
-        start = np.maximum(result.distances - np.hypot(*(result.points - way).T), 0.0)
-        start[(last < 0) & (owner >= 0)] = 0.0
-        self._way_x, self._way_y = np.ascontiguousarray(way.T)
-        self._start, self._owner = start, owner
-        # sites whose ways come from the same way-point of the same robot give the same distances
-        source = np.where(last >= 0, last, -2 - owner)
-        around = lattice.around
-        mixed = (source[around[..., 1:]] != source[around[..., :1]]).any(axis=-1)
-        self._inside = self._rivals(mixed, around[mixed])
-        divided = (owner[around[..., 1:]] != owner[around[..., :1]]).any(axis=-1)
-        beside, others = _with_neighbors(lattice, divided)
-        self._around = self._rivals(beside, _first_different(others, source[others]))
+        owners = result.owner
+        last_corners = result.last_corner
+        # The last bend of the path to each site, or the position of its robot.
+        bends = result.positions[owners]
+        is_bent = last_corners >= 0
+        bends[is_bent] = result.corners[last_corners[is_bent]]
+        lengths = np.maximum(result.distances - np.hypot(*(result.points - bends).T), 0.0)
+        lengths[~is_bent & (owners >= 0)] = 0.0
+        self._bend_x, self._bend_y = np.ascontiguousarray(bends.T)
+        self._lengths_to_bend = lengths
+        self._owners = owners
+        # Sites whose paths have the same last bend and the same robot give the same distances.
+        sources = np.where(last_corners >= 0, last_corners, -2 - owners)
+        corner_sites = lattice.corner_sites
+        is_mixed = _has_differences(sources[corner_sites])
+        self._distance_candidates = self._build_candidates(is_mixed, corner_sites[is_mixed])
+        is_divided = _has_differences(owners[corner_sites])
+        is_selected, sites = lattice.collect_sites(is_divided)
+        self._border_candidates = self._build_candidates(
+            is_selected, _select_different(sites, sources[sites])
+        )
 
-    def _rivals(self, squares: BoolArray, site: IntArray) -> _Rivals:
-        number = np.full(squares.shape, -1, dtype=np.intp)
-        number[squares] = np.arange(len(site))
-        corner = self.lattice.around[squares]
-        points = self.result.points[corner]
-        length = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
-        return number, site, length >= self.result.distances[corner][..., None] - 1e-9 * self.lattice.spacing
+    def _build_candidates(self, is_selected: BoolArray, sites: IntArray) -> _Candidates:
+        """Build the candidates of selected squares, (s, s); `sites` are theirs, (k, r)."""
+        indices = np.full(is_selected.shape, -1, dtype=np.intp)
+        indices[is_selected] = np.arange(len(sites))
+        corner_sites = self.lattice.corner_sites[is_selected]
+        corners = self.result.points[corner_sites]
+        lengths = self._compute_distances(sites[:, None], corners[..., 0, None], corners[..., 1, None])
+        tolerance = _TOLERANCE_STEPS * self.lattice.spacing
+        is_free = lengths >= self.result.distances[corner_sites][..., None] - tolerance
+        return _Candidates(indices, sites, is_free)
+
+    def _compute_distances(self, sites: IntArray, x: Array, y: Array) -> Array:
+        """Return the lengths of the paths of sites, m, if they lead to other points instead."""
+        dx = x - self._bend_x[sites]
+        dy = y - self._bend_y[sites]
+        return np.asarray(np.sqrt(dx * dx + dy * dy) + self._lengths_to_bend[sites])
+
+    def _compare_candidates(self, candidates: _Candidates, indices: IntArray, x: Array, y: Array) -> Array:
+        """Return the distances of points by each candidate of their squares.
+
+        Parameters
+        ----------
+        candidates : _Candidates
+        indices : (k,) int array
+            Rows of the candidates.
+        x, y : (k,) array, m
+
+        Returns
+        -------
+        (k, r) array, m
+            inf behind a wall.
+        """
+        distances = self._compute_distances(candidates.sites[indices], x[:, None], y[:, None])
+        x_steps, y_steps = self.lattice.to_steps(x, y)
+        nearest_corners = 2 * _is_in_upper_half(y_steps) + _is_in_upper_half(x_steps)
+        return np.where(candidates.is_free[indices, nearest_corners], distances, np.inf)
 
     @property
-    def largest(self) -> float:
+    def max_distance(self) -> float:
         """The largest distance of a site that a robot can reach, m; nan if there is none."""
-        reached = self.result.distances[self._owner >= 0]
+        reached = self.result.distances[self._owners >= 0]
         return float(reached.max()) if len(reached) else float("nan")
 
-    def distances(self, x: Array, y: Array) -> Array:
-        """Return distances at (w,) x and (h,) y as (h, w) m; inf where no robot can come beside obstacles."""
-        column, row = self.lattice.squares(x, y)
-        site = self.lattice.around[..., 0][row[:, None], column]
-        distance = self._distance(site, np.broadcast_to(x, site.shape), y[:, None])
-        number = self._inside[0][row[:, None], column]
-        high, wide = (number >= 0).nonzero()
-        distance[high, wide] = self._asked(self._inside, number[high, wide], x[wide], y[high]).min(axis=1)
-        return distance
+    def compute_distances(self, x: Array, y: Array) -> Array:
+        """Compute the distances of a grid of points.
 
-    def cells(self, x: Array, y: Array, within: float) -> tuple[IntArray, Borders]:
-        """Return the nearest robot of every pixel, (h, w), -1 where none can come; and `borders`."""
-        column, row = self.lattice.squares(x, y)
-        owner = self._owner[self.lattice.around[..., 0]].take(row, axis=0).take(column, axis=1)
-        blocks, pixels = self._coarse_and_fine(x, y, within)
-        for part in (blocks, pixels):
-            owner[part.row, part.column] = part.owner
-        return owner, pixels.within(within)
+        Parameters
+        ----------
+        x : (w,) array, m
+        y : (h,) array, m
 
-    def borders(self, x: Array, y: Array, within: float) -> Borders:
-        """Return the places at even (w,) x and (h,) y, at most `within` m from a change of owner."""
-        return self._coarse_and_fine(x, y, within)[1].within(within)
+        Returns
+        -------
+        (h, w) array, m
+            inf if no robot can reach the point.
+        """
+        columns, rows = self.lattice.find_squares(x, y)
+        sites = self.lattice.corner_sites[..., 0][rows[:, None], columns]
+        distances = self._compute_distances(sites, np.broadcast_to(x, sites.shape), y[:, None])
+        indices = self._distance_candidates.indices[rows[:, None], columns]
+        point_rows, point_columns = (indices >= 0).nonzero()
+        choices = self._compare_candidates(
+            self._distance_candidates,
+            indices[point_rows, point_columns],
+            x[point_columns],
+            y[point_rows],
+        )
+        distances[point_rows, point_columns] = choices.min(axis=1)
+        return distances
 
-    def _coarse_and_fine(self, x: Array, y: Array, within: float) -> tuple[Borders, Borders]:
-        """Return what is near a border by blocks, each as its middle is, then by pixels."""
-        # blocks with a corner in a square with rivals
-        column, row = self.lattice.squares(x, y)
-        numbered = self._around[0] >= 0
+    def compute_cells(self, x: Array, y: Array, max_distance: float) -> tuple[IntArray, BorderPixels]:
+        """Compute the geodesic cells of a grid of points.
 
-        def ends(square: IntArray) -> tuple[IntArray, IntArray]:
-            first = np.arange(0, len(square), _BLOCK)
-            return square[first], square[np.minimum(first + _BLOCK - 1, len(square) - 1)]
+        Parameters
+        ----------
+        x : (w,) array, m
+            Equally spaced.
+        y : (h,) array, m
+            Equally spaced.
+        max_distance : float, m
+            Maximum distance of the returned pixels from a border.
 
-        some = [numbered[np.ix_(high, wide)] for high in ends(row) for wide in ends(column)]
-        high, wide = np.logical_or.reduce(some).nonzero()
-        middle_x, middle_y = (middles(places, _BLOCK) for places in (x, y))
-        column, row = self.lattice.squares(middle_x, middle_y)
-        known = numbered[row[high], column[wide]]
-        blocks = self._bordering(high[known], wide[known], middle_x, middle_y)
+        Returns
+        -------
+        owners : (h, w) int array
+            The nearest robot; -1 if no robot can reach the point.
+        borders : BorderPixels
+        """
+        columns, rows = self.lattice.find_squares(x, y)
+        square_owners = self._owners[self.lattice.corner_sites[..., 0]]
+        owners = square_owners.take(rows, axis=0).take(columns, axis=1)
+        coarse, fine = self._evaluate_borders(x, y, max_distance)
+        for pixels in (coarse, fine):
+            owners[pixels.rows, pixels.columns] = pixels.owners
+        return owners, fine.select_within(max_distance)
+
+    def compute_borders(self, x: Array, y: Array, max_distance: float) -> BorderPixels:
+        """Compute the pixels near borders of geodesic cells; for the arguments see `compute_cells`."""
+        _, fine = self._evaluate_borders(x, y, max_distance)
+        return fine.select_within(max_distance)
+
+    def _evaluate_borders(self, x: Array, y: Array, max_distance: float) -> tuple[BorderPixels, BorderPixels]:
+        """Evaluate the pixels of squares with candidates.
+
+        Returns
+        -------
+        coarse : BorderPixels
+            Pixels with the values at the middle of their block.
+        fine : BorderPixels
+            Pixels with their own values: all that may be within the maximum distance, m, of a border.
+        """
+        block_rows, block_columns = self._find_blocks(x, y)
+        middle_x = compute_block_middles(x, _BLOCK_PX)
+        middle_y = compute_block_middles(y, _BLOCK_PX)
+        columns, rows = self.lattice.find_squares(middle_x, middle_y)
+        has_candidates = self._border_candidates.indices[rows[block_rows], columns[block_columns]] >= 0
+        blocks = self._evaluate_pixels(
+            block_rows[has_candidates], block_columns[has_candidates], middle_x, middle_y
+        )
         step = abs(x[1] - x[0]) if len(x) > 1 else self.lattice.spacing
-        # half a block's diagonal, and as much again because gaps are taken as if borders were straight
-        near = (blocks.gap <= within + 1.5 * _BLOCK * step).nonzero()[0]
-        coarse = _spread(blocks.row, blocks.column, len(y), len(x))
-        coarse_owner, coarse_gap = blocks.owner[coarse[2]], blocks.gap[coarse[2]]
-        high, wide = np.append(blocks.row[near], high[~known]), np.append(blocks.column[near], wide[~known])
-        row, column, _ = _spread(high, wide, len(y), len(x))
-        return Borders(*coarse[:2], coarse_owner, coarse_gap), self._bordering(row, column, x, y)
+        # Half the diagonal of a block, and as much again because distances assume straight borders.
+        is_near = blocks.distances <= max_distance + 1.5 * _BLOCK_PX * step
+        coarse_rows, coarse_columns, block_indices = _list_block_pixels(
+            blocks.rows, blocks.columns, len(y), len(x)
+        )
+        coarse = BorderPixels(
+            coarse_rows, coarse_columns, blocks.owners[block_indices], blocks.distances[block_indices]
+        )
+        fine_rows, fine_columns, _ = _list_block_pixels(
+            np.append(blocks.rows[is_near], block_rows[~has_candidates]),
+            np.append(blocks.columns[is_near], block_columns[~has_candidates]),
+            len(y),
+            len(x),
+        )
+        return coarse, self._evaluate_pixels(fine_rows, fine_columns, x, y)
 
-    def _bordering(self, high: IntArray, wide: IntArray, x: Array, y: Array) -> Borders:
-        """Return who is nearest, and how far the border is, at chosen rows and columns; inf for no border."""
-        column, row = self.lattice.squares(x, y)
-        number = self._around[0][row[high], column[wide]]
-        some = (number >= 0).nonzero()[0]
-        number, high, wide = number[some], high[some], wide[some]
-        px, py = x[wide], y[high]
-        around = self._around[1][number]
-        distance = self._asked(self._around, number, px, py)
-        owner = self._owner[around]
-        each = np.arange(len(around))
-        first = distance.argmin(axis=1)
-        others = np.where(owner == owner[each, first][:, None], np.inf, distance)
-        second = others.argmin(axis=1)
-        sites = around[each, first], around[each, second]
-        ways = [np.stack([px - self._way_x[site], py - self._way_y[site]]) for site in sites]
-        u, v = (way / np.maximum(np.hypot(*way), 1e-12) for way in ways)
-        apart = np.maximum(np.hypot(*(u - v)), _SHALLOW)
-        # between places that robots reach and such that none does, there is a wall
+    def _find_blocks(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
+        """Return rows and columns of the blocks with a corner in a square that has candidates."""
+        columns, rows = self.lattice.find_squares(x, y)
+        has_candidates = self._border_candidates.indices >= 0
+        has_corner = [
+            has_candidates[np.ix_(block_rows, block_columns)]
+            for block_rows in _get_block_ends(rows)
+            for block_columns in _get_block_ends(columns)
+        ]
+        block_rows, block_columns = np.logical_or.reduce(has_corner).nonzero()
+        return block_rows, block_columns
+
+    def _evaluate_pixels(self, rows: IntArray, columns: IntArray, x: Array, y: Array) -> BorderPixels:
+        """Evaluate pixels at some rows and columns of a grid; those without candidates are left out."""
+        square_columns, square_rows = self.lattice.find_squares(x, y)
+        indices = self._border_candidates.indices[square_rows[rows], square_columns[columns]]
+        chosen = (indices >= 0).nonzero()[0]
+        indices = indices[chosen]
+        rows = rows[chosen]
+        columns = columns[chosen]
+        pixel_x = x[columns]
+        pixel_y = y[rows]
+        sites = self._border_candidates.sites[indices]
+        distances = self._compare_candidates(self._border_candidates, indices, pixel_x, pixel_y)
+        owners = self._owners[sites]
+        points = np.arange(len(sites))
+        nearest = distances.argmin(axis=1)
+        nearest_owners = owners[points, nearest]
+        other_distances = np.where(owners == nearest_owners[:, None], np.inf, distances)
+        second = other_distances.argmin(axis=1)
+        nearest_dx, nearest_dy = self._compute_directions(sites[points, nearest], pixel_x, pixel_y)
+        second_dx, second_dy = self._compute_directions(sites[points, second], pixel_x, pixel_y)
+        # The difference of two distances grows by this much per meter across the border.
+        growth = np.maximum(np.hypot(nearest_dx - second_dx, nearest_dy - second_dy), _MIN_BORDER_ANGLE)
+        # Between points that robots reach and points that no robot reaches, there is a wall.
         with np.errstate(invalid="ignore"):
-            gap = (others[each, second] - distance[each, first]) / apart
-        gap = np.nan_to_num(gap, nan=np.inf, posinf=np.inf)
-        return Borders(high, wide, owner[each, first], gap)
+            gaps = (other_distances[points, second] - distances[points, nearest]) / growth
+        gaps = np.nan_to_num(gaps, nan=np.inf, posinf=np.inf)
+        return BorderPixels(rows, columns, nearest_owners, gaps)
 
-    def _asked(self, rivals: _Rivals, number: IntArray, x: Array, y: Array) -> Array:
-        """Return what the rivals of (k,) places in numbered squares say, (k, r), inf behind a wall."""
-        _, site, right_way = rivals
-        distance = self._distance(site[number], x[:, None], y[:, None])
-        # the square's corner beside the place
-        spacing, origin = self.lattice.spacing, self.lattice.origin
-        cells = [(at - low) / spacing for at, low in zip((x, y), origin, strict=True)]
-        right, upper = ((np.floor(at - 0.5) - np.floor(at)).astype(np.intp) + 1 for at in cells)
-        return np.where(right_way[number, 2 * upper + right], distance, np.inf)
-
-    def _distance(self, site: IntArray, x: Array, y: Array) -> Array:
-        dx, dy = x - self._way_x[site], y - self._way_y[site]
-        return np.asarray(np.sqrt(dx * dx + dy * dy) + self._start[site])
+    def _compute_directions(self, sites: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return the unit vectors, dx and dy, of the last parts of paths to points."""
+        dx = x - self._bend_x[sites]
+        dy = y - self._bend_y[sites]
+        lengths = np.maximum(np.hypot(dx, dy), _MIN_LENGTH_M)
+        return dx / lengths, dy / lengths
 
 
-class Fields:
-    """The fields of one map at any positions and time; their scale of colors ends at `limit`, m."""
+class DistanceFields:
+    """Computes the distance fields of one map at any positions and times.
+
+    Parameters
+    ----------
+    cost : CoverageCost
+    limit : float, m
+        End of the color scale of the distances.
+
+    Attributes
+    ----------
+    limit : float, m
+    """
 
     def __init__(self, cost: CoverageCost, limit: float) -> None:
         self.limit = limit
-        self._momentary = TimeVaryingCost(cost)
-        self._lattices = cost, FieldLattice(cost.sites)
+        self._time_varying_cost = TimeVaryingCost(cost)
+        self._lattice_cost = cost
+        self._lattice = FieldLattice(cost.sites)
 
-    def at(self, positions: Array, time: float = 0.0) -> Field | None:
-        """Return the field of robots at (n, 2) m at a time, s, without those below moving obstacles.
+    def compute_at(self, positions: Array, time: float = 0.0) -> DistanceField | None:
+        """Compute the distance field of robots.
 
-        None where all are. Raises InputError when a robot is in an obstacle that stands, or outside the map.
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+            Robots below moving obstacles are left out.
+        time : float, s
+
+        Returns
+        -------
+        DistanceField or None
+            None if all robots are below moving obstacles.
+
+        Raises
+        ------
+        InputError
+            If a robot is in an obstacle at rest, or outside the map.
         """
-        result = self._momentary.evaluate_all_robots(time, positions)
+        result = self._time_varying_cost.evaluate_all_robots(time, positions)
         if result is None:
             return None
-        cost = self._momentary.get_cost(time)
-        if cost is not self._lattices[0]:
-            self._lattices = cost, FieldLattice(cost.sites)
-        return Field(self._lattices[1], result)
+        cost = self._time_varying_cost.get_cost(time)
+        if cost is not self._lattice_cost:
+            self._lattice_cost = cost
+            self._lattice = FieldLattice(cost.sites)
+        return DistanceField(self._lattice, result)
 
 
-def middles(places: Array, count: int) -> Array:
-    """Return the middles of `count` pixels each; the last of them may stick out."""
-    step = places[1] - places[0] if len(places) > 1 else 0.0
-    return np.asarray(places[::count] + 0.5 * (count - 1) * step)
+def compute_block_middles(coordinates: Array, size: int) -> Array:
+    """Return the middles of blocks of pixels along an axis.
 
+    Parameters
+    ----------
+    coordinates : (n,) array
+        Middles of the pixels, equally spaced.
+    size : int
+        Number of pixels of a block. The last block may reach beyond the last pixel.
 
-def _spread(row: IntArray, column: IntArray, height: int, width: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Return rows and columns of all pixels of (k,) blocks, and which block each is of."""
-    inner_row, inner_column = np.divmod(np.arange(_BLOCK**2), _BLOCK)
-    rows = (row[:, None] * _BLOCK + inner_row).ravel()
-    columns = (column[:, None] * _BLOCK + inner_column).ravel()
-    inside = ((rows < height) & (columns < width)).nonzero()[0]
-    return rows[inside], columns[inside], inside // _BLOCK**2
-
-
-def _with_neighbors(lattice: FieldLattice, divided: BoolArray) -> tuple[BoolArray, IntArray]:
-    """Return divided squares, those across their open sides, and the (k, 20) sites of each, its own first.
-
-    A border may cut a corner off a square whose own four sites are of one robot.
+    Returns
+    -------
+    (ceil(n / size),) array
     """
-    found = divided.copy()
-    rows, columns = divided.shape
-    asked = []
-    for (up, right), shared in _BESIDE:
-        at = np.ix_(*(np.clip(np.arange(n) + by, 0, n - 1) for n, by in ((rows, up), (columns, right))))
-        open_ = ~divided & divided[at] & lattice.free[..., shared].all(axis=-1)
-        found |= open_
-        asked.append(np.where(open_[..., None], lattice.around[at], lattice.around))
-    return found, np.concatenate([lattice.around, *asked], axis=-1)[found]
+    step = coordinates[1] - coordinates[0] if len(coordinates) > 1 else 0.0
+    return np.asarray(coordinates[::size] + 0.5 * (size - 1) * step)
 
 
-def _first_different(site: IntArray, source: IntArray) -> IntArray:
-    """Return for each row of (k, m) sites the first few of different sources, else the first."""
-    fresh = np.ones(site.shape, dtype=bool)
-    for j in range(1, site.shape[1]):
-        fresh[:, j] = (source[:, j, None] != source[:, :j]).all(axis=1)
-    order = np.argsort(~fresh, axis=1, kind="stable")[:, :_RIVALS]
-    chosen = np.take_along_axis(site, order, axis=1)
-    return np.where(np.take_along_axis(fresh, order, axis=1), chosen, site[:, :1])
+def _has_differences(values: IntArray) -> BoolArray:
+    """Return which rows, (..., k), contain different values."""
+    return np.asarray((values[..., 1:] != values[..., :1]).any(axis=-1))
 
 
-_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-FARTHEST = 253  # number of the color at the limit of the scale and beyond
+def _is_in_upper_half(steps: Array) -> IntArray:
+    """Return 1 for coordinates, in lattice steps, that are nearer to the next lattice point, else 0."""
+    return (np.floor(steps - 0.5) - np.floor(steps)).astype(np.intp) + 1
 
 
-def round_limit(distance: float) -> float:
-    """Return a round length not below a distance, m, to which a scale of colors may reach."""
-    if not np.isfinite(distance) or distance <= 0.0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(distance))
-    return next(float(f"{step * power:.12g}") for step in _STEPS if step * power >= distance * (1.0 - 1e-9))
+def _get_block_ends(values: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the values of the first and of the last pixel of each block along an axis."""
+    first = np.arange(0, len(values), _BLOCK_PX)
+    last = np.minimum(first + _BLOCK_PX - 1, len(values) - 1)
+    return values[first], values[last]
 
 
-def ticks(limit: float) -> list[float]:
-    """Return round lengths from zero to a limit, m, for a scale of colors."""
-    power = 10.0 ** np.floor(np.log10(limit))
-    for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
-        count = limit / (step * power)
-        if count <= 5 + 1e-9 and abs(count - round(count)) < 1e-9:
-            break
-    return [float(f"{k * step * power:.12g}") for k in range(round(count) + 1)]
+def _list_block_pixels(
+    block_rows: IntArray, block_columns: IntArray, height: int, width: int
+) -> tuple[IntArray, IntArray, IntArray]:
+    """List the pixels of blocks that are inside a picture.
+
+    Returns
+    -------
+    rows, columns : (m,) int array
+    block_indices : (m,) int array
+        Index of the block of each pixel.
+    """
+    inner_rows, inner_columns = np.divmod(np.arange(_BLOCK_PX**2), _BLOCK_PX)
+    rows = (block_rows[:, None] * _BLOCK_PX + inner_rows).ravel()
+    columns = (block_columns[:, None] * _BLOCK_PX + inner_columns).ravel()
+    inside = ((rows < height) & (columns < width)).nonzero()[0]
+    return rows[inside], columns[inside], inside // _BLOCK_PX**2
 
 
-def palette(theme: Theme) -> NDArray[np.uint8]:
-    """Return the colors of `levels`, (256, 3): from near to far, then of where no robot can come."""
-    closed = np.array([theme.unreached, theme.obstacle_edge], dtype=np.uint8)
-    return np.concatenate([theme.build_heat_table(FARTHEST + 1), closed])
-
-
-def levels(field: Field, x: Array, y: Array, limit: float, hatch: int) -> NDArray[np.uint8]:
-    """Return distances at (w,) x and (h,) y as numbers in the `palette`; unreachable places are hatched."""
-    distance = field.distances(x, y)
-    reached = np.isfinite(distance)
-    np.multiply(distance, FARTHEST / limit, out=distance)
-    np.minimum(distance, FARTHEST, out=distance)
-    level = distance.astype(np.uint8)
-    if not reached.all():
-        row, column = np.indices(reached.shape)
-        line = np.asarray((row + column) % hatch < max(hatch // 9, 1))
-        level[~reached] = FARTHEST + 1 + line[~reached]
-    return level
-
-
-def strength(borders: Borders, zoom: float, width: float) -> Array:
-    """Return how much of each pixel a line of `width` px along borders covers, 0 to 1; `zoom` is in px/m."""
-    return np.asarray(np.clip(0.5 * width + 0.5 - borders.gap * zoom, 0.0, 1.0))
+def _select_different(sites: IntArray, sources: IntArray) -> IntArray:
+    """Return the first few sites of each row, (k, m), with different sources; others repeat the first one."""
+    is_new = np.ones(sites.shape, dtype=bool)
+    for column in range(1, sites.shape[1]):
+        is_new[:, column] = (sources[:, column, None] != sources[:, :column]).all(axis=1)
+    order = np.argsort(~is_new, axis=1, kind="stable")[:, :_MAX_CANDIDATES]
+    chosen = np.take_along_axis(sites, order, axis=1)
+    return np.where(np.take_along_axis(is_new, order, axis=1), chosen, sites[:, :1])

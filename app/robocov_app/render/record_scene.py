@@ -11,12 +11,14 @@ from robocov.arrays import IntArray
 from robocov.observation import Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record
-from robocov_app.render.distance_field import Fields
+from robocov_app.render.distance_field import DistanceFields
 from robocov_app.render.moving_obstacles import list_moving_obstacles
 from robocov_app.render.scene import Scene
 
 
-def build_record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
+def build_record_scene(
+    record: Record, row: int, *, cost: str = "", fields: DistanceFields | None = None
+) -> Scene:
     """Build the scene of a row of a record; failed robots are marked.
 
     Parameters
@@ -55,7 +57,7 @@ def build_record_scene(record: Record, row: int, *, cost: str = "", fields: Fiel
         is_present = record.present[: row + 1, robots, None]
         trail = np.where(is_present, trail[:, robots], starts)
     if fields is not None:
-        attributes["field"] = fields.at(snapshot.positions, snapshot.time)
+        attributes["field"] = fields.compute_at(snapshot.positions, snapshot.time)
         attributes["field_limit"] = fields.limit
     return Scene.from_snapshot(
         environment,

@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
-from robocov_app.render.distance_field import Field
+from robocov_app.render.distance_field import DistanceField
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.render.sensed_points import SensedPoints
 
@@ -103,7 +103,7 @@ class Scene:
     adjacency: IntArray | None = None
     label: str = ""
     cost: str = ""
-    field: Field | None = None
+    field: DistanceField | None = None
     field_limit: float = 1.0
     numbers: Sequence[int] | None = None
     failed: Mapping[int, tuple[float, float]] = dataclass_field(default_factory=dict)
@@ -122,6 +122,13 @@ class Scene:
     def get_number(self, row: int) -> int:
         """Return the number of a robot, given by its row."""
         return row + 1 if self.numbers is None else self.numbers[row]
+
+    def has_content(self, name: str) -> bool:
+        """Return whether an attribute, given by its name, is neither None nor an empty collection."""
+        value = getattr(self, name)
+        if isinstance(value, Sequence | Mapping):
+            return len(value) > 0
+        return value is not None
 
     @property
     def now(self) -> Snapshot:

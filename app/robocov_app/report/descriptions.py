@@ -6,7 +6,7 @@ from robocov.environment import Environment
 from robocov.errors import format_count
 from robocov.metrics import CostHistory
 from robocov.record import Record
-from robocov_app.render.density import density_label
+from robocov_app.render.density_text import describe_density
 from robocov_app.runs.saved_runs import build_roster
 
 
@@ -38,7 +38,7 @@ def describe_map(environment: Environment) -> str:
     """Describe a map in one sentence."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
-    density = density_label(environment)
+    density = describe_density(environment)
     return (
         f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m "
         f"{_describe_obstacles(environment)}, "
@@ -91,7 +91,7 @@ def _describe_costs(environment: Environment, history: CostHistory) -> list[str]
     if not np.isfinite([first, final]).all():
         return []
     verb = "falls" if final < first else "goes"
-    weighted = ", weighed by φ," if density_label(environment) else ""
+    weighted = ", weighed by φ," if describe_density(environment) else ""
     sentences = [
         f"The mean distance to the nearest robot{weighted} {verb} from {first:.3f} m to {final:.3f} m."
     ]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from robocov.errors import format_count
-from robocov_app.render.density import density_label
+from robocov_app.render.density_text import describe_density
 from robocov_app.report.analysis.groups import format_gains, format_setting
 from robocov_app.report.results.result import ReportedResult, ReportedRun, replace_unprintable
 from robocov_app.sweep.parameters import UNITS, format_parameter
@@ -145,7 +145,7 @@ def list_gain_meanings(result: ReportedResult) -> list[tuple[str, str]]:
 
 def format_densities(result: ReportedResult) -> str:
     """Return the densities by which locations on the maps are weighted; empty if there are none."""
-    labels = {name: density_label(environment) for name, environment in result.maps.items()}
+    labels = {name: describe_density(environment) for name, environment in result.maps.items()}
     if len(labels) == 1:
         return "".join(labels.values())
     return "; ".join(f"{name}: {label}" for name, label in labels.items() if label)

@@ -21,8 +21,8 @@ from robocov.record import Record
 from robocov_app.look.colors import mix
 from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.density import dots, shading
-from robocov_app.render.layout import fitted_radii, mark_size
+from robocov_app.render.crowding import fit_mark_size, fit_radii
+from robocov_app.render.density_shading import list_sample_coordinates, shade_density
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.report.descriptions import describe_map, describe_run
 from robocov_app.runs.saved_runs import build_roster
@@ -89,10 +89,10 @@ def build_density_image(environment: Environment) -> str:
     """
     if environment.density is None or environment.density.is_uniform:
         return ""
-    pixels = shading(environment, _DENSITY_DOTS, LIGHT)
+    pixels = shade_density(environment, _DENSITY_DOTS, LIGHT)
     # An image has one color for both themes: between the two.
     pixels[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
-    x, y = np.meshgrid(*dots(environment, _DENSITY_DOTS))
+    x, y = np.meshgrid(*list_sample_coordinates(environment, _DENSITY_DOTS))
     is_inside = environment.region.contains(np.column_stack([x.ravel(), y.ravel()]))
     pixels[~is_inside.reshape(x.shape), 3] = 0
     file = io.BytesIO()
@@ -196,7 +196,7 @@ def _draw_starts(record: Record, frame: PictureFrame) -> str:
     first_rows = np.argmax(record.present, axis=0)
     joined = np.flatnonzero(record.present.any(axis=0))
     starts = frame.to_pixels(record.positions[first_rows[joined], joined])
-    radius = mark_size(starts, 2.4, 5.0) / 2
+    radius = fit_mark_size(starts, 2.4, 5.0) / 2
     rings = [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>' for x, y in starts]
     return "".join(rings)
 
@@ -205,7 +205,7 @@ def _draw_robots(record: Record, frame: PictureFrame, *, has_numbers: bool) -> s
     """Draw the final positions; failed robots are crossed out."""
     centers = frame.to_pixels(record.positions[-1])
     max_radius = 9.0 if has_numbers else 4.5
-    radii = fitted_radii(centers, record.team.radius * frame.zoom, 1.5, max_radius)
+    radii = fit_radii(centers, record.team.radius * frame.zoom, 1.5, max_radius)
     numbers = build_roster(record).numbers
     shapes = []
     for robot in np.flatnonzero(record.present[-1]).tolist():

@@ -310,7 +310,8 @@ def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]
         Those in which a robot works.
     """
     from robocov_app.figures.coverage import Moment
-    from robocov_app.render.distance_field import Field, FieldLattice
+    from robocov_app.render.distance_field import DistanceField
+    from robocov_app.render.field_lattice import FieldLattice
 
     environment = runs[0].record.environment
     cost = refine_cost_for_figures(environment, cost)
@@ -328,7 +329,7 @@ def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]
             continue
         final_cost = varying_cost.get_cost(time)
         rows = np.flatnonzero(is_available)
-        field = Field(FieldLattice(final_cost.sites), final_cost(positions[rows]))
+        field = DistanceField(FieldLattice(final_cost.sites), final_cost(positions[rows]))
         mean_distance = float(run.history.mean_distance[-1])
         moments.append(Moment.last_of(record, field, mean_distance, rows, run.final_time))
     return moments

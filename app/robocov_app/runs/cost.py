@@ -102,10 +102,11 @@ def save_distance_figure(
     """
     from robocov_app.figures.coverage import Moment, plot_coverage
     from robocov_app.figures.files import save_figure
-    from robocov_app.render.distance_field import Field, FieldLattice
+    from robocov_app.render.distance_field import DistanceField
+    from robocov_app.render.field_lattice import FieldLattice
 
     team = Team.homogeneous(len(positions), radius=radius)
-    field = Field(FieldLattice(cost.sites), cost(positions, speeds))
+    field = DistanceField(FieldLattice(cost.sites), cost(positions, speeds))
     robots = format_count(len(team), "robot")
     moment = Moment(cost.environment, team, field, cost.environment.name, f"{robots}, {mean}")
     save_figure(plot_coverage([], [moment], theme, title=title), path)

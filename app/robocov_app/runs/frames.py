@@ -10,10 +10,11 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.metrics import CostHistory
 from robocov.record import Record
-from robocov_app.render.density import cost_label, mean_label
-from robocov_app.render.distance_field import Fields
-from robocov_app.render.layers import Layer
-from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.density_text import format_cost, get_cost_name
+from robocov_app.render.distance_field import DistanceFields
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.render.layers.layer import Layer
+from robocov_app.render.painter import Painter
 from robocov_app.render.record_scene import build_record_scene
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.settings import VideoSettings
@@ -57,7 +58,7 @@ def draw_frames(
     scale: float | None = None,
     cost: CostHistory | None = None,
     rows: IntArray | None = None,
-    fields: Fields | None = None,
+    fields: DistanceFields | None = None,
 ) -> Iterator[Frame]:
     """Draw the frames of a recorded run.
 
@@ -81,7 +82,7 @@ def draw_frames(
     ------
     Frame
     """
-    painter = build_painter(record, settings, size, layers or standard_layers(settings.colors), scale)
+    painter = build_painter(record, settings, size, layers or build_standard_layers(settings.colors), scale)
     if rows is None:
         rows = select_frame_rows(record.time, settings.fps, settings.speed)
     for row, repetitions in groupby(rows.tolist()):
@@ -132,4 +133,4 @@ def _describe_cost(record: Record, cost: CostHistory | None, time: float) -> str
         return ""
     latest = known_count - 1
     mean_time = None if cost.mean_time is None else cost.mean_time[latest]
-    return cost_label(mean_label(record.environment), cost.mean_distance[latest], mean_time)
+    return format_cost(get_cost_name(record.environment), cost.mean_distance[latest], mean_time)

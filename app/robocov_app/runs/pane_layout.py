@@ -12,10 +12,12 @@ from robocov.record import Record
 from robocov_app.look.colors import Color
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import Theme
-from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
-from robocov_app.render.distance_field import Fields
-from robocov_app.render.layout import columns_for
-from robocov_app.render.picture import Painter, pane_layers, scale_for
+from robocov_app.render.annotations import STRIP_HEIGHT_PX
+from robocov_app.render.distance_field import DistanceFields
+from robocov_app.render.layer_catalog import build_pane_layers
+from robocov_app.render.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, render_legend_image
+from robocov_app.render.painter import Painter, choose_scale
+from robocov_app.render.panel_grid import choose_column_count
 from robocov_app.render.record_scene import build_record_scene
 from robocov_app.render.scene import Scene
 from robocov_app.runs.encoding import Frame
@@ -91,7 +93,7 @@ def build_pane_layout(
     records: Sequence[Record],
     settings: VideoSettings,
     size: tuple[int, int] | None = None,
-    fields: Fields | None = None,
+    fields: DistanceFields | None = None,
     legend_scenes: Sequence[Scene] | None = None,
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as possible: wide maps one below the other.
@@ -117,12 +119,12 @@ def build_pane_layout(
     width, height = size or MAX_DEFAULT_SIZE_PX
     columns = _count_columns(len(records), aspect, (width, height))
     rows = math.ceil(len(records) / columns)
-    scale = scale_for((width, height))
+    scale = choose_scale((width, height))
     scale = max(min(scale, width / columns / _MIN_PANE_WIDTH_PX), _MIN_SCALE)
     pane_width = (width - (columns - 1) * PANE_GAP_PX) // columns
     pane_height = 0
     if size is None:
-        max_height = (height - (_HEADER_PADDING_PX + LEGEND_ROW) * scale) / rows - PANE_GAP_PX
+        max_height = (height - (_HEADER_PADDING_PX + ROW_HEIGHT_PX) * scale) / rows - PANE_GAP_PX
         pane_width, pane_height = _fit_pane(aspect, pane_width, max_height, scale)
         width = columns * pane_width + (columns - 1) * PANE_GAP_PX
     header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
@@ -146,16 +148,21 @@ def _compute_aspect(record: Record) -> float:
 
 def _count_columns(panes: int, aspect: float, size: tuple[int, int]) -> int:
     width, height = size
-    scale = scale_for(size)
-    caption_height = (_HEADER_PADDING_PX + LEGEND_ROW + _HEADER_PADDING_PX + STRIP) * scale
-    return columns_for(panes, aspect, (width, height - LEGEND_ROW * scale), caption_height)
+    scale = choose_scale(size)
+    caption_height = (_HEADER_PADDING_PX + ROW_HEIGHT_PX + _HEADER_PADDING_PX + STRIP_HEIGHT_PX) * scale
+    return choose_column_count(
+        panes, aspect, (width, height - ROW_HEIGHT_PX * scale), row_margin=caption_height
+    )
 
 
 def _fit_pane(aspect: float, max_width: int, max_height: float, scale: float) -> tuple[int, int]:
     """Return the width and height of a pane that suit the map, px."""
     space = _PaneSpace(
-        horizontal=(2 * MARGIN + _PANE_PADDING_PX) * scale,
-        vertical=(_HEADER_PADDING_PX + LEGEND_ROW + _HEADER_PADDING_PX + STRIP + _PANE_PADDING_PX) * scale,
+        horizontal=(2 * MARGIN_PX + _PANE_PADDING_PX) * scale,
+        vertical=(
+            _HEADER_PADDING_PX + ROW_HEIGHT_PX + _HEADER_PADDING_PX + STRIP_HEIGHT_PX + _PANE_PADDING_PX
+        )
+        * scale,
     )
     height = round(min((max_width - space.horizontal) / aspect + space.vertical, max_height))
     needed_width = round((height - space.vertical) * aspect + space.horizontal)
@@ -168,11 +175,11 @@ def _draw_legend(
     settings: VideoSettings,
     width: int,
     scale: float,
-    fields: Fields | None,
+    fields: DistanceFields | None,
     scenes: Sequence[Scene] | None,
 ) -> Frame:
     """Draw the legend of everything that the panes show."""
-    painter = build_painter(records[0], settings, (64, 64), pane_layers(settings.colors), scale)
+    painter = build_painter(records[0], settings, (64, 64), build_pane_layers(settings.colors), scale)
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
     entries = [painter.legend_entries(scene) for scene in scenes]
@@ -180,10 +187,12 @@ def _draw_legend(
     entries.sort(key=len)
     entries.reverse()
     merged = merge_legends(entries, lambda entry: entry.key)
-    return legend_picture(merged, width, settings.color_theme, scale, settings.shown_layers)
+    return render_legend_image(merged, width, settings.color_theme, scale, settings.shown_layers)
 
 
-def _select_legend_scenes(records: Sequence[Record], fields: Fields | None, painter: Painter) -> list[Scene]:
+def _select_legend_scenes(
+    records: Sequence[Record], fields: DistanceFields | None, painter: Painter
+) -> list[Scene]:
     shown_fields = fields if painter.needs_field else None
     scenes = []
     for record in records:

@@ -11,8 +11,9 @@ import numpy as np
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.metrics import CostHistory
 from robocov.record import Record
-from robocov_app.render.distance_field import Fields, round_limit
-from robocov_app.render.picture import pane_layers
+from robocov_app.render.distance_colors import choose_color_limit
+from robocov_app.render.distance_field import DistanceFields
+from robocov_app.render.layer_catalog import build_pane_layers
 from robocov_app.runs.cost import MIN_VIDEO_LATTICE, build_cost, refine_cost_for_figures
 from robocov_app.runs.encoding import Frame, save_frames_and_video
 from robocov_app.runs.execution import Run
@@ -42,7 +43,7 @@ def draw_comparison_frames(
     settings: VideoSettings,
     *,
     hold: float = 0.0,
-    fields: Fields | None = None,
+    fields: DistanceFields | None = None,
 ) -> Iterator[Frame]:
     """Draw the frames of several runs side by side.
 
@@ -68,7 +69,7 @@ def draw_comparison_frames(
             record,
             settings,
             # Layers cache drawings, so each pane needs its own.
-            layers=pane_layers(settings.colors),
+            layers=build_pane_layers(settings.colors),
             cost=cost,
             rows=select_frame_rows(record.time, settings.fps, settings.speed, hold),
             size=layout.pane,
@@ -134,7 +135,7 @@ def save_videos(
 
 def _build_fields(
     runs: Sequence[Run], cost: CoverageCost | None, settings: VideoSettings, *, quiet: bool
-) -> Fields | None:
+) -> DistanceFields | None:
     """Return the distances that videos show, on one scale of colors; None if no layer shows any."""
     if not settings.shown_layers & {"distances", "geodesic_cells"}:
         return None
@@ -150,7 +151,7 @@ def _build_fields(
         if result is not None:
             finite_distances = result.distances[np.isfinite(result.distances)]
             largest_distance = max(largest_distance, float(finite_distances.max(initial=0.0)))
-    return Fields(cost, round_limit(_COLOR_SCALE_FACTOR * largest_distance))
+    return DistanceFields(cost, choose_color_limit(_COLOR_SCALE_FACTOR * largest_distance))
 
 
 def write_frames_and_video(

@@ -3,7 +3,7 @@
 from math import ceil, floor
 from typing import NamedTuple, TypeAlias
 
-from robocov_app.render.layout import columns_for
+from robocov_app.render.panel_grid import choose_column_count
 
 Box: TypeAlias = tuple[int, int, int, int]
 """Left, top, width and height, px."""
@@ -113,7 +113,7 @@ def _arrange_panes(
 ) -> tuple[Box, ...]:
     """Arrange panes in rows below the legend."""
     free_size = width, max(arena_height - legend_height, 1)
-    columns = columns_for(count, aspect, free_size, around=68 * scale, beside=31 * scale)
+    columns = choose_column_count(count, aspect, free_size, row_margin=68 * scale, column_margin=31 * scale)
     rows = ceil(count / columns)
     pane_width = (width - PANE_GAP_PX * (columns - 1)) // columns
     pane_height = (arena_height - legend_height - PANE_GAP_PX * (rows - 1)) // rows

@@ -13,10 +13,11 @@ from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.density import cost_label, mean_label
-from robocov_app.render.distance_field import round_limit
-from robocov_app.render.marks import drawn_radii
-from robocov_app.render.picture import Painter, pane_layers, standard_layers
+from robocov_app.render.density_text import format_cost, get_cost_name
+from robocov_app.render.distance_colors import choose_color_limit
+from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
+from robocov_app.render.layers.robots import compute_drawn_radii
+from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.layout import Layout, is_inside
 from robocov_app.viewer.costs import KnownCost
@@ -86,10 +87,10 @@ class ViewerCanvas:
         self._environment = self.viewer.session.displayed.environment
         self._painters = []
         for _, _, width, height in layout.panes:
-            layers = standard_layers()
+            layers = build_standard_layers()
             if len(layout.panes) > 1:
                 # Panes share the time, which is in the window's own status line.
-                layers = [layer for layer in pane_layers() if layer.name != "status"]
+                layers = [layer for layer in build_pane_layers() if layer.name != "status"]
             painter = Painter(self._environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
                 painter.camera = self._camera.with_view(painter.camera.view)
@@ -156,7 +157,7 @@ class ViewerCanvas:
         point = np.array(self.to_world(pixel, pane))
         canvas = self._build_canvas(pygame.Surface((1, 1)), pane, scene)
         distances = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
-        radii = np.array(drawn_radii(canvas, scene)) + _HIT_MARGIN_PX * self.layout.scale
+        radii = np.array(compute_drawn_radii(canvas, scene)) + _HIT_MARGIN_PX * self.layout.scale
         rows = np.flatnonzero(distances <= radii).tolist()
         hits = [(float(distances[row]), scene.get_number(row)) for row in rows]
         for number, position in scene.failed.items():
@@ -205,7 +206,7 @@ class ViewerCanvas:
         selected = viewer.selected_robot
         row = setup.numbers.index(selected) if selected in setup.numbers else None
         if known is not None and painter.needs_field:
-            self._update_color_limit(known.field.largest)
+            self._update_color_limit(known.field.max_distance)
         return pane.build_scene(
             setup,
             snapshot,
@@ -224,7 +225,7 @@ class ViewerCanvas:
         """Let the color scale follow the largest distance, m, without changing it in every frame."""
         low, high = _COLOR_LIMIT_RANGE
         if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
-            self._color_limit = round_limit(1.1 * largest)
+            self._color_limit = choose_color_limit(1.1 * largest)
 
     def _get_path(self, known: KnownCost | None) -> Array | None:
         """Return the path from the cursor to its nearest robot, (k, 2) m."""
@@ -260,8 +261,8 @@ class ViewerCanvas:
         _, travel_times = displayed.get_costs("time")
         if pane.number not in distances:
             return ""
-        name = mean_label(displayed.get_setup(pane).environment)
-        text = cost_label(name, distances[pane.number], travel_times.get(pane.number))
+        name = get_cost_name(displayed.get_setup(pane).environment)
+        text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
         return f"{text} at {time:.1f} s" if displayed.time - time > MAX_COST_LAG_S else text
 
     def _build_canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:

@@ -15,7 +15,7 @@ from robocov_app.look.robot_colors import choose_curve_colors
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.density import density_label
+from robocov_app.render.density_text import describe_density
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.layout import Box, Layout, is_inside
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_tag
@@ -222,7 +222,7 @@ class Chart:
         """Write the names of the plotted quantity and of the other one, and the state of the computation."""
         scale = self.layout.scale
         row = 0.5 * TOP_PX * scale
-        density = density_label(self.viewer.session.displayed.environment)
+        density = describe_density(self.viewer.session.displayed.environment)
         weighted = ", weighed by φ" if density else ""
         title = f"{self.plotted.title}{weighted}, {self.plotted.unit}"
         canvas.draw_text(title, (12 * scale, row), bold=True)

@@ -17,7 +17,8 @@ from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
 from robocov_app.jobs.messages import Channel, Wire
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
-from robocov_app.render.distance_field import Field, FieldLattice
+from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.field_lattice import FieldLattice
 
 PROGRESS_INTERVAL_S = 0.05  # between two reports on the preparation of a map
 MIN_LISTED_TIME_S = 1.0  # a shorter remaining time is not shown
@@ -48,9 +49,9 @@ class KnownCost:
     travel_time: float | None = None
 
     @cached_property
-    def field(self) -> Field:
+    def field(self) -> DistanceField:
         """Distance field for drawing."""
-        return Field(self.get_lattice(), self.result)
+        return DistanceField(self.get_lattice(), self.result)
 
 
 class _SharedSites(NamedTuple):

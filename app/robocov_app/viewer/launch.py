@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from robocov.defaults import DEFAULT_LATTICE
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import find_draft_folder
 from robocov_app.storage.settings import (
     find_settings_file,
@@ -230,9 +230,9 @@ class ViewerLauncher:
 
 def _list_usual_layers(settings: ViewerSettings) -> set[str]:
     """Return the layers used last, or the default ones."""
-    layers = standard_layers()
+    layers = build_standard_layers()
     if settings.shown is None:
-        return {layer.name for layer in layers if layer.default}
+        return {layer.name for layer in layers if layer.is_default}
     return {layer.name for layer in layers} & set(settings.shown)
 
 

@@ -4,8 +4,8 @@ import pygame
 
 from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import Theme
-from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.legend_strip import arrange_legend_rows, render_legend_strip
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import create_flat_canvas
 
@@ -34,7 +34,7 @@ class SharedLegend:
     def count_rows(self, entries: list[LegendEntry], layout: Layout, layers: frozenset[str]) -> int:
         """Return how many rows are needed; never fewer than before in a layout, so that panes do not jump."""
         page = pygame.Surface((layout.arena[2], 1))
-        rows = len(legend_rows(create_flat_canvas(page, self.theme, layout.scale), entries))
+        rows = len(arrange_legend_rows(create_flat_canvas(page, self.theme, layout.scale), entries))
         key = (layout.size, layout.scale, len(layout.panes), layers)
         if key == self._rows_key:
             rows = max(rows, self._rows)
@@ -53,7 +53,7 @@ class SharedLegend:
             page.fill(self.theme.background)
             camera = create_flat_canvas(page, self.theme, layout.scale).camera
             canvas = Canvas(page, camera, self.theme, layout.scale, choose_robot_hues(1), layers)
-            page.blit(legend_strip(entries, canvas), (0, 0))
+            page.blit(render_legend_strip(entries, canvas), (0, 0))
             self._picture = page
             self._picture_key = key
         screen.blit(self._picture, (x, y), pygame.Rect(0, 0, width, height))

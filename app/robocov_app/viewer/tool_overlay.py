@@ -10,7 +10,7 @@ from robocov.arrays import Array
 from robocov.environment import Obstacle, Point
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.marks import drawn_radii
+from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_tag
 from robocov_app.viewer.tools.tool import ViewerDrawState
@@ -56,7 +56,7 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
     row = numbers.index(number)
     if row == scene.selected:
         return
-    radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
+    radius = compute_drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
     center = canvas.camera.to_pixels(scene.now.positions[row]).tolist()
     canvas.draw_sprite(partial(sprites.render_ring, radius, canvas.theme.ink, 1.2 * canvas.scale), center)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pygame
 
 from robocov_app.look.theme import get_theme
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.storage.autosave import Draft
 from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.command import CommandTable
@@ -108,7 +108,7 @@ class ViewerWindow(CommandWindow):
         self.canvas = ViewerCanvas(viewer, get_theme(viewer.view.theme))
         self.chart = Chart(viewer)
         self.lesson = LessonGuide(viewer, self.canvas.fit, is_unattended=is_unattended)
-        titles = {layer.name: layer.title for layer in standard_layers()}
+        titles = {layer.name: layer.title for layer in build_standard_layers()}
         window_commands = list_window_commands(self.canvas, self.chart, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))

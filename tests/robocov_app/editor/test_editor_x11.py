@@ -16,7 +16,7 @@ from x11_hands import MARKS, PATIENCE, Hands, ended, invisible_display, run_wind
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
 from robocov_app.editor.canvas.canvas import MARGIN_PX
-from robocov_app.render.annotations import STRIP
+from robocov_app.render.annotations import STRIP_HEIGHT_PX
 from robocov_app.render.camera import Camera
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE
@@ -50,7 +50,7 @@ class Sheet:
     def __init__(self, bounds: tuple[float, float, float, float], legend_rows: int = 1) -> None:
         left, top, width, height = build_layout(SIZE, 1.0, 1, 1.0, plot=False).arena
         above = 10 + 22 * legend_rows
-        view = float(left), float(top + above), float(width), height - above - STRIP
+        view = float(left), float(top + above), float(width), height - above - STRIP_HEIGHT_PX
         self.camera = Camera.fit(bounds, view, MARGIN_PX)
 
     def __call__(self, x: float, y: float) -> tuple[float, float]:

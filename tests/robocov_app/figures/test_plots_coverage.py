@@ -13,7 +13,9 @@ from robocov_app.figures.coverage import Moment, plot_coverage
 from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.files import save_figure
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, palette, round_limit
+from robocov_app.render.distance_colors import MAX_LEVEL, build_palette, choose_color_limit
+from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.field_lattice import FieldLattice
 
 T = np.linspace(0.0, 60.0, 61)
 COSTS = {map_.name: CoverageCost(map_, 64) for map_ in (ROOMS, HALL, CORRIDOR, SHAFT)}
@@ -23,7 +25,7 @@ def moment_of(environment, n=5, seed=0):
     cost = COSTS[environment.name]
     record = run_of(environment, n, seed=seed)
     positions = environment.start("spread").sample(n, seed)
-    return Moment.last_of(record, Field(FieldLattice(cost.sites), cost(positions)), 1.234)
+    return Moment.last_of(record, DistanceField(FieldLattice(cost.sites), cost(positions)), 1.234)
 
 
 def curves(count):
@@ -101,7 +103,7 @@ def test_the_colors_are_those_of_the_scale(theme, tmp_path):
     save_figure(figure, tmp_path / "a.png")
     pixels = np.array(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
     (axes,) = [axes for axes in figure.axes if not axes.axison]
-    limit = round_limit(moment.field.largest)
+    limit = choose_color_limit(moment.field.max_distance)
     geodesics = COSTS["hall"].geodesics
     hits = 0
     for place in COSTS["hall"].points[::97]:
@@ -109,7 +111,7 @@ def test_the_colors_are_those_of_the_scale(theme, tmp_path):
         column, height = axes.transData.transform(place)
         row = len(pixels) - 1 - int(height)
         around = pixels[row - 3 : row + 4, int(column) - 3 : int(column) + 4].reshape(-1, 3)
-        wanted = palette(theme)[int(exact.min() / limit * FARTHEST)].astype(int)
+        wanted = build_palette(theme)[int(exact.min() / limit * MAX_LEVEL)].astype(int)
         first, second = np.sort(exact)[:2]
         if first > 0.8 and second - first > 0.3:
             hits += 1
@@ -124,7 +126,7 @@ def test_all_maps_are_in_one_scale_of_colors():
     near, far = moment_of(ROOMS, n=12), moment_of(ROOMS, n=1)
     figure = plot_coverage([], [near, far])
     (bar,) = [axes for axes in figure.axes if axes.axison]
-    assert bar.get_xlim()[1] == round_limit(far.field.largest) > near.field.largest
+    assert bar.get_xlim()[1] == choose_color_limit(far.field.max_distance) > near.field.max_distance
 
 
 def test_the_words_say_what_is_seen():

@@ -7,9 +7,10 @@ from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 from robocov.voronoi import partition
 from robocov_app.look.theme import LIGHT
-from robocov_app.render.annotations import fitting_status
+from robocov_app.render.annotations import fit_status
 from robocov_app.render.fonts import measure_text, render_text
-from robocov_app.render.picture import Painter, pane_layers, standard_layers
+from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
+from robocov_app.render.painter import Painter
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)
@@ -39,7 +40,7 @@ def test_the_status_leaves_out_whole_facts_the_least_important_first():
     size = 14
     found = []
     for room in range(600, 0, -5):
-        text = fitting_status(scene, size, room)
+        text = fit_status(scene, size, room)
         assert measure_text(text, size) <= room
         if not found or found[-1] != text:
             found.append(text)
@@ -61,7 +62,7 @@ def test_a_caption_has_what_the_brief_status_leaves_out():
     frames = []
     for cost, label_ in (("1.23 m", "RAPF"), ("9.87 m", "RAPF"), ("1.23 m", "RPF")):
         scene = replace(scene_of(record, cost=cost), label=label_)
-        frames.append(drawn(scene, "caption", "status", layers=pane_layers())[0])
+        frames.append(drawn(scene, "caption", "status", layers=build_pane_layers())[0])
     for frame, side in ((frames[1], slice(SIZE[0] // 2, None)), (frames[2], slice(0, SIZE[0] // 2))):
         rows, columns = np.nonzero((frame != frames[0]).any(axis=2))
         assert len(rows) > 5 and rows.max() < 34
@@ -105,7 +106,7 @@ def test_the_legend_lists_exactly_what_is_shown():
     for name, word in words.items():
         painter.show({name})
         assert painter.legend(scene) == [word]
-    painter.show({layer.name for layer in standard_layers()})
+    painter.show({layer.name for layer in build_standard_layers()})
     assert sorted(painter.legend(scene)) == sorted(words.values())  # no obstacles, starts or trail here
     painter.show({"obstacles", "starts", "trajectories"})
     rooms = scene_of(run_of(ROOMS, 2))
@@ -114,7 +115,7 @@ def test_the_legend_lists_exactly_what_is_shown():
 
 def test_the_legend_stands_above_the_arena_in_as_many_rows_as_it_needs():
     scene = scene_of(run_of(ROOMS, 6))
-    names = [layer.name for layer in standard_layers()]
+    names = [layer.name for layer in build_standard_layers()]
     for size in (SIZE, (1920, 1080)):
         painter = Painter(ROOMS, size)
         painter.show(names)

@@ -15,18 +15,16 @@ from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, WallObstacle
 from robocov_app.look.colors import compute_contrast, compute_luminance
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_field import (
-    FARTHEST,
-    Borders,
-    Field,
-    FieldLattice,
-    Fields,
-    levels,
-    palette,
-    round_limit,
-    strength,
-    ticks,
+from robocov_app.render.distance_colors import (
+    MAX_LEVEL,
+    build_palette,
+    choose_color_limit,
+    compute_color_levels,
+    compute_line_opacities,
+    list_color_ticks,
 )
+from robocov_app.render.distance_field import BorderPixels, DistanceField, DistanceFields
+from robocov_app.render.field_lattice import FieldLattice
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))
 
@@ -36,7 +34,7 @@ def field_of(environment, n, seed, lattice=128):
     hall = max(environment.free.geoms, key=lambda part: part.area)
     points = cost.points[shapely.contains_xy(hall, *cost.points.T)]
     positions = points[np.random.default_rng(seed).choice(len(points), n, replace=False)]
-    return cost, Field(FieldLattice(cost.sites), cost(positions))
+    return cost, DistanceField(FieldLattice(cost.sites), cost(positions))
 
 
 def pixels(environment, width=331):
@@ -64,7 +62,7 @@ def test_distances_are_the_exact_ones(environment, seed):
     row, column = some_free(environment, x, y, 150, seed)
     places = np.column_stack([x[column], y[row]])
     exact = cost.geodesics.compute_distances(places, field.result.positions).min(axis=1)
-    error = np.abs(field.distances(x, y)[row, column] - exact)
+    error = np.abs(field.compute_distances(x, y)[row, column] - exact)
     # nearly everywhere to rounding; beside shadows of corners by far less than the lattice's step
     assert np.quantile(error, 0.9) < 1e-9
     assert error.max() < 0.3 * cost.spacing
@@ -74,7 +72,7 @@ def test_distances_are_the_exact_ones(environment, seed):
 def test_the_owner_is_the_nearest_robot(seed):
     cost, field = field_of(ROOMS, 6, seed)
     x, y, step = pixels(ROOMS)
-    owner, _ = field.cells(x, y, step)
+    owner, _ = field.compute_cells(x, y, step)
     row, column = some_free(ROOMS, x, y, 150, seed)
     exact = cost.geodesics.compute_distances(np.column_stack([x[column], y[row]]), field.result.positions)
     chosen = exact[np.arange(150), owner[row, column]]
@@ -85,23 +83,23 @@ def test_the_owner_is_the_nearest_robot(seed):
 def test_borders_are_where_two_robots_are_equally_near(seed):
     cost, field = field_of(ROOMS, 6, seed)
     x, y, step = pixels(ROOMS)
-    borders = field.borders(x, y, 0.5 * step)
-    free = shapely.contains_xy(ROOMS.free, x[borders.column], y[borders.row])
+    borders = field.compute_borders(x, y, 0.5 * step)
+    free = shapely.contains_xy(ROOMS.free, x[borders.columns], y[borders.rows])
     chosen = np.nonzero(free)[0][::7]
-    places = np.column_stack([x[borders.column[chosen]], y[borders.row[chosen]]])
+    places = np.column_stack([x[borders.columns[chosen]], y[borders.rows[chosen]]])
     exact = np.sort(cost.geodesics.compute_distances(places, field.result.positions), axis=1)
     # two distances grow apart by at most twice the way to the border
     assert len(chosen) > 30
-    assert (exact[:, 1] - exact[:, 0]).max() < 2.0 * borders.gap[chosen].max() + 0.1 * cost.spacing
+    assert (exact[:, 1] - exact[:, 0]).max() < 2.0 * borders.distances[chosen].max() + 0.1 * cost.spacing
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_every_change_of_owner_in_the_open_has_a_border(seed):
     _, field = field_of(HALL, 7, seed)
     x, y, step = pixels(HALL)
-    owner, borders = field.cells(x, y, 1.5 * step)
+    owner, borders = field.compute_cells(x, y, 1.5 * step)
     marked = np.zeros(owner.shape, dtype=bool)
-    marked[borders.row, borders.column] = True
+    marked[borders.rows, borders.columns] = True
     columns, rows = np.meshgrid(x, y)
     open_ = shapely.contains_xy(HALL.free.buffer(-0.2), columns, rows)
     changes = (owner[:, 1:] != owner[:, :-1]) & open_[:, 1:] & open_[:, :-1]
@@ -112,38 +110,38 @@ def test_every_change_of_owner_in_the_open_has_a_border(seed):
 def test_where_obstacles_move_a_field_is_of_its_time():
     path = ObstaclePath(((2.0, 1.0), (2.0, 5.0)), 1.0)
     crossed = Environment("crossed", SEALED.boundary, (CircleObstacle((2.0, 1.0), 0.8, path=path),))
-    fields = Fields(CoverageCost(crossed, 64), 5.0)
+    fields = DistanceFields(CoverageCost(crossed, 64), 5.0)
     robots = np.array([[1.0, 3.0], [2.0, 5.0]])
     x, y = np.array([1.95, 2.05]), np.array([1.05, 0.95])
-    assert fields.at(robots).result.owner.max() == 1
+    assert fields.compute_at(robots).result.owner.max() == 1
     # at four seconds it stands on the second robot, where the other cannot be either
-    later = fields.at(robots, 4.0)
+    later = fields.compute_at(robots, 4.0)
     assert set(later.result.owner.tolist()) == {0}
     exact = np.hypot(*(np.array([1.95, 1.05]) - robots[0]))
-    assert later.distances(x, y)[0, 0] == pytest.approx(exact, abs=1e-9)
-    assert fields.at(robots[1:], 4.0) is None
+    assert later.compute_distances(x, y)[0, 0] == pytest.approx(exact, abs=1e-9)
+    assert fields.compute_at(robots[1:], 4.0) is None
 
 
 def test_no_distance_leaks_through_a_wall():
     cost = CoverageCost(SEALED, 64)
-    field = Fields(cost, 5.0).at(np.array([[1.0, 1.0], [3.0, 5.0]]))
+    field = DistanceFields(cost, 5.0).compute_at(np.array([[1.0, 1.0], [3.0, 5.0]]))
     x, y, _ = pixels(SEALED)
-    distance, (owner, borders) = field.distances(x, y), field.cells(x, y, 0.1)
+    distance, (owner, borders) = field.compute_distances(x, y), field.compute_cells(x, y, 0.1)
     closed = x > 6.15 + cost.spacing
     assert np.isinf(distance[:, closed]).all()
     assert (owner[:, closed] == -1).all()
     opened = x < 5.85 - cost.spacing
     assert np.isfinite(distance[:, opened]).all()
-    assert not closed[borders.column].any()
+    assert not closed[borders.columns].any()
     reached = field.result.distances[field.result.owner >= 0]
-    assert field.largest == reached.max() < 6.0
+    assert field.max_distance == reached.max() < 6.0
 
 
 def test_one_robot_has_no_borders():
     _, field = field_of(ROOMS, 1, 0)
     x, y, _ = pixels(ROOMS)
-    owner, borders = field.cells(x, y, 10.0)
-    assert len(borders.gap) == 0
+    owner, borders = field.compute_cells(x, y, 10.0)
+    assert len(borders.distances) == 0
     row, column = some_free(ROOMS, x, y, 100, 0)
     assert set(owner[row, column].tolist()) == {0}
 
@@ -152,10 +150,13 @@ def test_one_robot_has_no_borders():
 def test_coarse_lattices_and_single_pixels(lattice):
     _, field = field_of(HALL, 1, 0, lattice)
     for x, y in (([3.0], [3.0]), ([0.0, 14.0], [11.0, 0.0]), (np.linspace(-5, 20, 9), [2.0])):
-        distance = field.distances(np.array(x, dtype=float), np.array(y, dtype=float))
+        distance = field.compute_distances(np.array(x, dtype=float), np.array(y, dtype=float))
         assert distance.shape == (len(y), len(x))
         assert np.isfinite(distance).all()
-        assert field.cells(np.array(x, dtype=float), np.array(y, dtype=float), 1.0)[0].shape == distance.shape
+        assert (
+            field.compute_cells(np.array(x, dtype=float), np.array(y, dtype=float), 1.0)[0].shape
+            == distance.shape
+        )
 
 
 THEMES = [LIGHT, DARK]
@@ -175,9 +176,9 @@ def test_colors_run_one_way_from_the_page_to_its_opposite(theme):
 
 @given(st.floats(1e-3, 1e5))
 def test_scales_end_at_round_lengths_not_far_beyond(distance):
-    limit = round_limit(distance)
+    limit = choose_color_limit(distance)
     assert distance * (1 - 1e-9) <= limit <= 1.51 * distance
-    marks = ticks(limit)
+    marks = list_color_ticks(limit)
     assert marks[0] == 0.0
     assert marks[-1] == pytest.approx(limit)
     assert 3 <= len(marks) <= 6
@@ -186,32 +187,32 @@ def test_scales_end_at_round_lengths_not_far_beyond(distance):
 
 def test_levels_follow_the_distances_up_to_the_limit():
     cost = CoverageCost(ROOMS, 64)
-    field = Field(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
+    field = DistanceField(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
     x, y = np.linspace(0.1, 15.9, 60), np.linspace(9.9, 0.1, 40)
-    distance = field.distances(x, y)
-    level = levels(field, x, y, 5.0, 9)
-    assert (level[np.isfinite(distance)] <= FARTHEST).all()
-    assert (level[np.isfinite(distance) & (distance >= 5.0)] == FARTHEST).all()
+    distance = field.compute_distances(x, y)
+    level = compute_color_levels(field, x, y, 5.0, 9)
+    assert (level[np.isfinite(distance)] <= MAX_LEVEL).all()
+    assert (level[np.isfinite(distance) & (distance >= 5.0)] == MAX_LEVEL).all()
     near = distance < 5.0
-    np.testing.assert_allclose(level[near] / FARTHEST * 5.0, distance[near], atol=5.0 / FARTHEST)
+    np.testing.assert_allclose(level[near] / MAX_LEVEL * 5.0, distance[near], atol=5.0 / MAX_LEVEL)
 
 
 def test_where_nobody_can_come_is_hatched():
     cost = CoverageCost(ROOMS, 32)
-    field = Field(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
-    courtyard = levels(field, np.linspace(1.8, 3.2, 50), np.linspace(8.6, 7.8, 30), 5.0, 9)
-    assert set(np.unique(courtyard)) == {FARTHEST + 1, FARTHEST + 2}
-    assert 0.05 < (courtyard == FARTHEST + 2).mean() < 0.2
+    field = DistanceField(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
+    courtyard = compute_color_levels(field, np.linspace(1.8, 3.2, 50), np.linspace(8.6, 7.8, 30), 5.0, 9)
+    assert set(np.unique(courtyard)) == {MAX_LEVEL + 1, MAX_LEVEL + 2}
+    assert 0.05 < (courtyard == MAX_LEVEL + 2).mean() < 0.2
     for theme in THEMES:
-        colors = palette(theme)
+        colors = build_palette(theme)
         assert colors.shape == (256, 3)
-        assert tuple(colors[FARTHEST + 1]) == theme.unreached
+        assert tuple(colors[MAX_LEVEL + 1]) == theme.unreached
 
 
 def test_lines_are_as_wide_as_asked_for_and_smooth():
     gap = np.linspace(0.0, 0.1, 1001)
     none = np.zeros(1001, dtype=np.intp)
-    part = strength(Borders(none, none, none, gap), zoom=50.0, width=3.0)
+    part = compute_line_opacities(BorderPixels(none, none, none, gap), zoom=50.0, width=3.0)
     assert part[0] == 1.0
     assert part[gap * 50 > 2.0].max() == 0.0
     # half its width on this side

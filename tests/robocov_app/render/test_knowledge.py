@@ -11,10 +11,10 @@ from written_words import check_glyph, glyphs, places
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
 from robocov_app.look.colors import compute_contrast, mix
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render import knowledge
 from robocov_app.render.camera import Camera
+from robocov_app.render.layers import known_obstacles
 from robocov_app.render.moving_obstacles import list_moving_obstacles
-from robocov_app.render.picture import Painter
+from robocov_app.render.painter import Painter
 from robocov_app.render.sensed_points import SensedPoints
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
@@ -216,13 +216,14 @@ class TestSensedObstacles:
         assert distance(frame, at, DARK.background) == 0
 
     def test_nothing_is_drawn_anew_where_nothing_is_new(self, monkeypatch):
-        counts, dots_of = [], knowledge._dots
+        counts = []
+        draw_dots = known_obstacles.draw_dots
 
-        def watched(canvas, centers, *style):
+        def count_dots(canvas, centers, *style):
             counts.append(len(centers))
-            dots_of(canvas, centers, *style)
+            draw_dots(canvas, centers, *style)
 
-        monkeypatch.setattr(knowledge, "_dots", watched)
+        monkeypatch.setattr(known_obstacles, "draw_dots", count_dots)
         sensed = SensedPoints()
         layer = layer_named("sensed")
         painter = Painter(ROOMS, SIZE, layers=[layer])

@@ -16,14 +16,15 @@ from robocov_app.look.colors import choose_text_color
 from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.marks import drawn_radii
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.moving_obstacles import list_moving_obstacles
-from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 
 
 def test_every_layer_has_a_name_of_its_own_and_words():
-    layers = standard_layers()
+    layers = build_standard_layers()
     assert len({layer.name for layer in layers}) == len(layers)
     assert all(layer.title for layer in layers)
 
@@ -78,7 +79,7 @@ def test_robots_of_different_size_are_drawn_to_scale():
     _, painter = drawn(scene, "robots")
     canvas = Canvas(pygame.Surface(SIZE), painter.camera, LIGHT, 1.0, choose_robot_hues(3))
     expected = record.team.radius * painter.camera.zoom
-    np.testing.assert_allclose(drawn_radii(canvas, scene), expected, atol=0.26)
+    np.testing.assert_allclose(compute_drawn_radii(canvas, scene), expected, atol=0.26)
 
 
 def test_edges_of_cells_are_drawn_between_robots():
@@ -166,7 +167,7 @@ class TestCrowds:
         painter = Painter(SQUARE, size)
         painter.frame(scene)
         canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, choose_robot_hues(0))
-        return np.array(drawn_radii(canvas, scene)), painter
+        return np.array(compute_drawn_radii(canvas, scene)), painter
 
     def test_discs_keep_apart_where_the_smallest_ones_can(self):
         positions = 4.0 + np.random.default_rng(0).normal(size=(150, 2)) * 0.9
@@ -378,7 +379,7 @@ class TestTrajectories:
     def test_run_along_the_positions(self, colors):
         record = run_of(SQUARE, 4)
         frame, painter = drawn(
-            scene_of(record), "trajectories", layers=standard_layers(colors), size=(800, 800)
+            scene_of(record), "trajectories", layers=build_standard_layers(colors), size=(800, 800)
         )
         for robot in range(4):
             color = LIGHT.trajectory if colors == "paper" else LIGHT.robots[robot]

@@ -9,7 +9,7 @@ from written_words import check_glyph, glyphs, places
 from robocov.team import Team
 from robocov_app.look.colors import compute_contrast, mix
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.picture import Painter
+from robocov_app.render.painter import Painter
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 

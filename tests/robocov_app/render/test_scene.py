@@ -16,7 +16,8 @@ from robocov.team import Team
 from robocov_app.figures.runs import plot_trajectories
 from robocov_app.look.theme import LIGHT
 from robocov_app.render import sensed_points
-from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.render.painter import Painter
 from robocov_app.render.record_scene import build_record_scene
 from robocov_app.render.sensed_points import CELL_SIZE_M, SensedPoints
 from robocov_app.runs.frames import draw_frames
@@ -91,7 +92,7 @@ def test_when_all_have_failed_the_map_is_still_drawn() -> None:
     scene = build_record_scene(record, len(record) - 1)
     assert scene.snapshot is None
     assert list(scene.failed) == [1, 2]
-    painter = Painter(HALL, (320, 240), LIGHT, standard_layers(), 1.0)
+    painter = Painter(HALL, (320, 240), LIGHT, build_standard_layers(), 1.0)
     assert painter.frame(scene).std() > 0
     assert plot_trajectories(record).axes
 

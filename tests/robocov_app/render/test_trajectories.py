@@ -10,8 +10,8 @@ from drawn_run import SQUARE, explained, run_of, scene_of
 
 from robocov_app.look.robot_colors import choose_trail_color
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.picture import Painter
-from robocov_app.render.trajectories import FADE_STEPS
+from robocov_app.render.layers.fading_trails import FADE_STEPS
+from robocov_app.render.painter import Painter
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 MOSTLY_LIGHT = pytest.mark.parametrize(

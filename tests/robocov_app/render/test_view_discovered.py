@@ -11,7 +11,7 @@ from robocov.planning.raster import Raster
 from robocov.team import Team
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.knowledge import discovered_map
+from robocov_app.render.layers.known_obstacles import get_discovered_map
 from robocov_app.render.sensed_points import SensedPoints
 
 
@@ -34,7 +34,7 @@ def scene(selected: int | None = 0):
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_walls_and_what_is_unknown_are_seen(theme):
     known, shown = scene()
-    assert discovered_map(shown) is known
+    assert get_discovered_map(shown) is known
     frame, painter = drawn(shown, "sensed", theme=theme)
     at = {
         name: painter.camera.to_pixels(known.raster.compute_centers(np.array(row), np.array(column)))
@@ -54,6 +54,6 @@ def test_walls_and_what_is_unknown_are_seen(theme):
 
 def test_without_a_robot_or_a_map_nothing_is_drawn():
     _, shown = scene(selected=None)
-    assert discovered_map(shown) is None
-    assert discovered_map(replace(explained(ONE), selected=0)) is None
-    assert discovered_map(replace(shown, snapshot=None, selected=0)) is None
+    assert get_discovered_map(shown) is None
+    assert get_discovered_map(replace(explained(ONE), selected=0)) is None
+    assert get_discovered_map(replace(shown, snapshot=None, selected=0)) is None

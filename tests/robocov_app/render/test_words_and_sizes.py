@@ -7,9 +7,15 @@ import pytest
 from robocov_app.look.colors import mix, parse_hex_color
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.render.canvas import clip_polygon, clip_segment
-from robocov_app.render.density import cost_label
-from robocov_app.render.distance_field import round_limit, ticks
-from robocov_app.render.layout import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
+from robocov_app.render.crowding import (
+    choose_width_factor,
+    compute_nearest_distances,
+    fit_mark_size,
+    fit_radii,
+)
+from robocov_app.render.density_text import format_cost
+from robocov_app.render.distance_colors import choose_color_limit, list_color_ticks
+from robocov_app.render.panel_grid import choose_column_count
 from robocov_app.render.surface_cache import LatestValue, cache_surfaces
 
 
@@ -21,11 +27,11 @@ def test_colors() -> None:
 def test_round_lengths() -> None:
     assert [round_down(x) for x in (0.7, 1.0, 3.9, 49.0)] == [0.5, 1.0, 2.0, 20.0]
     assert [format_scale_length(x) for x in (0.05, 0.5, 2.0, 5000.0)] == ["5 cm", "0.5 m", "2 m", "5 km"]
-    limits = [round_limit(x) for x in (0.93, 1.0, 4.2, 13.0, float("nan"))]
+    limits = [choose_color_limit(x) for x in (0.93, 1.0, 4.2, 13.0, float("nan"))]
     assert limits == [1.0, 1.0, 5.0, 15.0, 1.0]
-    assert ticks(5.0) == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
-    assert ticks(1.5) == [0.0, 0.5, 1.0, 1.5]
-    assert ticks(8.0) == [0.0, 2.0, 4.0, 6.0, 8.0]
+    assert list_color_ticks(5.0) == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert list_color_ticks(1.5) == [0.0, 0.5, 1.0, 1.5]
+    assert list_color_ticks(8.0) == [0.0, 2.0, 4.0, 6.0, 8.0]
 
 
 def test_what_is_far_away_is_clipped() -> None:
@@ -37,23 +43,23 @@ def test_what_is_far_away_is_clipped() -> None:
 
 
 def test_costs_in_words() -> None:
-    assert cost_label("mean distance", 1.25) == "mean distance 1.250 m"
+    assert format_cost("mean distance", 1.25) == "mean distance 1.250 m"
     words = "mean distance by φ 1.250 m, mean time 3.000 s"
-    assert cost_label("mean distance by φ", 1.25, 3.0) == words
+    assert format_cost("mean distance by φ", 1.25, 3.0) == words
 
 
 def test_sizes_in_a_crowd() -> None:
     three = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]])
-    assert nearest_distance(three).tolist() == [3.0, 1.0, 1.0]
+    assert compute_nearest_distances(three).tolist() == [3.0, 1.0, 1.0]
     centers = np.array([[0.0, 0.0], [8.0, 0.0], [99.0, 0.0]])
-    assert fitted_radii(centers, np.ones(3), 2.0, 9.0).tolist() == [4.0, 4.0, 9.0]
-    assert mark_size(np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [90.0, 0.0]]), 2.0, 9.0) == 5.0
-    assert [line_crowding(n) for n in (6, 20, 80, 1000)] == [1.0, 1.0, 0.5, 0.5]
+    assert fit_radii(centers, np.ones(3), 2.0, 9.0).tolist() == [4.0, 4.0, 9.0]
+    assert fit_mark_size(np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [90.0, 0.0]]), 2.0, 9.0) == 5.0
+    assert [choose_width_factor(n) for n in (6, 20, 80, 1000)] == [1.0, 1.0, 0.5, 0.5]
 
 
 @pytest.mark.parametrize(("aspect", "columns"), [(1.4, 3), (10.0, 1)])
 def test_columns(aspect: float, columns: int) -> None:
-    assert columns_for(3, aspect, (1920, 1080)) == columns
+    assert choose_column_count(3, aspect, (1920, 1080)) == columns
 
 
 def test_what_is_kept() -> None:

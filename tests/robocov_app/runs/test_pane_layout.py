@@ -6,7 +6,7 @@ from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 from robocov.metrics import CostHistory
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.picture import pane_layers
+from robocov_app.render.layer_catalog import build_pane_layers
 from robocov_app.runs.frames import draw_frames, select_frame_rows
 from robocov_app.runs.pane_layout import build_pane_layout, tile_frames
 from robocov_app.runs.settings import VideoSettings
@@ -83,7 +83,7 @@ class TestFrames:
         second = replace(first, positions=first.positions[:, ::-1] + 0.4)
         for records in ([first, second], [second, first]):
             layout, frames = film(records, size=(1280, 640))
-            style, layers = VideoSettings(fps=5), pane_layers("robots")
+            style, layers = VideoSettings(fps=5), build_pane_layers("robots")
             cost = known(records[1])
             alone = draw_frames(
                 records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale

@@ -15,7 +15,7 @@ from pointer_events import build_event
 
 import robocov_app.viewer as package
 from robocov.controllers import CONTROLLERS, get_gains
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.command import Command, find_commands
 from robocov_app.toolkit.input import format_key
 from robocov_app.viewer.commands import GROUPS, list_viewer_commands
@@ -24,7 +24,7 @@ from robocov_app.viewer.lesson_guide import COMMANDS_WITHIN_LESSON
 from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.tools.toolbox import ViewerToolbox
 
-TITLES = {layer.name: layer.title for layer in standard_layers()}
+TITLES = {layer.name: layer.title for layer in build_standard_layers()}
 TEXTS = [path.read_text() for path in Path(package.__path__[0]).glob("*.py")]
 
 UNTRIED = frozenset({"quit", "video", "screenshot", "save:run", "save:map", "fullscreen"})

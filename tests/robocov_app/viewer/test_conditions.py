@@ -16,7 +16,8 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.simulation import Simulation
 from robocov_app.look.theme import LIGHT
-from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import load_saved_runs
 from robocov_app.viewer.costs import Costs
@@ -163,7 +164,7 @@ def test_the_beliefs_of_the_selected_robot_are_drawn() -> None:
     advance_session(session, 12)
     pane = session.timeline.panes[0]
     scene = Scene.from_snapshot(HALL, pane.setup.team, pane.simulation.observe_and_decide())
-    painter = Painter(HALL, (400, 300), LIGHT, standard_layers(), 1.0)
+    painter = Painter(HALL, (400, 300), LIGHT, build_standard_layers(), 1.0)
     # The cells of all robots are the true ones, which neither overlap nor leave gaps.
     assert scene.cells is not None
     assert sum(Polygon(cell).area for cell in scene.cells) == pytest.approx(HALL.area)

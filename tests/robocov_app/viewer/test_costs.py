@@ -13,7 +13,7 @@ from sample_sessions import HALL
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov_app.jobs.workers import DirectWorker
-from robocov_app.render.distance_field import Field
+from robocov_app.render.distance_field import DistanceField
 from robocov_app.viewer import costs as module
 from robocov_app.viewer.costs import Costs, CostService
 
@@ -116,7 +116,7 @@ def test_answers_equal_the_coverage_cost():
     assert answers[0].result.mean_distance == cost(POSITIONS).mean_distance
     assert (answers[0].time, answers[0].path) == (1.5, None)
     np.testing.assert_array_equal(answers[3].path, cost.find_path(OTHER_POSITIONS, np.array([3.5, 0.5])))
-    assert isinstance(answers[3].field, Field)
+    assert isinstance(answers[3].field, DistanceField)
     assert answers[3].field is answers[3].field
     assert costs.poll() == []
     costs.close()

@@ -21,7 +21,7 @@ def test_a_missing_legend_is_found() -> None:
 
 
 def test_missing_numbers_on_robots_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robocov_app.render.marks.SMALLEST_NUMBER", 1000.0)
+    monkeypatch.setattr("robocov_app.render.layers.robots.MIN_NUMBER_SIZE_PX", 1000.0)
     assert difference(drawn("past-light"), golden("past-light")) > TOLERANCE
 
 

@@ -14,13 +14,13 @@ from sample_sessions import advance_session, start_session
 
 from robocov.errors import MapError
 from robocov_app.cli import main
-from robocov_app.render.picture import pane_layers, standard_layers
+from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.viewer import lessons
 from robocov_app.viewer.lessons import BASE_LAYERS, check_lesson, load_lesson
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session
 from robocov_app.viewer.session.session import Session
 
-LAYERS = {layer.name for layer in (*standard_layers(), *pane_layers())}
+LAYERS = {layer.name for layer in (*build_standard_layers(), *build_pane_layers())}
 LESSON = load_lesson().lesson
 assert LESSON is not None
 

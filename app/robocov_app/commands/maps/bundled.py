@@ -5,7 +5,7 @@ from typing import Any
 
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.commands.options import JsonOption
-from robocov_app.render.density import density_kind
+from robocov_app.render.density_text import get_density_kind
 from robocov_app.terminal.output import BOLD, print_answer, print_table
 
 
@@ -43,7 +43,7 @@ def _build_row(name: str) -> dict[str, Any]:
         "height_m": high_y - low_y,
         "free_area_m2": environment.free_area,
         "starts": list(environment.starts),
-        "density": density_kind(environment),
+        "density": get_density_kind(environment),
     }
 
 

@@ -23,11 +23,13 @@ from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.team import Team
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.look.theme import Theme
-from robocov_app.render import annotations, heatmaps
+from robocov_app.render import annotations, legend_strip
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.density import range_label, value_range
+from robocov_app.render.density_shading import measure_density_range
+from robocov_app.render.density_text import describe_density_range
 from robocov_app.render.fonts import shorten_to_width
+from robocov_app.render.layers.density import build_density_entry
 from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.layout import Layout, is_inside
 
@@ -115,14 +117,14 @@ class EditorCanvas:
         scale = self.layout.scale
         legend_height = 0
         if "legend" in self.editor.shown:
-            legend_height = round((10 + annotations.LEGEND_ROW * self._legend_rows) * scale)
-        view_height = max(height - legend_height - round(annotations.STRIP * scale), 1)
+            legend_height = round((10 + legend_strip.ROW_HEIGHT_PX * self._legend_rows) * scale)
+        view_height = max(height - legend_height - round(annotations.STRIP_HEIGHT_PX * scale), 1)
         return float(left), float(top + legend_height), float(width), float(view_height)
 
     def _update_legend(self, canvas: Canvas) -> None:
         is_shown = "legend" in self.editor.shown
         self.entries = self._build_legend_entries() if is_shown else []
-        rows = max(len(annotations.legend_rows(canvas, self.entries)), 1)
+        rows = max(len(legend_strip.arrange_legend_rows(canvas, self.entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, self.editor.document, is_shown)
         # While entries come and go the legend does not shrink again, so that the map does not jump.
         self._legend_rows = max(rows, self._legend_rows) if key == self._legend_key else rows
@@ -144,8 +146,8 @@ class EditorCanvas:
         density = sketch.density
         if density is not None and not density.is_uniform and sketch.boundary:
             xs, ys = zip(*sketch.boundary, strict=True)
-            values = value_range(density, (min(xs), min(ys), max(xs), max(ys)))
-            entries.append(heatmaps.density_entry(range_label(values)))
+            low, high = measure_density_range(density, (min(xs), min(ys), max(xs), max(ys)))
+            entries.append(build_density_entry(describe_density_range(low, high)))
         return entries
 
     def fit(self, selection: Selection | None = None) -> None:
@@ -291,22 +293,24 @@ class EditorCanvas:
         labels = tuple(entry.text for entry in self.entries)
         key = (labels, box.width, canvas.theme.name, canvas.scale)
         strip = replace(canvas, surface=Surface((box.width, 1)))
-        legend = self._legend.get(None, key, lambda: annotations.legend_strip(self.entries, strip))
+        legend = self._legend.get(None, key, lambda: legend_strip.render_legend_strip(self.entries, strip))
         scene.screen.blit(legend, box)
 
     def _draw_foot(self, scene: Scene) -> None:
         """Draw the strip at the foot: scale bar, and facts about the map."""
         box = Rect(self.layout.arena)
         scale = scene.canvas.scale
-        height = round(annotations.STRIP * scale)
+        height = round(annotations.STRIP_HEIGHT_PX * scale)
         strip = Rect(box.left, box.bottom - height, box.width, height)
         canvas = replace(scene.canvas, surface=scene.screen.subsurface(strip))
         annotations.draw_scale_bar(canvas)
-        bar_width = annotations.bar_length(canvas) * canvas.camera.zoom
-        free_width = box.width - (annotations.EDGE + SCALE_BAR_LABEL_PX) * scale - bar_width
+        bar_width = annotations.choose_bar_length(canvas) * canvas.camera.zoom
+        free_width = box.width - (annotations.EDGE_PX + SCALE_BAR_LABEL_PX) * scale - bar_width
         text_size = canvas.scale_text_size(canvas.theme.text)
-        text = shorten_to_width(describe_map(self.editor), text_size, free_width - annotations.EDGE * scale)
-        canvas.draw_text(text, (box.width - annotations.EDGE * scale, height / 2), anchor="right")
+        text = shorten_to_width(
+            describe_map(self.editor), text_size, free_width - annotations.EDGE_PX * scale
+        )
+        canvas.draw_text(text, (box.width - annotations.EDGE_PX * scale, height / 2), anchor="right")
 
 
 def _find_lifted(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:

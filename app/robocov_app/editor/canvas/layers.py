@@ -18,9 +18,10 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.tools.draw_state import CarriedItems
 from robocov_app.editor.tools.handles import compute_frame, list_handles
 from robocov_app.look.colors import Color, mix
-from robocov_app.render import marks, sprites
+from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.layout import fitted_radii
+from robocov_app.render.crowding import fit_radii
+from robocov_app.render.layers.robots import READABLE_RADIUS_PX
 from robocov_app.render.surface_cache import LatestValue
 
 MANY_OBJECTS = 200  # outlines of more selected objects are drawn once, and then as a picture
@@ -141,8 +142,8 @@ class TeamAtStart:
         scale = canvas.scale
         centers = canvas.camera.to_pixels(np.array(team.positions))
         true_radii = np.full(len(centers), team.radius * canvas.camera.zoom)
-        readable = min(marks.READABLE * scale, MAX_RADIUS_PX)
-        radii = np.minimum(fitted_radii(centers, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
+        readable = min(READABLE_RADIUS_PX * scale, MAX_RADIUS_PX)
+        radii = np.minimum(fit_radii(centers, true_radii, 2.4 * scale, readable), true_radii.clip(3.0))
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
             size = round(2 * min(radius, MAX_RADIUS_PX)) / 2

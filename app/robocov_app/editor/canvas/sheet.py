@@ -17,10 +17,11 @@ from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.lengths import round_down
 from robocov_app.look.theme import LIGHT
-from robocov_app.render import fonts, heatmaps
+from robocov_app.render import fonts
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.clipping import is_within_limit
+from robocov_app.render.layers.density import draw_density_shading
 from robocov_app.render.surface_cache import LatestValue
 
 # Lengths in pixels at scale 1.
@@ -291,7 +292,7 @@ def compute_hull_excess(sketch: Sketch) -> shapely.Geometry:
 def _draw_density(canvas: Canvas, sketch: Sketch) -> None:
     density = sketch.density
     if density is not None and not density.is_uniform and sketch.boundary is not None:
-        heatmaps.draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
+        draw_density_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
 
 
 def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) -> None:

@@ -16,9 +16,9 @@ from robocov_app.formats.geometry.conversion.comparison import ImportComparison
 from robocov_app.formats.reports import format_area
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
-from robocov_app.render import layout
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
+from robocov_app.render.panel_grid import choose_column_count
 from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 
@@ -77,7 +77,7 @@ class ImportPreview:
         aspect = (high_x - low_x) / (high_y - low_y)
         caption_height = round(CAPTION_HEIGHT_PX * scale)
         gap = round(MAPS_GAP_PX * scale)
-        columns = layout.columns_for(2, aspect, box.size, caption_height)
+        columns = choose_column_count(2, aspect, box.size, row_margin=caption_height)
         width = (box.width - (columns - 1) * gap) // columns
         free_height = box.height if columns == 2 else (box.height - gap) // 2
         height = min(free_height - caption_height, round(width / aspect))

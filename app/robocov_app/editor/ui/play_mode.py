@@ -13,7 +13,7 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.render.picture import standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.input import get_key_name
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.file_actions import FileActions
@@ -188,7 +188,7 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
         session.playback.clock.budget = float("inf")
     costs = Costs(DEFAULT_LATTICE, direct=patient)
     try:
-        shown = {layer.name for layer in standard_layers() if layer.default}
+        shown = {layer.name for layer in build_standard_layers() if layer.is_default}
         viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
         viewer.view.theme = editor.theme
         drafts = TrialDrafts(editor.document, viewer.files.tried)

@@ -9,7 +9,7 @@ from matplotlib.artist import Artist
 
 from robocov_app.figures.page import SMALL, TITLE, Box, Page
 from robocov_app.look.theme import Theme
-from robocov_app.render.layout import columns_for
+from robocov_app.render.panel_grid import choose_column_count
 
 LINE_HEIGHT_PX = 17.0
 """Height of a line of the report, at scale 1."""
@@ -99,7 +99,9 @@ def lay_out_page(
     caption_width = max(
         measure_caption_indent(page, caption.name) + page.text_width(caption.facts) for caption in captions
     )
-    columns = columns_for(_ARENA_COUNT, aspect, (_MAX_WIDTH_PX, _MAX_ARENAS_HEIGHT_PX), caption_height)
+    columns = choose_column_count(
+        _ARENA_COUNT, aspect, (_MAX_WIDTH_PX, _MAX_ARENAS_HEIGHT_PX), row_margin=caption_height
+    )
     rows = _ARENA_COUNT // columns
     max_arena_height = _MAX_ARENAS_HEIGHT_PX / rows
     max_arena_width = (_MAX_WIDTH_PX - margin) / columns - margin

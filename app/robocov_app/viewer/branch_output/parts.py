@@ -10,7 +10,7 @@ from robocov.controllers import has_memory
 from robocov.environment import CircleObstacle
 from robocov.metrics import CostHistory
 from robocov.record import Record, Recorder
-from robocov_app.render.density import cost_label, mean_label
+from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import name_failed_robot
 from robocov_app.viewer.session.document import Node, SessionDocument, replay
@@ -278,6 +278,6 @@ def build_pane_scene(pane: Pane, costs: list[PartCost] | None = None, name: str 
             mean_distances += cost.history.mean_distance[is_past].tolist()
     caption = ""
     if mean_distances:
-        caption = cost_label(mean_label(pane.setup.environment), mean_distances[-1], None)
+        caption = format_cost(get_cost_name(pane.setup.environment), mean_distances[-1], None)
     snapshot = pane.simulation.observe_and_decide()
     return pane.build_scene(pane.setup, snapshot, pane.trail.get_until(pane.time), cost=caption)

@@ -8,7 +8,8 @@ import pygame
 
 from robocov_app.look.theme import Theme
 from robocov_app.render.fonts import render_text, shorten_to_width
-from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
+from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
+from robocov_app.render.painter import Painter, choose_scale
 from robocov_app.runs.encoding import Frame
 from robocov_app.runs.pane_layout import PaneLayout, build_pane_layout
 from robocov_app.runs.saved_runs import name_folders
@@ -73,7 +74,7 @@ def _build_drawer(
 ) -> "_FrameDrawer":
     widest = max(parts, key=lambda part: len(part.setups))
     width, height = settings.video_size
-    caption_height = round(CAPTION_PX * scale_for((width, height)))
+    caption_height = round(CAPTION_PX * choose_scale((width, height)))
     layout: PaneLayout | None = None
     if len(widest.setups) > 1:
         scenes = [scene for part in parts for scene in part.scenes]
@@ -135,11 +136,11 @@ class _FrameDrawer:
     def _build_painter(self, run: Lockstep) -> Painter:
         settings = self.settings
         if self.layout is None:
-            layers = standard_layers(settings.colors)
+            layers = build_standard_layers(settings.colors)
             size = self.picture_size
             scale = None
         else:
-            layers = pane_layers(settings.colors)
+            layers = build_pane_layers(settings.colors)
             size = self.layout.pane
             scale = self.layout.scale
         painter = Painter(run.scenario.environment, size, settings.color_theme, layers, scale)

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from robocov_app.look.legend import merge_legends
-from robocov_app.render.layout import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
+from robocov_app.render.crowding import (
+    choose_width_factor,
+    compute_nearest_distances,
+    fit_mark_size,
+    fit_radii,
+)
+from robocov_app.render.panel_grid import choose_column_count
 
 points = arrays(np.float64, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(0, 100, width=32))
 
@@ -23,13 +29,13 @@ def all_distances(centers):
 @settings(deadline=None, max_examples=60)
 @given(points)
 def test_the_nearest_is_the_nearest_of_all(centers):
-    assert nearest_distance(centers) == pytest.approx(all_distances(centers).min(axis=1), abs=1e-9)
+    assert compute_nearest_distances(centers) == pytest.approx(all_distances(centers).min(axis=1), abs=1e-9)
 
 
 @settings(deadline=None, max_examples=100)
 @given(points, st.floats(0, 2), st.floats(0.1, 3))
 def test_discs_overlap_only_where_they_cannot_be_smaller(centers, true, least):
-    radii = fitted_radii(centers, np.full(len(centers), true), least, 9.0)
+    radii = fit_radii(centers, np.full(len(centers), true), least, 9.0)
     smallest = max(true, least)
     assert (radii >= smallest).all() and (radii <= max(9.0, true)).all()
     free = radii > smallest
@@ -38,12 +44,12 @@ def test_discs_overlap_only_where_they_cannot_be_smaller(centers, true, least):
 
 
 def test_one_alone_is_as_large_as_can_be():
-    assert fitted_radii(np.zeros((1, 2)), np.ones(1), 2.0, 9.0).tolist() == [9.0]
-    assert mark_size(np.zeros((1, 2)), 2.0, 9.0) == mark_size(np.empty((0, 2)), 2.0, 9.0) == 9.0
+    assert fit_radii(np.zeros((1, 2)), np.ones(1), 2.0, 9.0).tolist() == [9.0]
+    assert fit_mark_size(np.zeros((1, 2)), 2.0, 9.0) == fit_mark_size(np.empty((0, 2)), 2.0, 9.0) == 9.0
 
 
 def test_lines_become_thinner_with_many_but_not_invisible():
-    widths = [line_crowding(n) for n in (1, 6, 20, 40, 80, 200, 10000)]
+    widths = [choose_width_factor(n) for n in (1, 6, 20, 40, 80, 200, 10000)]
     assert widths[:3] == [1.0, 1.0, 1.0]
     assert 1.0 > widths[3] > widths[4] == widths[-1] == 0.5
 
@@ -53,7 +59,7 @@ def test_lines_become_thinner_with_many_but_not_invisible():
     [(1, 1.0, 1), (2, 1.0, 2), (2, 3.0, 1), (3, 1.4, 3), (3, 4.0, 1), (4, 1.5, 2), (4, 0.2, 4), (6, 1.2, 3)],
 )
 def test_panels_are_as_large_as_can_be(count, aspect, columns):
-    assert columns_for(count, aspect, (1920, 1080)) == columns
+    assert choose_column_count(count, aspect, (1920, 1080)) == columns
 
 
 ENTRIES = st.lists(st.integers(0, 8), unique=True)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import groupby
 from typing import NamedTuple
 
@@ -12,130 +11,26 @@ from numpy.typing import NDArray
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, describe_unknown_name
-from robocov_app.look.robot_colors import MAX_OWN_HUES, ColorScheme, choose_robot_hues
+from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.render import annotations, forces, heatmaps, knowledge, layers, marks
-from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP
+from robocov_app.render.annotations import STRIP_HEIGHT_PX, is_low_pane
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.layers import Layer
+from robocov_app.render.color_bar import measure_color_bar
+from robocov_app.render.layer_catalog import FIELD_LAYERS, build_standard_layers
+from robocov_app.render.layers.layer import Layer
+from robocov_app.render.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, TOP_PX, arrange_legend_rows
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import LatestValue
-from robocov_app.render.trajectories import Trajectories
 
 _UNIT_WIDTH_PX = 1024
 _UNIT_HEIGHT_PX = 576
 _SCALE_STEP = 0.125
 _MIN_SCALE = 0.875
 _MAX_SCALE = 6.0
-_FIELD_LAYERS = frozenset({"distances", "geodesic_cells"})
-"""Layers that need the distances to the nearest robot."""
-_LEGEND_PADDING = 6
-"""Space above and below the legend, px at scale 1."""
-
-_extra = partial(Layer, default=False)
-_fixed = partial(Layer, static=True)
-_strip = partial(Layer, in_world=False)
 
 
-def standard_layers(trails: ColorScheme = "robots") -> list[Layer]:
-    """Build one of each layer, from the lowest to the topmost.
-
-    Parameters
-    ----------
-    trails : {"robots", "paper"}
-        Colors of the trajectories.
-
-    Returns
-    -------
-    list of Layer
-    """
-    distances = heatmaps.field_drawing(heatmaps.draw_distances)
-    geodesic = heatmaps.field_drawing(heatmaps.draw_geodesic_cells)
-    sensed = knowledge.SensedObstacles()
-    trajectories = Trajectories(trails)
-    snapshot = ("snapshot",)
-
-    def obstacles(scene: Scene) -> list[LegendEntry]:
-        return [*layers.obstacles_legend(scene), *layers.moving_legend(scene)]
-
-    return [
-        _extra("distances", "Distance map", distances, ("field",), heatmaps.distances_legend),
-        _extra("geodesic_cells", "Geodesic cells", geodesic, ("field",), heatmaps.geodesic_legend),
-        Layer("cells", "Voronoi cells", layers.draw_cells, ("cells",), layers.cells_legend),
-        _fixed("grid", "Grid", layers.draw_grid),
-        _fixed("density", "Density φ", heatmaps.draw_density, (), heatmaps.density_legend),
-        _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), obstacles),
-        _fixed("boundary", "Boundary", layers.draw_boundary),
-        _extra("sensed", "Known obstacles", sensed.draw, ("sensed", "snapshot"), knowledge.sensed_legend),
-        _extra("scan", "Ray scan", knowledge.draw_scans, ("scans",), knowledge.scans_legend),
-        forces.range_layer("sensing", "Sensing range"),
-        forces.range_layer("communication", "Comm. range"),
-        _extra("links", "Neighbors", forces.draw_links, snapshot, forces.links_legend),
-        Layer("trajectories", "Trajectories", trajectories.draw, ("trail",), trajectories.legend),
-        Layer("starts", "Starts", marks.Starts().draw, ("starts",), marks.starts_legend),
-        _extra("obstacle_points", "Nearest obstacle", forces.draw_points, snapshot, forces.points_legend),
-        _extra("goals", "Goals", marks.draw_goals, snapshot, marks.goals_legend),
-        Layer("centroids", "Centroids", marks.draw_centroids, snapshot, marks.centroids_legend),
-        forces.velocity_layer(),
-        forces.force_layer("attraction", "Attraction", "full"),
-        forces.force_layer("repulsion_robots", "Robot repulsion", "open"),
-        forces.force_layer("repulsion_obstacle", "Obstacle repulsion", "dot"),
-        forces.force_layer("viscosity", "Viscosity", "bar"),
-        forces.force_layer("resultant", "Resultant force", "full"),
-        _extra("path", "Path from cursor", knowledge.draw_path, ("path",), knowledge.path_legend),
-        Layer("failed", "Failed robots", marks.draw_failed, ("failed",), marks.failed_legend),
-        Layer("selection", "Selection", marks.draw_selection, ("snapshot", "selected"), marks.belief_legend),
-        Layer("robots", "Robots", marks.draw_robots, snapshot, marks.robots_legend),
-        _strip("color_bar", "Color scale", heatmaps.draw_color_bar, ("field",)),
-        _strip("legend", "Legend", annotations.LegendStrip().draw),
-        _strip("scale_bar", "Scale bar", annotations.draw_scale_bar),
-        _strip("status", "Status line", annotations.draw_status),
-    ]
-
-
-def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
-    """Check names of layers, which may have dashes instead of underscores.
-
-    Parameters
-    ----------
-    option : str
-        Name of the option in messages.
-    names : iterable of str
-
-    Returns
-    -------
-    frozenset of str
-        The names with underscores.
-
-    Raises
-    ------
-    ParameterError
-        If a layer is unknown.
-    """
-    known_names = [layer.name for layer in standard_layers()]
-    layer_names = [name.replace("-", "_") for name in names]
-    for name in layer_names:
-        if name not in known_names:
-            raise ParameterError(f"{option}: {describe_unknown_name('layer', name, known_names)}")
-    return frozenset(layer_names)
-
-
-def pane_layers(trails: ColorScheme = "robots") -> list[Layer]:
-    """Build the layers of one picture among several, which has a caption instead of the shared legend."""
-
-    def draw_status(canvas: Canvas, scene: Scene) -> None:
-        # The caption contains the name of the controller and the cost.
-        annotations.draw_status(canvas, replace(scene, label="", cost=""))
-
-    return [
-        *(layer for layer in standard_layers(trails) if layer.name not in ("legend", "status")),
-        _strip("caption", "Caption", annotations.draw_caption),
-        _strip("status", "Status line", draw_status),
-    ]
-
-
-def scale_for(size: tuple[int, int]) -> float:
+def choose_scale(size: tuple[int, int]) -> float:
     """Return the scale of text and lines of films: 1.25 for 1280 x 720 pixels, in steps of 1/8."""
     width, height = size
     exact = min(width / _UNIT_WIDTH_PX, height / _UNIT_HEIGHT_PX)
@@ -161,7 +56,7 @@ class Painter:
     size : (int, int), px
     theme : Theme
     layers : sequence of Layer, optional
-        From the lowest to the topmost; by default those of `standard_layers`.
+        From the lowest to the topmost; by default those of `build_standard_layers`.
     scale : float, optional
         Scale of text and lines; by default that of films.
 
@@ -182,9 +77,9 @@ class Painter:
         self.environment = environment
         self.size = size
         self.theme = theme
-        self.layers = list(layers) if layers is not None else standard_layers()
-        self.scale = scale_for(size) if scale is None else scale
-        self.visible = {layer.name for layer in self.layers if layer.default}
+        self.layers = list(layers) if layers is not None else build_standard_layers()
+        self.scale = choose_scale(size) if scale is None else scale
+        self.visible = {layer.name for layer in self.layers if layer.is_default}
         self._camera: Camera | None = None  # None shows the whole region.
         self._hues = choose_robot_hues(0)
         self._static = LatestValue[pygame.Surface]()
@@ -208,7 +103,7 @@ class Painter:
     @property
     def needs_field(self) -> bool:
         """Whether a visible layer needs the distances to the nearest robot."""
-        return not _FIELD_LAYERS.isdisjoint(self.visible)
+        return not FIELD_LAYERS.isdisjoint(self.visible)
 
     @property
     def camera(self) -> Camera:
@@ -217,7 +112,7 @@ class Painter:
         if self._camera is not None:
             return self._camera.with_view(view)
         left, top, width, height = view
-        side = MARGIN * self.scale
+        side = MARGIN_PX * self.scale
         sides = 1 if self._margins.color_bar_width else 2
         inner = (left + side, top, max(width - sides * side, 1.0), height)
         fitted = Camera.fit(self.environment.region.bounds, inner, margin=2 * self.scale)
@@ -231,12 +126,12 @@ class Painter:
         """Return left, top, width and height of the area for the world, px."""
         width, height = self.size
         rows = self._margins.legend_rows
-        top = MARGIN
+        top = MARGIN_PX
         if rows:
-            top = _LEGEND_PADDING + LEGEND_ROW * rows + _LEGEND_PADDING
+            top = TOP_PX + ROW_HEIGHT_PX * rows + TOP_PX
         has_strip = bool({"scale_bar", "status"} & self.visible)
-        is_small = annotations.is_small(height, self.scale, self.visible)
-        bottom = STRIP if has_strip and not is_small else MARGIN
+        is_low = is_low_pane(height, self.scale, self.visible)
+        bottom = STRIP_HEIGHT_PX if has_strip and not is_low else MARGIN_PX
         view_width = max(width - self._margins.color_bar_width, 1.0)
         view_height = max(height - top * self.scale - bottom * self.scale, 1.0)
         return 0.0, top * self.scale, view_width, view_height
@@ -251,7 +146,9 @@ class Painter:
 
     def legend_entries(self, scene: Scene) -> list[LegendEntry]:
         """Return the entries of the legend, those of the layers that draw something of a scene."""
-        return [entry for layer in self._list_visible() if layer.has(scene) for entry in layer.legend(scene)]
+        return [
+            entry for layer in self._list_visible() if layer.can_draw(scene) for entry in layer.legend(scene)
+        ]
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
         """Draw a scene on the whole of a surface, whose size becomes that of the painter.
@@ -276,14 +173,14 @@ class Painter:
         canvas = replace(canvas, camera=self.camera)
         clip = pygame.Rect([round(side) for side in canvas.camera.view])
         surface.fill(self.theme.background)
-        for is_static, group in groupby(self._list_visible(), key=lambda layer: layer.static):
+        for is_static, group in groupby(self._list_visible(), key=lambda layer: layer.is_static):
             if is_static:
                 page = self._get_static_page(canvas, scene, list(group), clip)
                 surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
                 continue
             for layer in group:
-                if layer.has(scene):
-                    surface.set_clip(clip if layer.in_world else None)
+                if layer.can_draw(scene):
+                    surface.set_clip(clip if layer.is_in_world else None)
                     layer.draw(canvas, scene)
         surface.set_clip(None)
 
@@ -305,8 +202,8 @@ class Painter:
         if "caption" in names:
             rows = 1
         elif "legend" in names:
-            rows = len(annotations.legend_rows(canvas, canvas.legend))
-        color_bar_width = heatmaps.bar_room(canvas, scene)
+            rows = len(arrange_legend_rows(canvas, canvas.legend))
+        color_bar_width = measure_color_bar(canvas, scene)
         key = (self.size, self.scale, canvas.visible_layers)
         if key == self._margins.key:
             rows = max(rows, self._margins.legend_rows)
@@ -348,7 +245,7 @@ class Painter:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
             page.set_clip(clip)
             for layer in layers:
-                if layer.has(scene):
+                if layer.can_draw(scene):
                     layer.draw(replace(canvas, surface=page), scene)
             return page
 

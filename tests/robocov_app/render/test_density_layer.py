@@ -14,8 +14,9 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
 from robocov_app.figures.arena import build_map_handles, draw_map, set_meter_axes
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_field import Field, FieldLattice
-from robocov_app.render.picture import Painter
+from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.field_lattice import FieldLattice
+from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 
 RING = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (2.0, 8.0))
@@ -66,7 +67,7 @@ def test_colors_of_distances_hide_it():
     painter = Painter(HEAVY, (400, 380))
     painter.show({"density", "distances", "obstacles"})
     cost = CoverageCost(HEAVY, 32)
-    field = Field(FieldLattice(cost.sites), cost(STARTS))
+    field = DistanceField(FieldLattice(cost.sites), cost(STARTS))
     with_both = painter.frame(scene_of(HEAVY, field=field, field_limit=5.0))
     painter.show({"distances", "obstacles"})
     assert np.array_equal(painter.frame(scene_of(HEAVY, field=field, field_limit=5.0)), with_both)

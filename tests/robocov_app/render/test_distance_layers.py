@@ -8,9 +8,12 @@ from drawn_run import HALL, ROOMS, run_of, scene_of
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render import heatmaps
-from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, Fields, palette
-from robocov_app.render.picture import Painter, checked_layers
+from robocov_app.render.distance_colors import MAX_LEVEL, build_palette
+from robocov_app.render.distance_field import DistanceField, DistanceFields
+from robocov_app.render.field_lattice import FieldLattice
+from robocov_app.render.layer_catalog import check_layer_names
+from robocov_app.render.layers import distances
+from robocov_app.render.painter import Painter
 
 SIZE = (560, 364)
 
@@ -19,7 +22,7 @@ def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
     record = run_of(environment, n, seed=seed)
     cost = CoverageCost(environment, 128)
     positions = environment.start("spread").sample(n, seed + 1000)
-    field = Field(FieldLattice(cost.sites), cost(positions))
+    field = DistanceField(FieldLattice(cost.sites), cost(positions))
     return cost, replace(scene_of(record), field=field, field_limit=limit)
 
 
@@ -51,7 +54,9 @@ def test_colors_are_those_of_the_exact_distances(environment, theme):
     pixels, places = free_pixels(painter, environment, 150)
     exact = cost.geodesics.compute_distances(places, what.field.result.positions).min(axis=1)
     reached = np.isfinite(exact)
-    wanted = palette(theme)[np.minimum(exact[reached] / 8.0 * FARTHEST, FARTHEST).astype(int)].astype(int)
+    wanted = build_palette(theme)[np.minimum(exact[reached] / 8.0 * MAX_LEVEL, MAX_LEVEL).astype(int)].astype(
+        int
+    )
     seen = frame[pixels[reached, 1], pixels[reached, 0]]
     assert reached.sum() > 100
     assert np.abs(seen - wanted).max(axis=1).max() <= 6
@@ -161,9 +166,9 @@ def test_the_scale_says_when_there_is_more(monkeypatch):
 def test_an_unchanged_picture_is_kept(layer, monkeypatch):
     _, what = scene()
     made = []
-    name = f"draw_{layer}"
-    real = getattr(heatmaps, name)
-    monkeypatch.setattr(heatmaps, name, lambda *args: made.append(1) or real(*args))
+    name = f"render_{layer}"
+    real = getattr(distances, name)
+    monkeypatch.setattr(distances, name, lambda *args: made.append(1) or real(*args))
     painter = Painter(ROOMS, SIZE)
     painter.change([layer], [])
     first = painter.frame(what).copy()
@@ -186,19 +191,19 @@ def test_any_zoom_shows_the_same_colors(zoom):
     frame = painter.frame(what).astype(int)
     x, y = np.rint(painter.camera.to_pixels(place)).astype(int)
     exact = cost.geodesics.compute_distances(place[None], what.field.result.positions).min()
-    wanted = palette(LIGHT)[int(exact / 8.0 * FARTHEST)]
+    wanted = build_palette(LIGHT)[int(exact / 8.0 * MAX_LEVEL)]
     assert np.abs(frame[y, x] - wanted).max() <= (60 if zoom < 1 else 6)
 
 
 def test_fields_follow_the_robots():
     cost = CoverageCost(ROOMS, 64)
-    fields = Fields(cost, 7.0)
+    fields = DistanceFields(cost, 7.0)
     place = np.array([[2.0, 2.0]])
     assert fields.limit == 7.0
-    np.testing.assert_array_equal(fields.at(place).result.distances, cost(place).distances)
+    np.testing.assert_array_equal(fields.compute_at(place).result.distances, cost(place).distances)
 
 
 def test_names_of_layers_are_checked():
-    assert checked_layers("--show", ["geodesic-cells", "grid"]) == {"geodesic_cells", "grid"}
+    assert check_layer_names("--show", ["geodesic-cells", "grid"]) == {"geodesic_cells", "grid"}
     with pytest.raises(ParameterError, match="--show: unknown layer 'distance': did you mean 'distances'"):
-        checked_layers("--show", ["distance"])
+        check_layer_names("--show", ["distance"])

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from robocov.errors import ParameterError
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render import fonts
-from robocov_app.render.picture import Painter, scale_for, standard_layers
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.render.painter import Painter, choose_scale
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
@@ -117,7 +118,7 @@ def test_the_legend_follows_the_colors_of_the_trajectories():
     scene = scene_of(run_of(ROOMS, 6))
     tops = []
     for colors in ("robots", "paper"):
-        painter = Painter(ROOMS, (640, 480), layers=standard_layers(colors))
+        painter = Painter(ROOMS, (640, 480), layers=build_standard_layers(colors))
         painter.show({"legend", "trajectories"})
         tops.append(painter.frame(scene)[:20].copy())
     assert (tops[0] != tops[1]).any()
@@ -147,7 +148,7 @@ def test_a_surface_of_another_size_is_filled():
 
 def test_what_does_not_change_is_drawn_once():
     calls = []
-    layers = standard_layers()
+    layers = build_standard_layers()
     at = [layer.name for layer in layers].index("obstacles")
     draw = layers[at].draw
     layers[at] = replace(layers[at], draw=lambda *given: (calls.append(1), draw(*given)))
@@ -178,9 +179,9 @@ def test_unknown_layers_are_named_with_the_nearest():
 
 
 def test_the_scale_grows_with_the_picture():
-    assert scale_for((1280, 720)) == 1.25
-    assert scale_for((2560, 1440)) == 2.5
-    assert 0.8 <= scale_for((320, 240)) < 1.0
+    assert choose_scale((1280, 720)) == 1.25
+    assert choose_scale((2560, 1440)) == 2.5
+    assert 0.8 <= choose_scale((320, 240)) < 1.0
 
 
 def test_labels_outlive_a_restart_of_the_font_module():
@@ -218,7 +219,7 @@ for module in ("pygame", "matplotlib"):
     assert module not in sys.modules, module
 import robocov_app.look.theme, robocov_app.render.camera, robocov_app.runs.encoding
 assert "pygame" not in sys.modules and "matplotlib" not in sys.modules
-from robocov_app.render.picture import Painter
+from robocov_app.render.painter import Painter
 frame = Painter(ROOMS, (320, 240)).frame(scene_of(run_of(ROOMS, 3)))
 assert frame.std() > 10
 import pygame

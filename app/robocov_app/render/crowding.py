@@ -1,0 +1,91 @@
+"""Sizes of marks and lines that become smaller in a crowd."""
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from robocov.arrays import Array
+
+_MAX_POINTS_WITHOUT_TREE = 120
+"""With at most this many points, comparing all pairs is faster than building a tree."""
+_MAX_SAMPLED_POINTS = 250
+"""Number of points of which the distances to neighbors are sampled for the size of marks."""
+_MAX_LINES_AT_FULL_WIDTH = 20
+_MIN_WIDTH_FACTOR = 0.5
+
+
+def compute_nearest_distances(points: Array, step: int = 1) -> Array:
+    """Return the distance of each point to the nearest other one.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+    step : int
+        If there are many points, only every `step`-th is evaluated.
+
+    Returns
+    -------
+    (m,) array
+        In the unit of the points; inf for a single point.
+    """
+    if len(points) < 2:
+        return np.full(len(points), np.inf)
+    if len(points) <= _MAX_POINTS_WITHOUT_TREE:
+        delta = points[:, None] - points[None]
+        squares = np.asarray(delta[..., 0] ** 2 + delta[..., 1] ** 2)
+        np.fill_diagonal(squares, np.inf)
+        return np.asarray(np.sqrt(squares.min(axis=1)))
+    distances, _ = KDTree(points).query(points[::step], k=[2])
+    return np.asarray(distances).ravel()
+
+
+def fit_radii(centers: Array, true_radii: Array, low: float, high: float) -> Array:
+    """Choose radii of discs so that they overlap as little as possible.
+
+    A disc has the largest radius, but reaches at most half of the way to its nearest neighbor.
+
+    Parameters
+    ----------
+    centers : (n, 2) array
+    true_radii : (n,) array
+        Discs are never smaller.
+    low, high : float
+        Smallest and largest radius.
+
+    Returns
+    -------
+    (n,) array
+    """
+    half_distances = compute_nearest_distances(centers) / 2
+    return np.asarray(np.maximum(true_radii, np.clip(half_distances, low, high)))
+
+
+def fit_mark_size(points: Array, low: float, high: float) -> float:
+    """Choose one size for all marks at some points, at which about half of them do not overlap.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+    low, high : float
+        Smallest and largest size.
+
+    Returns
+    -------
+    float
+    """
+    if not len(points):
+        return high
+    distances = compute_nearest_distances(points, 1 + len(points) // _MAX_SAMPLED_POINTS)
+    return float(np.clip(np.median(distances), low, high))
+
+
+def choose_width_factor(n_lines: int) -> float:
+    """Return the factor of the width of lines, from 1 for a few lines to 0.5 for many."""
+    factor = np.sqrt(_MAX_LINES_AT_FULL_WIDTH / max(n_lines, 1))
+    return float(np.clip(factor, _MIN_WIDTH_FACTOR, 1.0))
+
+
+def round_to_half(sizes: Any) -> Any:
+    """Round sizes, px, to halves of a pixel, so that few different marks have to be rendered."""
+    return np.round(sizes * 2) / 2

@@ -1,0 +1,75 @@
+"""The density and the coverage cost as text."""
+
+import numpy as np
+
+from robocov.environment import Environment
+from robocov_app.render.density_shading import compute_density_range
+
+
+def describe_density(environment: Environment) -> str:
+    """Return the range of the density as text; empty if the density is uniform."""
+    density = environment.density
+    if density is None or density.is_uniform:
+        return ""
+    low, high = compute_density_range(environment)
+    return describe_density_range(low, high)
+
+
+def describe_density_range(low: float, high: float) -> str:
+    """Return a range of densities as text.
+
+    Examples
+    --------
+    >>> describe_density_range(0.5, 7.5)
+    'density φ, 0.5 to 7.5'
+    """
+    return f"density φ, {low:.3g} to {high:.3g}"
+
+
+def get_density_kind(environment: Environment) -> str | None:
+    """Return the kind of the density; None for an environment without one."""
+    return None if environment.density is None else environment.density.kind
+
+
+def list_density_lines(environment: Environment) -> list[str]:
+    """Return the line below figures that are weighted by the density; none if the density is uniform."""
+    density = environment.density
+    if density is None or density.is_uniform:
+        return []
+    low, high = compute_density_range(environment)
+    return [f"weighted by φ   {density.kind}, {low:.3g} to {high:.3g}"]
+
+
+def get_cost_name(environment: Environment) -> str:
+    """Return the name of the coverage cost, which says whether a density weights it."""
+    return "mean distance by φ" if describe_density(environment) else "mean distance"
+
+
+def format_cost(name: str, mean_distance: float, mean_time: float | None = None) -> str:
+    """Return the coverage cost as text.
+
+    Values that are not finite are left out, as those of a team without a working robot.
+
+    Parameters
+    ----------
+    name : str
+        Name of the mean distance.
+    mean_distance : float, m
+    mean_time : float, s, optional
+        Mean time until the first robot arrives.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_cost("mean distance", 1.25, 3.0)
+    'mean distance 1.250 m, mean time 3.000 s'
+    """
+    texts = []
+    if np.isfinite(mean_distance):
+        texts.append(f"{name} {mean_distance:.3f} m")
+    if mean_time is not None and np.isfinite(mean_time):
+        texts.append(f"mean time {mean_time:.3f} s")
+    return ", ".join(texts)

@@ -1,0 +1,162 @@
+"""Trajectories that fade into the past."""
+
+from itertools import pairwise
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov_app.look.colors import Color
+from robocov_app.render.canvas import Canvas, premultiply
+from robocov_app.render.clipping import limit_pixels
+from robocov_app.render.sprites import Sketch, find_visible_box
+
+FADE_STEPS = 24
+"""Number of shades; a fading trajectory is drawn again this many times while it fades."""
+FADE_PIECE_PX = 4.0
+"""Distance that the fastest robot covers between two corners, at scale 1."""
+_FINENESS = 2
+"""Trajectories are drawn this many times larger, and shrunk."""
+_FADE_EXPONENT = 0.7
+"""Below 1, trajectories fade slowly at first, so that older parts can still be followed."""
+_MIN_ROUNDED_WIDTH_PX = 2.5
+"""The joints of wider lines are rounded, px."""
+
+
+RgbaColor: TypeAlias = tuple[int, int, int, int]
+
+
+class Pen(NamedTuple):
+    """Look of trajectories.
+
+    Attributes
+    ----------
+    colors : list of Color
+        Of each robot.
+    width : float, px
+    """
+
+    colors: list[Color]
+    width: float
+
+
+def draw_fading_trails(
+    page: pygame.Surface, canvas: Canvas, trail: Array, times: Array, *, fade: float, pen: Pen
+) -> None:
+    """Draw the last part of trajectories, the more transparent the older.
+
+    Parameters
+    ----------
+    page : pygame.Surface
+        Transparent surface that is drawn on.
+    canvas : Canvas
+        Its camera and scale are used.
+    trail : (k, n, 2) array, m
+        nan for absent robots.
+    times : (k,) array, s
+    fade : float, s
+        Length of the drawn part.
+    pen : Pen
+    """
+    first_row = int(np.searchsorted(times, times[-1] - fade))
+    pixels = limit_pixels(canvas.camera.to_pixels(trail[first_row:]))
+    box = find_visible_box(pixels, 5.0 + pen.width, page)
+    if box is None:
+        return
+    ages = np.ceil((times[-1] - times[first_row:]) / fade * FADE_STEPS)
+    # Rounding errors may give one more step.
+    steps = np.minimum(ages, FADE_STEPS).astype(int)
+    rows = _select_corners(pixels, steps, FADE_PIECE_PX * canvas.scale)
+    steps = steps[rows]
+    sketch = Sketch(box, _FINENESS)
+    points = (pixels[rows] - np.array(box.topleft) + 0.5) * _FINENESS
+    # Where paths cross, the newer one is on top.
+    bounds = [0, *(np.flatnonzero(np.diff(steps)) + 1).tolist(), len(rows) - 1]
+    tips = np.full((len(pen.colors), 2), np.nan)
+    for start, end in pairwise(bounds):
+        opacity = (1.0 - max(float(steps[start]) - 0.5, 0.0) / FADE_STEPS) ** _FADE_EXPONENT
+        tips = _draw_shade(sketch, points[start : end + 1], tips, opacity, pen)
+    sketch.draw_on(page)
+
+
+def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen: Pen) -> Array:
+    """Draw the part of the trajectories that has one shade.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    points : (k, n, 2) array, enlarged px
+    tips : (n, 2) array, enlarged px
+        Ends of what was drawn before; nan if nothing was.
+    opacity : float
+    pen : Pen
+
+    Returns
+    -------
+    (n, 2) array, enlarged px
+        The new tips. Those of robots that have hardly moved stay.
+    """
+    shades = {color: premultiply(color, opacity) for color in set(pen.colors)}
+    width = max(1, round(pen.width * _FINENESS))
+    is_rounded = width > _MIN_ROUNDED_WIDTH_PX * _FINENESS
+    has_moved = ~(np.abs(points - tips).max(axis=(0, 2)) < _FINENESS)
+    is_present: BoolArray = np.asarray(np.isfinite(points).all(axis=(0, 2)))
+    continues = is_present & ~np.isnan(tips[:, 0])
+    paths = points.copy()
+    paths[0, continues] = tips[continues]
+    for robot in np.flatnonzero(has_moved).tolist():
+        path = paths[:, robot]
+        lines = [path.tolist()] if is_present[robot] else _split_at_absences(path)
+        for line in lines:
+            if len(line) > 1:
+                _draw_line(sketch.large, line, shades[pen.colors[robot]], width, is_rounded=is_rounded)
+    new_tips = tips.copy()
+    new_tips[has_moved] = points[-1, has_moved]
+    return new_tips
+
+
+def _draw_line(
+    large: pygame.Surface, line: list[list[float]], color: RgbaColor, width: int, *, is_rounded: bool
+) -> None:
+    pygame.draw.lines(large, color, False, line, width)
+    if is_rounded:
+        # Lines have straight ends, which leave notches at the corners.
+        for point in line:
+            pygame.draw.circle(large, color, point, width / 2)
+
+
+def _select_corners(points: Array, steps: IntArray, min_distance: float) -> IntArray:
+    """Select the rows of trajectories that are needed to draw them: few if all robots are slow.
+
+    Parameters
+    ----------
+    points : (k, n, 2) array, px
+    steps : (k,) int array
+        Shades; rows where they change are needed.
+    min_distance : float, px
+        Distance that the fastest robot covers between two rows.
+
+    Returns
+    -------
+    (m,) int array
+    """
+    is_absent = np.isnan(points[..., 0])
+    lengths = np.hypot(*np.moveaxis(np.diff(points, axis=0), -1, 0))
+    max_lengths = np.where(np.isnan(lengths), 0.0, lengths).max(axis=1)
+    pieces = np.floor(np.cumsum(max_lengths) / min_distance)
+    changes_presence = (is_absent[1:] != is_absent[:-1]).any(axis=1)
+    starts_piece = np.diff(pieces, prepend=0.0) > 0
+    changes_shade = np.diff(steps) != 0
+    is_needed = np.append(True, starts_piece | changes_shade | changes_presence)
+    # The row before a robot joins or fails is needed as well.
+    is_needed[:-1] |= changes_presence
+    is_needed[-1] = True
+    return np.flatnonzero(is_needed)
+
+
+def _split_at_absences(path: Array) -> list[list[list[float]]]:
+    """Split a path, (k, 2), into the parts in which its robot is present."""
+    is_present = np.isfinite(path[:, 0])
+    pieces = np.split(path, np.flatnonzero(np.diff(is_present)) + 1)
+    return [piece.tolist() for piece in pieces if np.isfinite(piece[0, 0])]

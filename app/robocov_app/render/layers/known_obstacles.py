@@ -1,0 +1,163 @@
+"""The layer of known obstacles: sensed points, and the map that a robot has discovered."""
+
+from dataclasses import replace
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array, IntArray
+from robocov.planning.discovered_map import PRESUMED_WALL, UNKNOWN, WALL, DiscoveredMap
+from robocov_app.look.colors import Color, mix
+from robocov_app.render.canvas import Canvas, premultiply
+from robocov_app.render.layers.layer import build_legend
+from robocov_app.render.layers.ray_scans import draw_dots
+from robocov_app.render.layers.static_map import draw_blocked_area, draw_boundary
+from robocov_app.render.scene import Scene
+
+_CELL_OPACITIES = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}
+"""Opacity of the cells of a discovered map; free ones are transparent."""
+_UNKNOWN_FILL_STRENGTH = 0.3
+_UNKNOWN_EDGE_STRENGTH = 0.6
+"""How much of the color of an obstacle remains if no robot has sensed it."""
+_POINT_RADIUS_PX = 2.1
+"""Radius of a sensed point, at scale 1."""
+
+
+class KnownObstaclesLayer:
+    """Draws the sensed points of the selected robot or of all, above paler obstacles, and its discovered map.
+
+    Only new points are drawn on the page, which is drawn again when the view changes.
+    """
+
+    def __init__(self) -> None:
+        self._page = pygame.Surface((0, 0))
+        self._key: object = None
+        # The objects themselves, not their ids, which others may get once these are gone.
+        self._sources: tuple[object, object] = (None, None)
+        self._drawn_points = np.empty((0, 2))
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw what is known at the time of a scene."""
+        assert scene.sensed is not None
+        points, robots = scene.sensed.get_until(scene.now.time)
+        selected = None if scene.selected is None else scene.get_number(scene.selected)
+        if not self._is_continued(canvas, scene, points):
+            self._start_page(canvas, scene)
+        self._add_points(canvas, points, robots, selected)
+        canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        discovered = get_discovered_map(scene)
+        if discovered is not None:
+            draw_discovered_map(canvas, discovered)
+
+    def _is_continued(self, canvas: Canvas, scene: Scene, points: Array) -> bool:
+        """Return whether the page shows the first of the points, (k, 2) m, in the same view."""
+        count = len(self._drawn_points)
+        is_same_source = self._sources[0] is scene.environment and self._sources[1] is scene.sensed
+        is_same_view = self._key == _build_key(canvas, scene)
+        has_last_point = np.array_equal(points[count - 1 : count], self._drawn_points[-1:])
+        return is_same_source and is_same_view and has_last_point
+
+    def _start_page(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw a page with pale obstacles, without points."""
+        self._key = _build_key(canvas, scene)
+        self._sources = (scene.environment, scene.sensed)
+        self._drawn_points = np.empty((0, 2))
+        self._page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+        self._page.set_clip(canvas.surface.get_clip())
+        if "obstacles" not in canvas.visible_layers:
+            return
+        page = replace(canvas, surface=self._page)
+        fill, edge = _get_pale_colors(canvas)
+        draw_blocked_area(page, scene, fill=fill, moving_fill=fill, edge=edge)
+        if "boundary" in canvas.visible_layers:
+            # The obstacles have covered parts of it.
+            draw_boundary(page, scene)
+
+    def _add_points(self, canvas: Canvas, points: Array, robots: IntArray, selected: int | None) -> None:
+        """Draw the points, (k, 2) m, that are not on the page yet; with a selected robot only its own."""
+        count = len(self._drawn_points)
+        if count < len(points):
+            new_points = points[count:]
+            if selected is not None:
+                new_points = new_points[robots[count:] == selected]
+            page = replace(canvas, surface=self._page)
+            centers = canvas.camera.to_pixels(new_points)
+            color = canvas.theme.forces["repulsion_obstacle"]
+            draw_dots(page, centers, _POINT_RADIUS_PX * canvas.scale, color)
+        self._drawn_points = points
+
+
+def _build_key(canvas: Canvas, scene: Scene) -> tuple[object, ...]:
+    """Return what the page depends on in addition to the points."""
+    selected = None if scene.selected is None else scene.get_number(scene.selected)
+    return (
+        canvas.camera,
+        canvas.theme.name,
+        canvas.scale,
+        canvas.surface.get_size(),
+        tuple(canvas.surface.get_clip()),
+        canvas.visible_layers,
+        selected,
+    )
+
+
+def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
+    """Return the map that the selected robot has discovered; None if its controller has no maps."""
+    if scene.snapshot is None or scene.selected is None:
+        return None
+    # Memories of controllers, also of those of users, have no common base class.
+    maps = getattr(scene.snapshot.decision.memory, "maps", ())
+    if scene.selected >= len(maps):
+        return None
+    known_map = maps[scene.selected]
+    return known_map if isinstance(known_map, DiscoveredMap) else None
+
+
+def draw_discovered_map(canvas: Canvas, known_map: DiscoveredMap) -> None:
+    """Draw the visible cells of a discovered map: a veil over unknown ones, and walls."""
+    raster = known_map.raster
+    clip = canvas.surface.get_clip()
+    clip_corners = np.array([clip.topleft, clip.bottomright], dtype=float)
+    rows, columns = raster.find_cells(canvas.camera.to_world(clip_corners))
+    visible = (slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1))
+    low = np.array([columns.min(), rows.min()])
+    high = np.array([columns.max() + 1, rows.max() + 1])
+    ends = canvas.camera.to_pixels(np.array(raster.origin) + np.array([low, high]) * raster.cell_size)
+    (left, bottom), (right, top) = ends.round().astype(int).tolist()
+    if right <= left or bottom <= top:
+        return
+    state = np.minimum(known_map.state[visible], WALL)
+    is_inside = ~raster.is_outside[visible]
+    pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
+    for value, opacity in _CELL_OPACITIES.items():
+        is_unknown = value == UNKNOWN
+        color = canvas.theme.obstacle if is_unknown else canvas.theme.forces["repulsion_obstacle"]
+        pixels[(state == value) & is_inside] = premultiply(color, opacity)
+    # The lowest row comes first in the map, and the highest one in a picture.
+    upright = np.ascontiguousarray(pixels[::-1])
+    picture = pygame.image.frombuffer(upright.tobytes(), (state.shape[1], state.shape[0]), "RGBA")
+    scaled = pygame.transform.scale(picture, (right - left, bottom - top))
+    canvas.surface.blit(scaled, (left, top), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def _get_pale_colors(canvas: Canvas) -> tuple[Color, Color]:
+    """Return fill and edge of obstacles that no robot knows."""
+    theme = canvas.theme
+    fill = mix(theme.background, theme.obstacle, _UNKNOWN_FILL_STRENGTH)
+    edge = mix(theme.background, theme.obstacle_edge, _UNKNOWN_EDGE_STRENGTH)
+    return fill, edge
+
+
+def _draw_known_obstacle_symbol(canvas: Canvas, x: float, y: float) -> None:
+    half_width = 8 * canvas.scale
+    top = y - 2 * canvas.scale
+    fill, edge = _get_pale_colors(canvas)
+    box = pygame.Rect(round(x - half_width), round(top), round(2 * half_width), round(6 * canvas.scale))
+    pygame.draw.rect(canvas.surface, fill, box)
+    pygame.draw.rect(canvas.surface, edge, box, canvas.scale_width(1.0))
+    dots = np.column_stack([x + half_width * np.array([-0.9, -0.3, 0.3, 0.9]), np.full(4, top)])
+    color = canvas.theme.forces["repulsion_obstacle"]
+    draw_dots(canvas, dots, _POINT_RADIUS_PX * canvas.scale, color)
+
+
+build_known_obstacles_legend = build_legend("known obstacles", _draw_known_obstacle_symbol)

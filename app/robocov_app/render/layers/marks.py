@@ -1,0 +1,132 @@
+"""Layers of marks: starts, goals and centroids of cells."""
+
+from functools import partial
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array
+from robocov_app.look import legend
+from robocov_app.render import sprites
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, PlacedSprites, Sprite
+from robocov_app.render.crowding import fit_mark_size, round_to_half
+from robocov_app.render.layers.layer import build_legend
+from robocov_app.render.layers.robots import compute_drawn_radii
+from robocov_app.render.scene import Scene, are_centroids
+from robocov_app.render.surface_cache import LatestValue
+
+# Lengths in pixels at scale 1.
+_MIN_MARK_PX = 5.0
+_START_SIZE_PX = 9.0
+_CENTROID_SIZE_PX = 11.0
+_START_SYMBOL_RADIUS_PX = 4.5
+_GOAL_ARM_PX = 5.5
+
+
+class StartsLayer:
+    """Draws rings at the starts; their positions are computed again when the view changes."""
+
+    def __init__(self) -> None:
+        self._rings = LatestValue[PlacedSprites]()
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw the starts of a scene."""
+        starts = scene.starts
+        assert starts is not None
+
+        def place_rings() -> PlacedSprites:
+            centers = canvas.camera.to_pixels(starts)
+            size = fit_mark_size(centers, _MIN_MARK_PX * canvas.scale, _START_SIZE_PX * canvas.scale)
+            return canvas.place_sprites([_build_start_ring(canvas, round_to_half(0.5 * size))], centers)
+
+        key = (canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size())
+        canvas.surface.fblits(self._rings.get(starts, key, place_rings), pygame.BLEND_PREMULTIPLIED)
+
+
+def _build_start_ring(canvas: Canvas, radius: float) -> Sprite:
+    width = min(1.6 * canvas.scale, 0.4 * radius)
+    return partial(sprites.render_ring, radius, canvas.theme.start, width)
+
+
+def _draw_start_symbol(canvas: Canvas, x: float, y: float) -> None:
+    canvas.draw_sprite(_build_start_ring(canvas, _START_SYMBOL_RADIUS_PX * canvas.scale), (x, y))
+
+
+build_starts_legend = build_legend(legend.START, _draw_start_symbol)
+
+
+def draw_centroids(canvas: Canvas, scene: Scene) -> None:
+    """Draw a plus at each centroid or a times sign at each goal, except where a robot has arrived."""
+    name, targets = _choose_targets(scene)
+    if not name:
+        return
+    centers = canvas.camera.to_pixels(targets)
+    distances = np.hypot(*(centers - canvas.camera.to_pixels(scene.now.positions)).T)
+    has_target = np.isfinite(distances)
+    size = fit_mark_size(centers[has_target], _MIN_MARK_PX * canvas.scale, _CENTROID_SIZE_PX * canvas.scale)
+    is_away = distances > compute_drawn_radii(canvas, scene)
+    cross = _build_cross(canvas, name, round_to_half(0.5 * size))
+    canvas.draw_sprites([cross], centers[has_target & is_away])
+
+
+def build_centroids_legend(scene: Scene) -> list[LegendEntry]:
+    """Build the legend of centroids or goals, whichever are drawn."""
+    name, _ = _choose_targets(scene)
+    return [LegendEntry(name, _build_cross_glyph(name))] if name else []
+
+
+def _choose_targets(scene: Scene) -> tuple[str, Array]:
+    """Return the name and positions, (n, 2) m, of what robots head for: centroids, if goals equal them.
+
+    The name is empty if there are no goals.
+    """
+    goals = None if scene.snapshot is None else scene.snapshot.decision.goals
+    if goals is None or scene.centroids is None:
+        return "", np.empty((0, 2))
+    cells = scene.now.decision.cells
+    # Robots that do not hear all others compute other cells than the drawn ones. With the centroids of the
+    # drawn ones, the name would change with each lost message.
+    centroids = scene.centroids if cells is None else cells.centroid
+    if centroids.shape == goals.shape and are_centroids(goals, centroids):
+        return legend.CELL_CENTROID, scene.centroids
+    return legend.GOAL, goals
+
+
+def draw_goals(canvas: Canvas, scene: Scene) -> None:
+    """Draw a times sign at each goal, joined to its robot."""
+    if scene.now.decision.goals is None:
+        return
+    goals = canvas.camera.to_pixels(scene.now.decision.goals)
+    centers = canvas.camera.to_pixels(scene.now.positions)
+    has_goal = np.isfinite(goals).all(axis=1)
+    for center, goal in zip(centers[has_goal].tolist(), goals[has_goal].tolist(), strict=True):
+        canvas.draw_dashed_line(center, goal, canvas.theme.faint)
+    canvas.draw_sprites([_build_cross(canvas, legend.GOAL, _GOAL_ARM_PX * canvas.scale)], goals)
+
+
+def _build_cross(canvas: Canvas, name: str, arm: float) -> Sprite:
+    """Return the mark of centroids or goals; `arm` is half its size, px."""
+    theme = canvas.theme
+    is_goal = name == legend.GOAL
+    color = theme.final if is_goal else theme.ink
+    width = min(1.8 * canvas.scale, 0.4 * arm) if is_goal else min(1.3 * canvas.scale, 0.3 * arm)
+    return partial(
+        sprites.render_cross,
+        arm,
+        color=color,
+        halo=theme.background,
+        width=width,
+        is_diagonal=is_goal,
+    )
+
+
+def _build_cross_glyph(name: str) -> Glyph:
+    def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
+        canvas.draw_sprite(_build_cross(canvas, name, _GOAL_ARM_PX * canvas.scale), (x, y))
+
+    return draw_symbol
+
+
+build_goals_legend = build_legend(
+    legend.GOAL, _build_cross_glyph(legend.GOAL), lambda scene: scene.now.decision.goals is not None
+)

@@ -1,0 +1,92 @@
+"""Layers of what robots perceive at the moment: ranges, neighbors and nearest obstacle points."""
+
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov_app.look.colors import mix
+from robocov_app.render import sprites
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.layers.layer import Layer, build_legend
+from robocov_app.render.scene import Scene
+from robocov_app.render.sprites import Pixel
+
+_RANGE_SYMBOL_RADIUS_PX = 6.5
+_POINT_RADIUS_PX = 3.0
+
+
+def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> Layer:
+    """Build the layer of finite sensing ranges, solid circles, or communication ranges, dashed ones."""
+    is_dashed = kind == "communication"
+
+    def get_ranges(scene: Scene) -> Array:
+        return scene.team.communication_range if is_dashed else scene.team.sensing_range
+
+    def draw(canvas: Canvas, scene: Scene) -> None:
+        centers = canvas.camera.to_pixels(scene.now.positions).tolist()
+        ranges = get_ranges(scene).tolist()
+        for center, range_, hue in zip(centers, ranges, canvas.hues.tolist(), strict=True):
+            if np.isfinite(range_):
+                color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
+                canvas.draw_circle(center, range_ * canvas.camera.zoom, color, is_dashed=is_dashed)
+
+    def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
+        radius = _RANGE_SYMBOL_RADIUS_PX * canvas.scale
+        canvas.draw_circle((x, y), radius, canvas.theme.ink, is_dashed=is_dashed)
+
+    legend = build_legend(
+        f"{kind} range", draw_symbol, lambda scene: bool(np.isfinite(get_ranges(scene)).any())
+    )
+    return Layer(kind, title, draw, ("snapshot",), legend, is_default=False)
+
+
+def draw_links(canvas: Canvas, scene: Scene) -> None:
+    """Draw lines between neighbors; if all robots are neighbors, only between adjacent cells."""
+    pairs = _list_links(scene)
+    if pairs is None:
+        return
+    for start, end in canvas.camera.to_pixels(scene.now.positions)[pairs].tolist():
+        _draw_link(canvas, start, end)
+
+
+def _list_links(scene: Scene) -> IntArray | None:
+    """Return pairs of robots, (k, 2); None if the adjacency of the cells is not known."""
+    neighbors = scene.now.seen.neighbors
+    if neighbors.is_complete:
+        return scene.adjacency
+    pairs = np.column_stack(neighbors.list_pairs())
+    return pairs[pairs[:, 0] < pairs[:, 1]]
+
+
+def _draw_link(canvas: Canvas, start: Pixel, end: Pixel) -> None:
+    color = mix(canvas.theme.background, canvas.theme.final, 0.7)
+    canvas.draw_line(start, end, color, canvas.scale_width(canvas.theme.line))
+
+
+def _draw_link_symbol(canvas: Canvas, x: float, y: float) -> None:
+    start, end = canvas.get_symbol_line(x, y, 9)
+    _draw_link(canvas, start, end)
+
+
+build_links_legend = build_legend("neighbors", _draw_link_symbol)
+
+
+def draw_obstacle_points(canvas: Canvas, scene: Scene) -> None:
+    """Draw the nearest obstacle point of each robot that senses one, joined to the robot."""
+    points = canvas.camera.to_pixels(scene.now.seen.obstacle_points)
+    centers = canvas.camera.to_pixels(scene.now.positions)
+    is_sensed = np.isfinite(points).all(axis=1)
+    color = canvas.theme.forces["repulsion_obstacle"]
+    for point, center in zip(points[is_sensed].tolist(), centers[is_sensed].tolist(), strict=True):
+        canvas.draw_dashed_line(center, point, color, dash=3.0)
+        _draw_obstacle_point(canvas, point[0], point[1])
+
+
+def _draw_obstacle_point(canvas: Canvas, x: float, y: float) -> None:
+    color = canvas.theme.forces["repulsion_obstacle"]
+    canvas.draw_sprite(partial(sprites.render_dot, _POINT_RADIUS_PX * canvas.scale, color), (x, y))
+
+
+build_obstacle_points_legend = build_legend("nearest obstacle point", _draw_obstacle_point)

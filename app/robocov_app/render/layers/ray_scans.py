@@ -1,0 +1,135 @@
+"""The layer of ray scans: what range sensors measure all around."""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array
+from robocov_app.look.colors import Color, mix
+from robocov_app.render import sprites
+from robocov_app.render.canvas import Canvas, premultiply
+from robocov_app.render.clipping import clip_polygon, clip_segment, limit_pixels
+from robocov_app.render.layers.layer import build_legend
+from robocov_app.render.scene import Scene
+
+_FINENESS = 2
+"""Scans are drawn larger and shrunk: drawing hundreds of smooth rays would take far longer."""
+_HIT_RADIUS_PX = 1.5
+"""Radius of the end of a ray, at scale 1."""
+_MIN_RAY_GAP_PX = 5.0
+"""Minimum distance between rays, at scale 1; closer to the robot every second one is left out."""
+_FIRST_RAY_PX = 12.0
+"""Distance from the robot at which rays start, at scale 1."""
+_MAX_RANGE_TOLERANCE = 1e-6
+_AREA_OPACITY = 0.11
+_RAY_OPACITY = 0.3
+_OUTLINE_OPACITY = 0.4
+
+
+class _Scan(NamedTuple):
+    """A scan on a surface.
+
+    Attributes
+    ----------
+    position : (2,) array, px
+        Of the sensor.
+    ends : (r, 2) array, px
+        Of the rays.
+    """
+
+    position: Array
+    ends: Array
+
+    @property
+    def hits(self) -> Array:
+        """Ends of the rays that are shorter than the longest one, (k, 2) px."""
+        lengths = np.hypot(*(self.ends - self.position).T)
+        return np.asarray(self.ends[lengths < lengths.max() * (1.0 - _MAX_RANGE_TOLERANCE)])
+
+
+def draw_dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> None:
+    """Draw dots; where several have the same place, only one.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    centers : (n, 2) array, px
+    radius : float, px
+    color : Color
+    """
+    quarters = np.unique(np.rint((centers + 0.5) * sprites.FINENESS), axis=0)
+    different = quarters / sprites.FINENESS - 0.5
+    canvas.draw_sprites([partial(sprites.render_dot, radius, color)], different)
+
+
+def draw_scans(canvas: Canvas, scene: Scene) -> None:
+    """Draw the scanned area of each range sensor, its rays, and dots where they hit an obstacle."""
+    to_pixels = canvas.camera.to_pixels
+    scans = [_Scan(to_pixels(position), to_pixels(ends)) for position, ends in scene.scans]
+    all_ends = np.concatenate([scan.ends for scan in scans])
+    box = sprites.find_visible_box(limit_pixels(all_ends), 3.0, canvas.surface)
+    if box is None:
+        return
+    sketch = sprites.Sketch(box, _FINENESS)
+    _draw_large_scans(sketch, canvas, scans)
+    sketch.draw_on(canvas.surface)
+    hits = np.concatenate([scan.hits for scan in scans])
+    draw_dots(canvas, hits, _HIT_RADIUS_PX * canvas.scale, canvas.theme.final)
+
+
+def _draw_large_scans(sketch: sprites.Sketch, canvas: Canvas, scans: list[_Scan]) -> None:
+    """Draw scans on a sketch. Drawing replaces colors, so that overlapping scans are not darker."""
+    color = canvas.theme.final
+    large = sketch.large
+    corner = np.array(sketch.box.topleft) - 0.5
+    large_scans = [
+        _Scan((scan.position - corner) * _FINENESS, (scan.ends - corner) * _FINENESS) for scan in scans
+    ]
+    outlines: list[Array] = []
+    for scan in large_scans:
+        outlines += clip_polygon(scan.ends)
+    for outline in outlines:
+        pygame.draw.polygon(large, premultiply(color, _AREA_OPACITY), np.rint(outline).tolist())
+    for scan in large_scans:
+        _draw_rays(large, scan, canvas)
+    for outline in outlines:
+        pygame.draw.lines(large, premultiply(color, _OUTLINE_OPACITY), True, outline.tolist(), _FINENESS)
+
+
+def _draw_rays(large: pygame.Surface, scan: _Scan, canvas: Canvas) -> None:
+    along = scan.ends - scan.position
+    lengths = np.hypot(along[:, 0], along[:, 1])
+    starts = _choose_ray_starts(len(scan.ends)) * canvas.scale * _FINENESS
+    is_visible = lengths > starts + _FINENESS
+    fractions = starts[is_visible] / lengths[is_visible]
+    first_points = scan.position + along[is_visible] * fractions[:, None]
+    color = premultiply(canvas.theme.final, _RAY_OPACITY)
+    width = max(1, round(0.5 * canvas.scale * _FINENESS))
+    for start, end in zip(first_points.tolist(), scan.ends[is_visible].tolist(), strict=True):
+        visible_ends = clip_segment(start, end)
+        if visible_ends:
+            pygame.draw.line(large, color, visible_ends[0], visible_ends[1], width)
+
+
+def _choose_ray_starts(n_rays: int) -> Array:
+    """Return the distance from the robot at which each ray starts, px at scale 1."""
+    rays = np.arange(n_rays)
+    starts = np.full(n_rays, _MIN_RAY_GAP_PX * n_rays / (2 * np.pi))
+    for divisor in (2, 4, 8):
+        starts[rays % divisor == 0] /= 2
+    return np.asarray(np.maximum(starts, _FIRST_RAY_PX))
+
+
+def _draw_scan_symbol(canvas: Canvas, x: float, y: float) -> None:
+    size = 8 * canvas.scale
+    angles = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+    ends = np.column_stack([x - size + 2 * size * np.cos(angles), y + 1.15 * size * np.sin(angles)])
+    ray_color = mix(canvas.theme.background, canvas.theme.final, 0.55)
+    for end in ends.tolist():
+        canvas.draw_line((x - size, y), end, ray_color)
+    draw_dots(canvas, ends, _HIT_RADIUS_PX * canvas.scale, canvas.theme.final)
+
+
+build_scans_legend = build_legend("ray scan", _draw_scan_symbol)

@@ -1,0 +1,258 @@
+"""Layers of robots: working ones, failed ones and the selected one."""
+
+from functools import lru_cache, partial
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.voronoi import VoronoiPartition
+from robocov_app.look import legend
+from robocov_app.look.colors import Color, mix
+from robocov_app.render import sprites
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas, LegendEntry, Sprite
+from robocov_app.render.crowding import fit_radii, round_to_half
+from robocov_app.render.layers.layer import build_legend
+from robocov_app.render.scene import Scene
+
+# Lengths in pixels at scale 1.
+READABLE_RADIUS_PX = 9.0
+"""Radius of robots that are not in a crowd: their numbers are readable."""
+MIN_RADIUS_PX = 2.4
+MIN_NUMBER_SIZE_PX = 6.6
+"""Smaller numbers are left out."""
+_MAX_RADIUS_PX = 400.0
+"""Maximum radius, px of the surface."""
+_RING_WIDTH_PX = 1.6
+_FAILED_SIZE_FACTOR = 0.85
+"""Size of failed robots compared with working ones."""
+_NUMBER_GAP_PX = 3.0
+"""Space between a failed robot and its number."""
+_INK_HALF_HEIGHT = 0.4
+"""Half the height of digits, as a fraction of the text size."""
+_NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))
+"""Positions of the number of a failed robot: right, left, above, below."""
+
+
+def compute_drawn_radii(canvas: Canvas, scene: Scene) -> Array:
+    """Compute the radii at which robots are drawn: readable ones, in a crowd down to the true ones.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    scene : Scene
+
+    Returns
+    -------
+    (n,) array, px
+        In steps of half a pixel.
+    """
+    return _compute_drawn_radii(scene, canvas.camera, canvas.scale)
+
+
+# Several layers need the radii in each frame.
+@lru_cache(maxsize=8)
+def _compute_drawn_radii(scene: Scene, camera: Camera, scale: float) -> Array:
+    if scene.snapshot is None:
+        return np.empty(0)
+    centers = camera.to_pixels(scene.snapshot.positions)
+    true_radii = scene.team.radius * camera.zoom
+    radii = fit_radii(centers, true_radii, MIN_RADIUS_PX * scale, READABLE_RADIUS_PX * scale)
+    return np.asarray(round_to_half(np.minimum(radii, _MAX_RADIUS_PX)))
+
+
+def draw_robots(canvas: Canvas, scene: Scene) -> None:
+    """Draw the robots as discs with their numbers; those of unicycles have a nose."""
+    centers = canvas.camera.to_pixels(scene.now.positions)
+    radii = compute_drawn_radii(canvas, scene)
+    if scene.now.steering is not None:
+        headings = scene.now.steering[:, 0]
+        _draw_noses(canvas, centers, radii, headings, np.flatnonzero(scene.team.is_unicycle))
+    ring_widths = np.minimum(_RING_WIDTH_PX * canvas.scale, round_to_half(0.3 * radii))
+    numbers = _choose_numbers(canvas, scene, radii - ring_widths)
+    # In a crowd many robots look the same.
+    indices_by_look: dict[tuple[float, float, int, int], int] = {}
+    looks = zip(radii.tolist(), ring_widths.tolist(), canvas.hues.tolist(), numbers.tolist(), strict=True)
+    indices = [indices_by_look.setdefault(look, len(indices_by_look)) for look in looks]
+    discs = []
+    for radius, ring_width, hue, number in indices_by_look:
+        text = str(number) if number else ""
+        discs.append(_build_disc(canvas, radius, ring_width, hue, text))
+    canvas.draw_sprites(discs, centers, np.array(indices, dtype=int))
+
+
+def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: Array) -> IntArray:
+    """Return the number on the disc of each robot; 0 if it would be too small."""
+    numbers = np.array([scene.get_number(row) for row in range(len(inner_radii))], dtype=int)
+    n_digits = 1 + np.digitize(numbers, [10, 100, 1000])
+    sizes = sprites.choose_number_size(inner_radii, n_digits)
+    return np.where(sizes < MIN_NUMBER_SIZE_PX * canvas.scale, 0, numbers)
+
+
+def _draw_noses(canvas: Canvas, centers: Array, radii: Array, headings: Array, robots: IntArray) -> None:
+    """Draw the noses of some robots; headings are in radians."""
+    directions = np.rint(headings * (sprites.N_NOSE_DIRECTIONS / (2.0 * np.pi))).astype(int)
+    noses = []
+    for radius, direction in zip(
+        radii.tolist(), (directions % sprites.N_NOSE_DIRECTIONS).tolist(), strict=True
+    ):
+        nose_radius = min(radius, sprites.MAX_FINE_RADIUS_PX)
+        noses.append(
+            partial(sprites.render_nose, nose_radius, canvas.theme.ink, canvas.theme.background, direction)
+        )
+    canvas.draw_sprites(noses, centers[robots], robots)
+
+
+def _build_disc(canvas: Canvas, radius: float, ring_width: float, hue: int, text: str) -> Sprite:
+    theme = canvas.theme
+    return partial(
+        sprites.render_disc,
+        radius,
+        fill=theme.robots[hue],
+        ring=theme.robot_ring,
+        ring_width=ring_width,
+        edge=mix(theme.background, theme.ink, 0.55),
+        text=text,
+    )
+
+
+def _draw_robot_symbol(canvas: Canvas, x: float, y: float) -> None:
+    disc = _build_disc(canvas, 6.5 * canvas.scale, 1.4 * canvas.scale, 0, "")
+    canvas.draw_sprite(disc, (x, y))
+
+
+build_robots_legend = build_legend(legend.ROBOT, _draw_robot_symbol)
+
+
+def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
+    """Draw failed robots crossed out, with their numbers next to them."""
+    failed_centers = canvas.camera.to_pixels(np.array(list(scene.failed.values())))
+    working_centers = np.empty((0, 2))
+    true_radii = [scene.get_failed_radius(number) for number in scene.failed]
+    if scene.snapshot is not None:
+        working_centers = canvas.camera.to_pixels(scene.snapshot.positions)
+        true_radii += scene.team.radius.tolist()
+    centers = np.concatenate([failed_centers, working_centers])
+    fitted = fit_radii(
+        centers,
+        np.array(true_radii) * canvas.camera.zoom,
+        MIN_RADIUS_PX * canvas.scale,
+        _FAILED_SIZE_FACTOR * READABLE_RADIUS_PX * canvas.scale,
+    )
+    failed_radii = round_to_half(np.minimum(fitted[: len(failed_centers)], _MAX_RADIUS_PX))
+    all_radii = np.concatenate([failed_radii, compute_drawn_radii(canvas, scene)])
+    for number, center, radius in zip(scene.failed, failed_centers, failed_radii.tolist(), strict=True):
+        _draw_failed_robot(canvas, center[0], center[1], radius)
+        position = _choose_number_position(canvas, str(number), center, radius, (centers, all_radii))
+        size = canvas.theme.small_text
+        canvas.draw_text(str(number), position, size=size, bold=True, anchor="middle")
+
+
+def _choose_number_position(
+    canvas: Canvas, text: str, center: Array, radius: float, robots: tuple[Array, Array]
+) -> list[float]:
+    """Return the middle of the number of a failed robot, px.
+
+    The first position with enough space is chosen, so that numbers do not jump when others pass by; if there
+    is none, the one with the most space. `robots` are the centers, (n, 2) px, and radii, (n,) px, of all.
+    """
+    centers, radii = robots
+    size = canvas.theme.small_text
+    half_width = canvas.measure_text(text, size, bold=True) / 2
+    half_height = _INK_HALF_HEIGHT * canvas.scale_text_size(size)
+    gap = _NUMBER_GAP_PX * canvas.scale
+    best_space = -np.inf
+    best_position: list[float] = []
+    for side, down in _NUMBER_SIDES:
+        dx = side * (radius + gap + half_width)
+        dy = down * (radius + gap + half_height)
+        position = center + np.array([dx, dy])
+        outside = np.maximum(np.abs(centers - position) - np.array([half_width, half_height]), 0.0)
+        space = float((np.hypot(outside[:, 0], outside[:, 1]) - radii).min())
+        sufficient_space = min(space, 0.5 * gap)
+        if sufficient_space > best_space:
+            best_space = sufficient_space
+            best_position = position.tolist()
+    return best_position
+
+
+def _draw_failed_robot(canvas: Canvas, x: float, y: float, radius: float) -> None:
+    theme = canvas.theme
+    edge = mix(theme.background, theme.ink, 0.75)
+    disc = partial(
+        sprites.render_disc,
+        radius,
+        fill=mix(theme.background, theme.ink, 0.3),
+        ring=edge,
+        ring_width=min(1.2 * canvas.scale, 0.25 * radius),
+        edge=edge,
+    )
+    canvas.draw_sprite(disc, (x, y))
+    # The cross reaches beyond the edge; inside, it would look like the sign of a button.
+    cross = partial(
+        sprites.render_cross,
+        round_to_half(1.1 * radius),
+        color=theme.ink,
+        halo=theme.background,
+        width=min(1.7 * canvas.scale, 0.35 * radius),
+        is_diagonal=True,
+    )
+    canvas.draw_sprite(cross, (x, y))
+
+
+def _draw_failed_symbol(canvas: Canvas, x: float, y: float) -> None:
+    _draw_failed_robot(canvas, x, y, 6.0 * canvas.scale)
+
+
+build_failed_robots_legend = build_legend(legend.FAILED_ROBOT, _draw_failed_symbol)
+
+
+def draw_selection(canvas: Canvas, scene: Scene) -> None:
+    """Draw a ring around the selected robot and, if messages fail, its cell and positions it believes."""
+    assert scene.selected is not None
+    robot = scene.selected
+    positions = canvas.camera.to_pixels(scene.now.positions).tolist()
+    if scene.now.seen.reported_positions is not None:
+        _draw_believed_cell(canvas, scene, robot)
+        _draw_believed_positions(canvas, scene, robot, positions)
+    radius = compute_drawn_radii(canvas, scene)[robot] + 4.0 * canvas.scale
+    ring = partial(sprites.render_ring, radius, canvas.theme.ink, 2.2 * canvas.scale)
+    canvas.draw_sprite(ring, positions[robot])
+
+
+def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
+    """Draw the outline of the cell that a robot computes."""
+    cells = scene.now.decision.cells
+    if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
+        corners = canvas.camera.to_pixels(cells.polygons[robot])
+        canvas.draw_outline(corners, canvas.theme.ink, canvas.scale_width(1.6 * canvas.theme.line))
+
+
+def _draw_believed_positions(canvas: Canvas, scene: Scene, robot: int, positions: list[list[float]]) -> None:
+    """Draw where a robot believes itself and its neighbors, joined to their true positions, px."""
+    seen = scene.now.seen
+    robots = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
+    believed = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])
+    for other, position in zip(robots, canvas.camera.to_pixels(believed).tolist(), strict=True):
+        hue = int(canvas.hues[other])
+        canvas.draw_dashed_line(positions[other], position, _get_belief_color(canvas, hue), dash=3.0)
+        _draw_belief_ring(canvas, hue, position[0], position[1])
+
+
+def _get_belief_color(canvas: Canvas, hue: int) -> Color:
+    return mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
+
+
+def _draw_belief_ring(canvas: Canvas, hue: int, x: float, y: float) -> None:
+    color = _get_belief_color(canvas, hue)
+    ring = partial(sprites.render_ring, 5.0 * canvas.scale, color, 1.6 * canvas.scale)
+    canvas.draw_sprite(ring, (x, y))
+
+
+def build_selection_legend(scene: Scene) -> list[LegendEntry]:
+    """Build the legend of the positions that the selected robot believes, if messages fail."""
+    assert scene.selected is not None
+    if scene.now.seen.reported_positions is None:
+        return []
+    text = f"as robot {scene.get_number(scene.selected)} believes"
+    return [LegendEntry(text, lambda canvas, x, y: _draw_belief_ring(canvas, 0, x, y))]

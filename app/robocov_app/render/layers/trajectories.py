@@ -1,0 +1,263 @@
+"""The layer of trajectories: finished sections stay on a page, so that only new ones have to be drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array
+from robocov_app.look import legend
+from robocov_app.look.colors import Color
+from robocov_app.look.robot_colors import ColorScheme, choose_trail_colors
+from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.clipping import limit_pixels
+from robocov_app.render.crowding import choose_width_factor
+from robocov_app.render.layers.fading_trails import FADE_STEPS, Pen, draw_fading_trails
+from robocov_app.render.scene import Scene
+from robocov_app.render.sprites import Sketch, find_visible_box
+from robocov_app.render.surface_cache import LatestValue
+
+MIN_STEP_PX = 2.0
+"""Minimum distance between the corners of a drawn trajectory."""
+SECTION_PX = 16.0
+"""Length of the sections that are added to the page; shorter ends are drawn again in each frame."""
+MIN_CROWD = 400
+"""With at least this many robots, the ends are not smooth."""
+_MIN_MOVE_PX = 1.0
+"""Robots that have moved less have no trajectory yet."""
+
+Path: TypeAlias = list[list[float]]
+"""Corners of a trajectory, px; a path that is a single nan is that of an absent robot."""
+
+
+class _Section(NamedTuple):
+    """A finished section of a trajectory.
+
+    Attributes
+    ----------
+    robot : int
+        Row of the robot.
+    path : Path
+    """
+
+    robot: int
+    path: Path
+
+
+class TrajectoriesLayer:
+    """Draws trajectories; those of absent robots are nan.
+
+    Parameters
+    ----------
+    colors : {"robots", "paper"}
+        Whether each trajectory has the color of its robot, or all have the same.
+    """
+
+    def __init__(self, colors: ColorScheme = "robots") -> None:
+        self._color_scheme: ColorScheme = colors
+        self._page = pygame.Surface((0, 0))
+        self._key: object = None
+        self._n_drawn_rows = 0
+        self._last_row = np.empty((0, 2))
+        self._open_paths: list[Path] = []
+        self._ended: list[_Section] = []
+        self._colors = LatestValue[list[Color]]()
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw the trail of a scene."""
+        trail = scene.trail
+        if trail is None or len(trail) == 0:
+            return
+        n_robots = trail.shape[1]
+        width = canvas.scale * canvas.theme.trajectory_line * choose_width_factor(n_robots)
+        pen = Pen(self._choose_colors(canvas), width)
+        key = _build_key(canvas, scene, pen, n_robots)
+        is_continued = key == self._key and self._n_drawn_rows > 0 and self._find_last_row(trail)
+        is_fading = False
+        if not is_continued:
+            self._start_page(canvas, trail, key)
+            is_fading = self._draw_fading_trails(canvas, scene, trail, pen)
+        self._extend_paths(_to_limited_pixels(canvas, trail[self._n_drawn_rows :]))
+        self._n_drawn_rows = len(trail)
+        self._last_row = trail[-1].copy()
+        sections = self._finish_sections(1 + SECTION_PX / MIN_STEP_PX if is_continued or is_fading else 2)
+        self._draw_sections(sections, pen, can_merge=not is_continued and not is_fading)
+        canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        self._draw_ends(canvas, _to_limited_pixels(canvas, trail[-1]).tolist(), pen)
+
+    def _find_last_row(self, trail: Array) -> bool:
+        """Return whether the trail contains the row that was drawn last.
+
+        Rows come forward when older ones are removed; the number of drawn rows is then updated.
+        """
+        n_rows = self._n_drawn_rows
+        if n_rows <= len(trail) and _are_same_rows(trail[[n_rows - 1]], self._last_row).all():
+            return True
+        rows = np.flatnonzero(_are_same_rows(trail[:n_rows], self._last_row))
+        if len(rows):
+            self._n_drawn_rows = int(rows[-1]) + 1
+        return len(rows) > 0
+
+    def _start_page(self, canvas: Canvas, trail: Array, key: object) -> None:
+        """Start an empty page, and paths at the first positions."""
+        self._key = key
+        self._page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+        self._page.set_clip(canvas.surface.get_clip())
+        self._n_drawn_rows = 0
+        self._ended.clear()
+        self._start_paths(canvas, trail[0])
+
+    def _start_paths(self, canvas: Canvas, positions: Array) -> None:
+        self._open_paths = [[pixel] for pixel in _to_limited_pixels(canvas, positions).tolist()]
+
+    def _draw_fading_trails(self, canvas: Canvas, scene: Scene, trail: Array, pen: Pen) -> bool:
+        """Draw the whole trail on the page if it fades, and return whether it does."""
+        if not scene.trail_fade or scene.trail_time is None:
+            return False
+        draw_fading_trails(self._page, canvas, trail, scene.trail_time, fade=scene.trail_fade, pen=pen)
+        self._n_drawn_rows = len(trail)
+        self._start_paths(canvas, trail[-1])
+        return True
+
+    def _extend_paths(self, rows: Array) -> None:
+        """Extend the open paths by new positions, (k, n, 2) px."""
+        last = np.array([path[-1] for path in self._open_paths])
+        has_absent = bool(np.isnan(last).any() or np.isnan(rows).any())
+        for row in rows:
+            if has_absent:
+                # A path starts when its robot joins, and ends when the robot fails.
+                is_changed = np.isnan(last[:, 0]) != np.isnan(row[:, 0])
+                for robot in np.nonzero(is_changed)[0].tolist():
+                    self._ended.append(_Section(robot, self._open_paths[robot]))
+                    self._open_paths[robot] = [row[robot].tolist()]
+                last[is_changed] = row[is_changed]
+            delta = row - last
+            has_moved = delta[:, 0] ** 2 + delta[:, 1] ** 2 >= MIN_STEP_PX * MIN_STEP_PX
+            if has_moved.any():
+                for robot in np.nonzero(has_moved)[0].tolist():
+                    self._open_paths[robot].append(row[robot].tolist())
+                last[has_moved] = row[has_moved]
+
+    def _finish_sections(self, min_corners: float) -> list[_Section]:
+        """Return ended paths and those with a number of corners, which go on from their last corner."""
+        sections = [section for section in self._ended if len(section.path) > 1]
+        self._ended.clear()
+        for robot, path in enumerate(self._open_paths):
+            if len(path) >= min_corners:
+                sections.append(_Section(robot, path))
+                self._open_paths[robot] = path[-1:]
+        return sections
+
+    def _draw_sections(self, sections: list[_Section], pen: Pen, *, can_merge: bool) -> None:
+        """Draw sections on the page: each in a sketch of its own, or all in one if that is smaller."""
+        groups = [[section] for section in sections]
+        boxes = [self._find_box(group, pen.width) for group in groups]
+        if can_merge:
+            box = self._find_box(sections, pen.width)
+            if box is not None and _sum_areas(boxes) > box.width * box.height:
+                groups = [sections]
+                boxes = [box]
+        for group, box in zip(groups, boxes, strict=True):
+            if box is None:
+                continue
+            sketch = Sketch(box)
+            for section in group:
+                sketch.draw_path(section.path, pen.colors[section.robot], pen.width)
+            sketch.draw_on(self._page)
+
+    def _find_box(self, sections: Sequence[_Section], width: float) -> pygame.Rect | None:
+        """Return the visible box around sections with a line width, px; None if nothing is visible."""
+        paths = [section.path for section in sections]
+        points = np.concatenate([np.empty((0, 2)), *paths])
+        return find_visible_box(points, 5.0 + width, self._page)
+
+    def _draw_ends(self, canvas: Canvas, ends: list[list[float]], pen: Pen) -> None:
+        """Draw the open paths up to the current positions, px.
+
+        They are mostly below the robots, where neither seams nor steps show.
+        """
+        width = canvas.scale_width(pen.width / canvas.scale)
+        is_smooth = len(ends) < MIN_CROWD
+        for path, end, color in zip(self._open_paths, ends, pen.colors, strict=True):
+            if _is_absent(path) or _is_at_start(path, end):
+                continue
+            points = [*path, end]
+            if width > 1:
+                canvas.draw_outline(np.array(points), color, width, is_closed=False)
+            elif is_smooth:
+                canvas.draw_thin_path(points, color)
+            else:
+                pygame.draw.lines(canvas.surface, color, False, points)
+
+    def _choose_colors(self, canvas: Canvas) -> list[Color]:
+        """Return the color of the trajectory of each robot."""
+        theme = canvas.theme
+        hues = canvas.hues.tolist()
+        return self._colors.get(
+            None, (theme.name, hues), lambda: choose_trail_colors(theme, hues, self._color_scheme)
+        )
+
+    def build_legend(self, scene: Scene) -> list[LegendEntry]:
+        """Build the legend, whose symbol is a wave in the color of the first robot."""
+
+        def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
+            angles = np.linspace(-np.pi, np.pi, 24)
+            columns = x + angles * 2.9 * canvas.scale
+            rows = y - 3 * canvas.scale * np.sin(angles)
+            wave = np.column_stack([columns, rows]).tolist()
+            sketch = Sketch.from_points(wave, 3.0)
+            if sketch is not None:
+                width = canvas.theme.trajectory_line * canvas.scale
+                sketch.draw_path(wave, self._choose_colors(canvas)[0], width)
+                sketch.draw_on(canvas.surface)
+
+        return [LegendEntry(legend.TRAJECTORY, draw_symbol, self._color_scheme)]
+
+
+def _build_key(canvas: Canvas, scene: Scene, pen: Pen, n_robots: int) -> tuple[object, ...]:
+    """Return what the page depends on in addition to the trail; fading ones change with time."""
+    fade_step = None
+    if scene.trail_fade and scene.trail_time is not None:
+        step = int(np.floor(scene.trail_time[-1] / scene.trail_fade * FADE_STEPS))
+        fade_step = (scene.trail_fade, step)
+    return (
+        canvas.camera,
+        canvas.theme.name,
+        canvas.scale,
+        canvas.surface.get_size(),
+        tuple(canvas.surface.get_clip()),
+        tuple(pen.colors),
+        n_robots,
+        fade_step,
+    )
+
+
+def _to_limited_pixels(canvas: Canvas, positions: Array) -> Array:
+    """Convert positions, (..., 2) m, to pixels that pygame can draw."""
+    return limit_pixels(canvas.camera.to_pixels(positions))
+
+
+def _is_absent(path: Path) -> bool:
+    """Return whether a path is that of an absent robot."""
+    return math.isnan(path[-1][0])
+
+
+def _is_at_start(path: Path, end: list[float]) -> bool:
+    """Return whether a robot has hardly moved since the start of its path."""
+    if len(path) > 1:
+        return False
+    return max(abs(path[0][0] - end[0]), abs(path[0][1] - end[1])) < _MIN_MOVE_PX
+
+
+def _sum_areas(boxes: Iterable[pygame.Rect | None]) -> int:
+    return sum(box.width * box.height for box in boxes if box is not None)
+
+
+def _are_same_rows(rows: Array, row: Array) -> Array:
+    """Return which rows, (k, n, 2), equal another one, (n, 2); nan equals nan."""
+    is_same = (rows == row) | (np.isnan(rows) & np.isnan(row))
+    return np.asarray(is_same.all(axis=(1, 2)))
