@@ -63,7 +63,7 @@ def open_viewer(
     with open_display(headless=True):
         session = start_session(*(controllers or (RAPF,)), robots=robots, environment=environment, **changes)
         if shown is None:
-            shown = {layer.name for layer in build_standard_layers() if layer.default}
+            shown = {layer.name for layer in build_standard_layers() if layer.is_default}
         viewer = Presenter(session, Costs(lattice, direct=True), shown, folder, map_name)
         driver = Driver(ViewerWindow(viewer, size, scale, is_unattended=True))
         driver.settle()

@@ -189,7 +189,7 @@ def test_moving_obstacles_are_at_the_position_of_the_time():
         costs.ask(0, when, POSITIONS)
         ((_, known),) = costs.poll()
         assert known.result.mean_distance == CoverageCost(CROSSED.at(when), 32)(POSITIONS).mean_distance
-        assert known.field.largest == known.result.distances.max()
+        assert known.field.max_distance == known.result.distances.max()
         values.append(known.result.mean_distance)
     assert len(set(values)) == 3
 
@@ -339,7 +339,7 @@ def test_another_process_gives_the_same_answers(worker_costs):
         np.testing.assert_array_equal(answers[pane].result.distances, cost(positions).distances)
     assert answers[0].path is None
     np.testing.assert_array_equal(answers[5].path, cost.find_path(OTHER_POSITIONS, point))
-    assert answers[5].field.largest > 0.0
+    assert answers[5].field.max_distance > 0.0
     assert worker_costs.state == ""
     assert worker_costs.known == answers
     # There is no path from a point inside the pillar.
@@ -366,7 +366,7 @@ def test_another_process_evaluates_moving_obstacles(worker_costs):
         assert known.travel_time == cost(POSITIONS, speeds).mean_time
         # The sites are those at that time.
         np.testing.assert_array_equal(known.result.points, cost.points)
-        assert known.field.largest == known.result.distances.max()
+        assert known.field.max_distance == known.result.distances.max()
 
 
 @pytest.mark.slow
