@@ -436,7 +436,9 @@ def _list_parts(folder: Path) -> list[Path]:
         names = [str(name) for name in json.loads((folder / "comparison.json").read_bytes())["folders"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
-    parts = [folder / name for name in names if Path(name).name == name != ".."]
+    # Any other name could lead out of the folder.
+    plain_names = [name for name in names if name != ".." and Path(name).name == name]
+    parts = [folder / name for name in plain_names]
     return [part for part in parts if part.is_dir() and not part.is_symlink()]
 
 
