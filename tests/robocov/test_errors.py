@@ -11,7 +11,7 @@ from robocov.controllers import list_controller_classes
 from robocov.errors import InputError, MapError, Mistake, format_path
 
 
-def test_the_tree_of_errors() -> None:
+def test_the_class_hierarchy_of_errors() -> None:
     assert issubclass(errors.MapError, errors.InputError)
     assert issubclass(errors.StartError, errors.InputError)
     assert issubclass(errors.ParameterError, errors.InputError)
@@ -27,7 +27,7 @@ def test_the_tree_of_errors() -> None:
         ("zzzz", "unknown controller 'zzzz' (known: lloyd, rapf, rpf)"),
     ],
 )
-def test_unknown_names_get_the_nearest(name: str, message: str) -> None:
+def test_unknown_names_get_a_suggestion(name: str, message: str) -> None:
     assert errors.describe_unknown_name("controller", name, ["rapf", "rpf", "lloyd"]) == message
 
 
@@ -36,14 +36,14 @@ def test_long_values_are_cut_in_messages() -> None:
     assert len(errors.quote("x" * 1000)) == 60
 
 
-def test_strange_names_leave_messages_readable() -> None:
+def test_messages_about_strange_names_are_readable() -> None:
     message = errors.describe_unknown_name("controller", "x" * 1000, ["x" * 2000, "rapf"])
     assert len(message) < 250
     assert message.endswith("(known: rapf, " + "x" * 57 + "...)")
     assert errors.describe_unknown_name("start", "b", ["a\nb"]).endswith("(known: a\\nb)")
 
 
-def test_one_is_told_and_the_others_are_counted() -> None:
+def test_the_first_mistake_is_reported_and_the_others_are_counted() -> None:
     mistakes = [Mistake.at_path(("boundary", k), "expected a point, got 3") for k in range(3)]
     assert (
         str(MapError.from_mistakes("m.json", mistakes[:1])) == "m.json: boundary[0]: expected a point, got 3"
@@ -55,26 +55,26 @@ def test_one_is_told_and_the_others_are_counted() -> None:
     assert (error.line, error.column) == (None, None)
 
 
-def test_an_error_with_a_line_begins_as_those_of_compilers() -> None:
+def test_an_error_with_a_line_starts_like_those_of_compilers() -> None:
     error = MapError.from_mistakes("m.json", [Mistake((), "empty", line=14, column=9)])
     assert str(error) == "m.json:14:9: empty"
     assert (error.line, error.column) == (14, 9)
 
 
-def test_an_error_without_a_place_has_no_line() -> None:
+def test_an_error_without_a_location_has_no_line() -> None:
     assert MapError("m.json: no such file").line is None
     assert MapError("m.json: no such file").mistakes == ()
 
 
-def test_the_whole_document_needs_no_place() -> None:
+def test_a_mistake_of_the_whole_document_has_no_path() -> None:
     assert Mistake.at_path((), "expected an object, got []").text == "expected an object, got []"
 
 
-def test_keys_that_are_no_names_are_quoted() -> None:
+def test_keys_that_are_not_identifiers_are_quoted() -> None:
     assert format_path(("a b", "$schema", "x-y", 3, "")) == '["a b"].$schema.x-y[3][""]'
 
 
-def test_keys_of_any_length_leave_messages_readable() -> None:
+def test_long_keys_are_cut_in_messages() -> None:
     assert format_path(("a", "x" * 60, 1)) == f"a.{'x' * 60}[1]"
     assert format_path(("a", "x" * 61, 1)) == f'a["{"x" * 57}..."][1]'
 

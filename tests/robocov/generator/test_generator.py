@@ -33,7 +33,7 @@ ASKED = {
 
 
 @st.composite
-def asked(draw):
+def draw_requests(draw):
     kind = draw(st.sampled_from(list(GENERATORS)))
     count, area = ASKED[kind]
     return {
@@ -47,7 +47,7 @@ def asked(draw):
     }
 
 
-def coordinates(environment):
+def list_coordinates(environment):
     for obstacle in environment.obstacles:
         if isinstance(obstacle, PolygonObstacle):
             for ring in (obstacle.vertices, *obstacle.holes):
@@ -62,12 +62,12 @@ def coordinates(environment):
 
 
 @settings(max_examples=160)
-@given(asked())
+@given(draw_requests())
 @example({"seed": 3, "kind": "polygons", "obstacles": 6, "area": 0.2, "gap": 0.6, "side": 10.0})
 @example({"seed": 3, "kind": "blocks", "obstacles": 12, "area": 0.45, "gap": 0.5, "side": 10})
 @example({"seed": 3, "kind": "rooms", "obstacles": 12, "area": 0.15, "gap": 0.6, "side": 10.0})
 @example({"seed": 1, "kind": "polygons", "obstacles": 3, "area": 0.1, "gap": 0.25, "side": 1.5})
-def test_a_map_is_what_was_asked_for(words):
+def test_maps_have_the_requested_properties(words):
     environment = generate_map(**words)
     gap = words["gap"]
     width, height = words.get("width", words.get("side")), words.get("height", words.get("side"))
@@ -95,7 +95,7 @@ def test_a_map_is_what_was_asked_for(words):
     assert report.narrowest_gap is None or report.narrowest_gap.width >= gap - 1e-6
     assert list(environment.starts) == ["corner", "centre", "uniform"]
     digits = 2 if gap >= 0.5 else 3
-    assert all(value == round(value, digits) for value in coordinates(environment))
+    assert all(value == round(value, digits) for value in list_coordinates(environment))
 
 
 @pytest.mark.slow
@@ -107,8 +107,8 @@ def test_maps_may_be_large(kind):
 
 
 @settings(max_examples=20)
-@given(asked())
-def test_files_hold_the_same_map(tmp_path_factory, words):
+@given(draw_requests())
+def test_saved_maps_are_the_same(tmp_path_factory, words):
     environment = generate_map(**words)
     path = tmp_path_factory.mktemp("maps") / "generated.json"
     save_map(environment, path)
@@ -144,7 +144,7 @@ def test_the_same_seed_gives_the_same_map_and_another_seed_another():
         assert len({environment.obstacles for environment in maps}) == 3
 
 
-def digest(environment):
+def compute_digest(environment):
     return hashlib.sha256(json.dumps(to_json(environment)).encode()).hexdigest()[:16]
 
 
@@ -188,9 +188,9 @@ def digest(environment):
         ),
     ],
 )
-def test_maps_that_studies_used_stay_as_they_are(words, expected):
+def test_maps_of_earlier_studies_do_not_change(words, expected):
     """Bit for bit: a seed in a paper must give the same map in every version."""
-    assert digest(generate_map(**words)) == expected
+    assert compute_digest(generate_map(**words)) == expected
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_maps_do_not_depend_on_the_process():
     assert done.stdout == "".join(dump_map(generate_map(5, kind=kind)) for kind in GENERATORS)
 
 
-def test_numbers_may_be_numpys():
+def test_parameters_may_be_numpy_scalars():
     plain = generate_map(4, obstacles=5, area=0.125, gap=0.5, side=8.0)
     assert (
         generate_map(
@@ -280,7 +280,7 @@ def test_parameters_out_of_range_are_named(words, message):
         {"kind": "caves", "obstacles": 4, "area": 0.02},
     ],
 )
-def test_what_is_impossible_is_given_up(words):
+def test_impossible_requests_are_rejected(words):
     with pytest.raises(ParameterError) as caught:
         generate_map(0, **words)
     assert str(caught.value).startswith(
@@ -309,14 +309,14 @@ def square(x, y, side=1.0):
         (None, 0.02, False),
     ],
 )
-def test_kinds_are_a_registry_and_no_layout_gets_through_unchecked(layout, area, good, monkeypatch):
+def test_layouts_of_registered_kinds_are_checked(layout, area, good, monkeypatch):
     drawn = []
 
-    def of_mine(request, corner, rng):
+    def build_layout(request, corner, rng):
         drawn.append(rng.random())
         return layout
 
-    mine = replace(GENERATORS["polygons"], layout=of_mine, counted="things")
+    mine = replace(GENERATORS["polygons"], layout=build_layout, counted="things")
     monkeypatch.setitem(generator.GENERATORS, "mine", mine)
     if good:
         environment = generate_map(0, kind="mine", area=area)
@@ -329,7 +329,7 @@ def test_kinds_are_a_registry_and_no_layout_gets_through_unchecked(layout, area,
         assert len(set(drawn)) == len(drawn) > 1
 
 
-def test_every_kind_says_in_a_line_what_it_is():
+def test_every_kind_has_a_description_of_one_line():
     for kind in GENERATORS.values():
         assert 10 < len(kind.description) < 100
         assert "\n" not in kind.description

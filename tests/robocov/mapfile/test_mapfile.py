@@ -37,7 +37,7 @@ from robocov.mapfile import (
 # What is read
 
 
-def test_every_part_of_a_document_arrives() -> None:
+def test_every_key_of_a_document_is_read() -> None:
     environment = from_json(DOCUMENT)
     assert environment.name == "Two rooms – süd"
     assert environment.description == DOCUMENT["description"]
@@ -66,13 +66,13 @@ def test_only_the_header_name_and_boundary_are_required() -> None:
     assert environment.starts == {}
 
 
-def test_a_byte_order_mark_is_read_over() -> None:
+def test_a_byte_order_mark_is_ignored() -> None:
     text = b"\xef\xbb\xbf" + json.dumps(DOCUMENT).encode()
     assert parse_map(text, "m.json") == from_json(DOCUMENT)
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_the_boundary_may_go_either_way_round_and_be_closed(order: int) -> None:
+def test_the_boundary_may_have_either_orientation_and_be_closed(order: int) -> None:
     ring = DOCUMENT["boundary"][::order]
     for given_ring in (ring, [*ring, ring[0]]):
         environment = from_json(changed("boundary", given_ring))
@@ -80,7 +80,7 @@ def test_the_boundary_may_go_either_way_round_and_be_closed(order: int) -> None:
         assert from_json(to_json(environment)) == environment
 
 
-def test_obstacles_may_overlap_touch_and_stick_out() -> None:
+def test_obstacles_may_overlap_touch_and_cross_the_boundary() -> None:
     obstacles = [
         {"kind": "circle", "center": [0, 3], "radius": 1},
         {"kind": "circle", "center": [1, 3], "radius": 1},
@@ -100,12 +100,12 @@ def test_the_document_is_not_shared_with_the_environment() -> None:
 # Round trips
 
 
-def near(one: Any, other: Any) -> bool:
+def is_close(one: Any, other: Any) -> bool:
     """Return whether two documents say the same but for rounding errors of numbers."""
     if isinstance(one, dict) and isinstance(other, dict):
-        return list(one) == list(other) and all(near(one[key], other[key]) for key in one)
+        return list(one) == list(other) and all(is_close(one[key], other[key]) for key in one)
     if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(near, one, other))
+        return len(one) == len(other) and all(map(is_close, one, other))
     if isinstance(one, float) or isinstance(other, float):
         return math.isclose(one, other, rel_tol=1e-14, abs_tol=1e-14)
     return bool(one == other)
@@ -190,10 +190,10 @@ def environments(draw: st.DrawFn) -> Environment:
 
 @settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.filter_too_much])
 @given(environments())
-def test_what_is_written_is_what_is_read(environment: Environment) -> None:
+def test_written_maps_are_read_unchanged(environment: Environment) -> None:
     text = dump_map(environment)
     again = parse_map(text.encode(), "again")
-    assert near(to_json(again), to_json(environment))
+    assert is_close(to_json(again), to_json(environment))
     assert parse_map(dump_map(again), "once more") == again
     assert list(again.starts) == list(environment.starts)
     assert list(again.extra) == list(environment.extra)
@@ -202,11 +202,11 @@ def test_what_is_written_is_what_is_read(environment: Environment) -> None:
     SCHEMA.validate(json.loads(text))
 
 
-def test_a_document_survives_in_its_own_words() -> None:
+def test_a_document_is_written_back_unchanged() -> None:
     assert to_json(from_json(DOCUMENT)) == DOCUMENT
 
 
-def test_a_dump_reads_well() -> None:
+def test_the_layout_of_a_written_map() -> None:
     lines = dump_map(from_json(DOCUMENT)).splitlines()
     assert '  "boundary": [[0, 0], [10, 0], [10, 6], [0, 6]],' in lines
     assert '    {"kind": "circle", "center": [7, 2], "radius": 0.5},' in lines
@@ -272,7 +272,7 @@ def test_a_moved_vertex_changes_one_line(path: tuple[Any, ...], off: float) -> N
         (8765432.12345679, "8765432.12345679"),
     ],
 )
-def test_numbers_are_as_short_as_can_be(value: float, text: str) -> None:
+def test_numbers_are_as_short_as_possible(value: float, text: str) -> None:
     ring = [[value, value], [value + 9, value], [value, value + 9]]
     document = {**ROUND, "boundary": ring, "obstacles": [], "starts": {}}
     dumped = dump_map(from_json(document))
@@ -281,7 +281,7 @@ def test_numbers_are_as_short_as_can_be(value: float, text: str) -> None:
 
 
 @given(st.decimals(-100, 100, places=12, allow_nan=False) | st.decimals(-1, 1, places=13, allow_nan=False))
-def test_what_is_written_by_hand_stays_as_it_is(number: Any) -> None:
+def test_numbers_written_by_hand_are_kept(number: Any) -> None:
     ring = f"[[{number}, 0], [1000, 0], [1000, 1000], [0, 1000]]"
     text = f'{{"format": "robocov-map", "version": 1, "name": "x", "boundary": {ring}}}'
     mine = parse_map(text, "mine")
@@ -290,8 +290,8 @@ def test_what_is_written_by_hand_stays_as_it_is(number: Any) -> None:
 
 
 @pytest.mark.parametrize("tiny", [1e-320, 5e-324, -1e-310, 1e-160])
-def test_numbers_that_are_all_but_zero_are_zero(tiny: float) -> None:
-    def drawn(zero: float) -> Environment:
+def test_tiny_numbers_are_written_as_zero(tiny: float) -> None:
+    def build_map(zero: float) -> Environment:
         return from_json(
             {
                 **ROUND,
@@ -304,10 +304,10 @@ def test_numbers_that_are_all_but_zero_are_zero(tiny: float) -> None:
             }
         )
 
-    assert drawn(tiny) == drawn(0.0)
+    assert build_map(tiny) == build_map(0.0)
 
 
-def test_extra_is_nobodys_business() -> None:
+def test_unknown_content_of_extra_is_kept() -> None:
     environment = from_json(changed("extra", {"mine": [0.1 + 0.2]}))
     assert parse_map(dump_map(environment), "again").extra == {"mine": [0.1 + 0.2]}
 
@@ -333,22 +333,22 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
     path = tmp_path / "m.json"
     path.write_text("old")
 
-    def full(_: int) -> None:
+    def raise_disk_full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", raise_disk_full)
     with pytest.raises(OutputError, match=r"m\.json: cannot be written: No space left on device"):
         save_map(from_json(DOCUMENT), path)
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["m.json"]
 
 
-def test_a_missing_folder_is_said(tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written: No such file or directory"):
         save_map(from_json(DOCUMENT), tmp_path / "none" / "m.json")
 
 
-def test_a_link_is_written_through(tmp_path: Path) -> None:
+def test_links_are_kept_when_saving(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     link = tmp_path / "m.json"
     link.symlink_to(tmp_path / "there" / "real.json")
@@ -360,7 +360,7 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
     assert load_map(tmp_path / "there" / "real.json") == from_json(DOCUMENT)
 
 
-def test_a_map_that_could_not_be_loaded_is_not_written(tmp_path: Path) -> None:
+def test_an_invalid_map_is_not_written(tmp_path: Path) -> None:
     bow_tie = Environment("bow tie", ((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)))
     with pytest.raises(MapError, match="expected a ring that does not meet itself"):
         save_map(bow_tie, tmp_path / "m.json")

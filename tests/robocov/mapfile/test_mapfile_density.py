@@ -20,7 +20,7 @@ RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
 PLAIN = to_json(Environment("plain", RING))
 
 
-def with_density(density) -> dict:
+def build_document(density) -> dict:
     return PLAIN | {"density": density}
 
 
@@ -36,21 +36,21 @@ def test_round_trip(density, tmp_path):
     assert "density" not in to_json(Environment("plain", RING))
 
 
-def test_what_can_be_left_out():
-    assert from_json(with_density({"kind": "uniform"})).density == Uniform(1.0)
+def test_optional_keys():
+    assert from_json(build_document({"kind": "uniform"})).density == Uniform(1.0)
     peaks = [{"center": [1, 2], "sigma": 0.5, "weight": 3}]
-    density = from_json(with_density({"kind": "gaussians", "peaks": peaks})).density
+    density = from_json(build_document({"kind": "gaussians", "peaks": peaks})).density
     assert isinstance(density, Gaussians) and density.floor == 0.0
-    density = from_json(with_density({"kind": "polygons", "areas": []})).density
+    density = from_json(build_document({"kind": "polygons", "areas": []})).density
     assert isinstance(density, WeightedPolygons) and density.background == 1.0
-    density = from_json(with_density({"kind": "raster", "rows": [[1, 2], [3, 4]]})).density
+    density = from_json(build_document({"kind": "raster", "rows": [[1, 2], [3, 4]]})).density
     assert isinstance(density, Raster) and density.extent == (0.0, 0.0, 10.0, 6.0)
     assert density.values.tolist() == [[3.0, 4.0], [1.0, 2.0]]  # the file has the top row first
     assert density.interpolation == "bilinear"
-    assert from_json(with_density(None)).density is None
+    assert from_json(build_document(None)).density is None
 
 
-def test_each_row_of_a_raster_stands_on_a_line_of_its_own():
+def test_each_row_of_a_raster_is_a_line():
     text = dump_map(Environment("weighed", RING, density=Raster(np.eye(2), (0.0, 0.0, 10.0, 6.0), "cells")))
     assert '    "rows": [\n      [0, 1],\n      [1, 0]\n    ]' in text
 
@@ -154,15 +154,15 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
 )
 def test_mistakes_are_reported_with_their_path(density, words):
     with pytest.raises(MapError) as caught:
-        from_json(with_density(density), "mine.json")
+        from_json(build_document(density), "mine.json")
     start, _, end = words.partition(".* ")
     message = str(caught.value)
     assert message.startswith("mine.json: ") and start in message and end in message
     assert "\n" not in message
 
 
-def test_in_a_file_with_line_and_column():
-    text = json.dumps(with_density({"kind": "gaussians", "peaks": [{**PEAK, "sigma": -1}]}), indent=1)
+def test_mistakes_in_a_file_have_line_and_column():
+    text = json.dumps(build_document({"kind": "gaussians", "peaks": [{**PEAK, "sigma": -1}]}), indent=1)
     with pytest.raises(MapError) as caught:
         parse_map(text, "mine.json")
     line = text.splitlines()[caught.value.line - 1]
@@ -177,45 +177,45 @@ def test_tiny_weights_are_read_as_zero():
         {"kind": "gaussians", "floor": 1e-300, "peaks": []},
     ):
         with pytest.raises(MapError, match="expected at least one weight above 0, got none"):
-            from_json(with_density(density))
-    tiny = from_json(with_density({"kind": "raster", "rows": [[1e-12, 1]]}))
+            from_json(build_document(density))
+    tiny = from_json(build_document({"kind": "raster", "rows": [[1e-12, 1]]}))
     assert tiny.density.min_value == 0.0 and parse_map(dump_map(tiny), "again") == tiny
     flat = {"kind": "polygons", "areas": [{**AREA, "vertices": [[0, 0], [9, 0], [9, 5], [0, 1e-320]]}]}
-    assert from_json(with_density(flat)).free_masses.sum() == pytest.approx(60.0 + 4.0 * 22.5)
+    assert from_json(build_document(flat)).free_masses.sum() == pytest.approx(60.0 + 4.0 * 22.5)
 
 
 # pictures
 
 
-def map_with(folder: Path, picture: str, **more) -> Path:
+def write_map(folder: Path, picture: str, **more) -> Path:
     path = folder / "mine.json"
-    path.write_text(json.dumps(with_density({"kind": "raster", "picture": picture, **more})))
+    path.write_text(json.dumps(build_document({"kind": "raster", "picture": picture, **more})))
     return path
 
 
-def gray(path: Path, rows, mode: str = "L") -> None:
+def write_image(path: Path, rows, mode: str = "L") -> None:
     kind = np.uint16 if mode == "I;16" else np.uint8
     Image.fromarray(np.array(rows, dtype=kind)).save(path)
 
 
-def test_a_picture_next_to_the_map(tmp_path):
-    gray(tmp_path / "phi.png", [[0, 255], [51, 102]])
-    density = load_map(map_with(tmp_path, "phi.png", black=1, white=6)).density
+def test_an_image_next_to_the_map(tmp_path):
+    write_image(tmp_path / "phi.png", [[0, 255], [51, 102]])
+    density = load_map(write_map(tmp_path, "phi.png", black=1, white=6)).density
     assert isinstance(density, Raster)
     assert density.values.tolist() == [[2.0, 3.0], [1.0, 6.0]]
     (tmp_path / "more").mkdir()
-    gray(tmp_path / "more" / "deep.png", [[0, 65535]], "I;16")
-    density = load_map(map_with(tmp_path, "more/deep.png", extent=[0, 0, 10, 6])).density
+    write_image(tmp_path / "more" / "deep.png", [[0, 65535]], "I;16")
+    density = load_map(write_map(tmp_path, "more/deep.png", extent=[0, 0, 10, 6])).density
     assert isinstance(density, Raster) and density.values.tolist() == [[0.0, 1.0]]
     Image.fromarray(np.full((2, 2, 3), 255, dtype=np.uint8)).save(tmp_path / "color.png")
-    assert load_map(map_with(tmp_path, "color.png")).density.values.min() == 1.0
+    assert load_map(write_map(tmp_path, "color.png")).density.values.min() == 1.0
     (tmp_path / "phi.pgm").write_bytes(b"P5 2 1 255\n\x00\xff")
-    assert load_map(map_with(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
+    assert load_map(write_map(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
 
 
-def test_pictures_are_written_as_rows(tmp_path):
-    gray(tmp_path / "phi.png", [[0, 200], [7, 102]])
-    environment = load_map(map_with(tmp_path, "phi.png", black=0.1, white=5))
+def test_images_are_written_as_rows(tmp_path):
+    write_image(tmp_path / "phi.png", [[0, 200], [7, 102]])
+    environment = load_map(write_map(tmp_path, "phi.png", black=0.1, white=5))
     document = to_json(environment)
     assert "picture" not in document["density"] and from_json(document) == environment
     save_map(environment, tmp_path / "again.json")
@@ -226,46 +226,46 @@ def test_pictures_are_written_as_rows(tmp_path):
 @pytest.mark.parametrize(
     "name", ["../phi.png", "/etc/passwd", "C:\\phi.png", "\\\\host\\phi.png", "a/../../phi.png", "C:phi.png"]
 )
-def test_a_picture_stays_in_the_folder(tmp_path, name):
+def test_images_must_be_in_the_folder(tmp_path, name):
     folder = tmp_path / "inner"
     folder.mkdir()
-    gray(tmp_path / "phi.png", [[1, 2]])
+    write_image(tmp_path / "phi.png", [[1, 2]])
     with pytest.raises(MapError, match="expected a file in the folder of the map"):
-        load_map(map_with(folder, name))
+        load_map(write_map(folder, name))
 
 
 def test_links_out_of_the_folder_are_not_followed(tmp_path):
     folder = tmp_path / "inner"
     folder.mkdir()
-    gray(tmp_path / "phi.png", [[1, 2]])
+    write_image(tmp_path / "phi.png", [[1, 2]])
     (folder / "link.png").symlink_to(tmp_path / "phi.png")
     with pytest.raises(MapError, match="expected a file in the folder of the map"):
-        load_map(map_with(folder, "link.png"))
+        load_map(write_map(folder, "link.png"))
 
 
-def test_pictures_that_cannot_be_used(tmp_path):
-    def refused(name: str, **more) -> str:
+def test_unusable_images_are_rejected(tmp_path):
+    def get_error(name: str, **more) -> str:
         with pytest.raises(MapError) as caught:
-            load_map(map_with(tmp_path, name, **more))
+            load_map(write_map(tmp_path, name, **more))
         assert "\n" not in str(caught.value)
         return str(caught.value)
 
-    assert 'density.picture: "none.png": no such file' in refused("none.png")
+    assert 'density.picture: "none.png": no such file' in get_error("none.png")
     (tmp_path / "text.png").write_text("not a picture")
-    assert "cannot be read as PNG or PGM" in refused("text.png")
-    gray(tmp_path / "whole.png", np.arange(10_000).reshape(100, 100) % 251)
+    assert "cannot be read as PNG or PGM" in get_error("text.png")
+    write_image(tmp_path / "whole.png", np.arange(10_000).reshape(100, 100) % 251)
     (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:-2000])
-    assert "cannot be read as PNG or PGM" in refused("cut.png")
+    assert "cannot be read as PNG or PGM" in get_error("cut.png")
     (tmp_path / "wide.pgm").write_bytes(b"P5 1025 1 255\n" + bytes(1025))
-    assert f"expected at most {MAX_RASTER_SIZE} x {MAX_RASTER_SIZE} pixels, got 1025 x 1" in refused(
+    assert f"expected at most {MAX_RASTER_SIZE} x {MAX_RASTER_SIZE} pixels, got 1025 x 1" in get_error(
         "wide.pgm"
     )
     (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
-    assert "got 100000 x 100000" in refused("bomb.pgm") or "PNG or PGM" in refused("bomb.pgm")
+    assert "got 100000 x 100000" in get_error("bomb.pgm") or "PNG or PGM" in get_error("bomb.pgm")
     with (tmp_path / "heavy.png").open("wb") as file:
         file.truncate(MAX_PICTURE_BYTES + 1)
-    assert "expected at most 8 MB, got more" in refused("heavy.png")
-    gray(tmp_path / "black.png", [[0, 0]])
-    assert "density.picture: expected at least one weight above 0, got none" in refused("black.png")
+    assert "expected at most 8 MB, got more" in get_error("heavy.png")
+    write_image(tmp_path / "black.png", [[0, 0]])
+    assert "density.picture: expected at least one weight above 0, got none" in get_error("black.png")
     (tmp_path / "folder.png").mkdir()
-    assert "no such file" in refused("folder.png")
+    assert "no such file" in get_error("folder.png")

@@ -33,7 +33,7 @@ def record(cluttered: Environment) -> Record:
     )
 
 
-def test_load_gives_what_was_saved(record: Record, tmp_path: Path) -> None:
+def test_a_saved_record_can_be_loaded(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path, {"mean_distance_m": 1.0})
     again = Record.load(tmp_path)
     for name in ARRAYS:
@@ -52,7 +52,7 @@ def test_load_gives_what_was_saved(record: Record, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["record.npz", "run.json"]
 
 
-def test_run_json_is_all_that_is_needed_to_repeat_the_run(record: Record, tmp_path: Path) -> None:
+def test_run_json_suffices_to_repeat_the_run(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())
     assert run["team"]["max_speed_m_per_s"] == 1.0
@@ -70,7 +70,7 @@ def test_run_json_is_all_that_is_needed_to_repeat_the_run(record: Record, tmp_pa
         assert getattr(repeated, name).tobytes() == getattr(record, name).tobytes()
 
 
-def test_a_snapshot_of_the_record_is_the_one_of_the_run(record: Record, cluttered: Environment) -> None:
+def test_snapshots_of_the_record_equal_those_of_the_run(record: Record, cluttered: Environment) -> None:
     simulation = Simulation(
         cluttered, Rapf(k_rep=0.2, attraction_limit=None), record.positions[0], record.team, 0.02
     )
@@ -86,7 +86,7 @@ def test_a_snapshot_of_the_record_is_the_one_of_the_run(record: Record, cluttere
     ]
 
 
-def test_what_a_record_says_of_a_moment_is_said_of_who_worked_then(empty: Environment) -> None:
+def test_samples_of_a_record_refer_to_the_robots_that_worked_then(empty: Environment) -> None:
     team = replace(Team.homogeneous(3), max_speed=np.array([0.3, 0.6, 1.5]))
     starts, failing = [[2.0, 2.0], [4.0, 2.0], [3.0, 4.0]], Conditions(failures=((1, 0.1),))
     made = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=failing).run(0.2)
@@ -98,7 +98,7 @@ def test_what_a_record_says_of_a_moment_is_said_of_who_worked_then(empty: Enviro
         assert not any(np.shares_memory(getattr(part, name), getattr(made, name)) for name in ARRAYS)
 
 
-def test_the_gains_of_a_law_for_each_robot_are_recorded(empty: Environment) -> None:
+def test_gains_of_individual_controllers_are_recorded(empty: Environment) -> None:
     @dataclass(frozen=True)
     class Drift:
         pull: float = 0.5
@@ -110,13 +110,13 @@ def test_the_gains_of_a_law_for_each_robot_are_recorded(empty: Environment) -> N
     assert made.gains == {"pull": 0.25}
 
 
-def test_a_law_without_goals_has_none_in_its_record(empty: Environment) -> None:
+def test_records_of_controllers_without_goals_have_no_goals(empty: Environment) -> None:
     record = Simulation(empty, Rpf(), empty.start().sample(3)).run(0.5)
     assert np.isnan(record.goals).all()
     assert record.snapshot(0).decision.goals is None
 
 
-def test_a_stopped_run_is_a_shorter_run(empty: Environment) -> None:
+def test_a_stopped_run_equals_a_shorter_run(empty: Environment) -> None:
     simulation = Simulation(empty, Rapf(), empty.start().sample(3))
     recorder = Recorder(empty, simulation.team, simulation.controller, simulation.dt)
     for snapshot in simulation.snapshots(10.0):
@@ -283,9 +283,7 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         ),
     ],
 )
-def test_a_damaged_folder_is_refused_in_one_line(
-    record: Record, tmp_path: Path, damage, message: str
-) -> None:
+def test_damaged_folders_are_rejected(record: Record, tmp_path: Path, damage, message: str) -> None:
     record.save(tmp_path)
     damage(tmp_path)
     with pytest.raises(InputError) as caught:
@@ -295,7 +293,7 @@ def test_a_damaged_folder_is_refused_in_one_line(
     assert message in str(caught.value)
 
 
-def test_what_later_versions_may_add_is_passed_over(record: Record, tmp_path: Path) -> None:
+def test_additions_of_later_versions_are_ignored(record: Record, tmp_path: Path) -> None:
     """And what earlier ones did not write yet may be missing."""
     record.save(tmp_path)
     for path in (("mood",), ("controller", "label"), ("team", "color_rgb"), ("session", "weather")):
@@ -310,13 +308,13 @@ def test_what_later_versions_may_add_is_passed_over(record: Record, tmp_path: Pa
     assert again.session == {"weather": {"fine": [1, None]}}
 
 
-def test_a_run_names_its_controller_and_nobody_loads_it(record: Record, tmp_path: Path) -> None:
+def test_loading_a_run_does_not_load_its_controller(record: Record, tmp_path: Path) -> None:
     replace(record, controller="somewhere/mine.py:Mine").save(tmp_path)
     again = Record.load(tmp_path)
     assert (again.controller, again.label) == ("somewhere/mine.py:Mine", "Mine")
 
 
-def test_who_worked_is_nobodys_to_change(record: Record) -> None:
+def test_the_mask_of_working_robots_is_read_only(record: Record) -> None:
     """A view of it is in each moment."""
     there = replace(record, conditions=Conditions(failures=((1, 0.5),)))
     for mask in (there.working, there.present, there.snapshot(3).working, record.working):
@@ -342,13 +340,13 @@ class Reusing:
 class TestReusedArrays:
     """A controller may use the same array for all of its decisions."""
 
-    def test_every_moment_is_recorded_as_it_was(self, empty: Environment) -> None:
+    def test_every_step_is_recorded(self, empty: Environment) -> None:
         record = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02).run(0.2)
         steps = 0.01 * np.arange(1, 12)
         for values in (record.forces, record.goals):
             np.testing.assert_allclose(values, np.broadcast_to(steps[:, None, None], values.shape))
 
-    def test_what_was_given_to_the_recorder_may_change(self, empty: Environment) -> None:
+    def test_the_recorder_copies_its_arguments(self, empty: Environment) -> None:
         simulation = Simulation(empty, Rapf(), empty.start().sample(2))
         recorder = Recorder(empty, simulation.team, simulation.controller, simulation.dt)
         decision = Decision(np.ones((2, 2)), np.ones((2, 2)))
@@ -357,14 +355,14 @@ class TestReusedArrays:
         assert (recorder.record().forces == 1.0).all()
         assert (recorder.record().goals == 1.0).all()
 
-    def test_snapshots_stay_as_they_were(self, empty: Environment) -> None:
+    def test_snapshots_do_not_change_later(self, empty: Environment) -> None:
         simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
         kept = [(snapshot, deepcopy(snapshot)) for snapshot in simulation.snapshots(0.1)]
         for snapshot, then in kept:
             np.testing.assert_array_equal(snapshot.decision.forces, then.decision.forces)
             np.testing.assert_array_equal(snapshot.decision.terms["attraction"], then.decision.forces)
 
-    def test_a_copy_goes_on_the_same_also_after_the_decision(self, empty: Environment) -> None:
+    def test_a_copy_continues_identically_also_after_the_decision(self, empty: Environment) -> None:
         simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
         simulation.step()
         assert simulation.observe_and_decide().decision.forces.max() == pytest.approx(0.02)
@@ -375,7 +373,7 @@ class TestReusedArrays:
         assert simulation.observe_and_decide().decision.forces.max() == pytest.approx(0.03)
 
 
-def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
+def test_files_are_complete_or_missing(tmp_path: Path) -> None:
     target = tmp_path / "result.txt"
     target.write_text("old")
     with pytest.raises(RuntimeError), replace_file(target) as part:
@@ -400,7 +398,7 @@ def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 class TestMoments:
-    def test_a_thinned_record_has_moments_of_the_whole_one(self, record: Record) -> None:
+    def test_a_thinned_record_contains_samples_of_the_whole_one(self, record: Record) -> None:
         thin = record.thin(5.0)
         assert thin.time == pytest.approx(np.arange(11) * 0.2)
         for name in ARRAYS:
@@ -411,16 +409,16 @@ class TestMoments:
         assert len(record) == 101
 
     @pytest.mark.parametrize("rate", [50.0, 50.1, 1e6, 1e308])
-    def test_more_moments_than_there_are_are_not_made_up(self, record: Record, rate: float) -> None:
+    def test_thinning_adds_no_samples(self, record: Record, rate: float) -> None:
         assert record.thin(rate).time.tolist() == record.time.tolist()
 
-    def test_the_first_and_the_last_stay_whatever_the_rate(self, record: Record) -> None:
+    def test_thinning_keeps_the_first_and_the_last_sample(self, record: Record) -> None:
         assert record.thin(0.0).time.tolist() == [record.time[0], record.time[-1]]
         assert record.thin(1e-9).time.tolist() == [record.time[0], record.time[-1]]
         assert record.thin(0.3).time.tolist() == [record.time[0], record.time[-1]]
         assert record.until(0.0).thin(0.0).time.tolist() == [0.0]
 
-    def test_thinning_twice_is_thinning_once(self, record: Record) -> None:
+    def test_thinning_twice_equals_thinning_once(self, record: Record) -> None:
         once = record.thin(7.0)
         assert once.thin(7.0).time.tolist() == once.time.tolist()
 
@@ -435,13 +433,13 @@ class TestMoments:
             assert times[0] == times[1]
 
     @pytest.mark.parametrize("rate", [-1.0, np.inf, np.nan])
-    def test_a_rate_that_is_none_is_refused(self, record: Record, rate: float) -> None:
+    def test_invalid_rates_are_rejected(self, record: Record, rate: float) -> None:
         with pytest.raises(
             ParameterError, match=r"^rate: expected a finite number of at least 0 Hz, got .*$"
         ):
             record.thin(rate)
 
-    def test_the_moment_at_a_time(self, record: Record) -> None:
+    def test_the_sample_at_a_time(self, record: Record) -> None:
         assert record.at(1.0).time == 1.0
         assert record.at(1.008).time == 1.0
         assert record.at(1.012).time == pytest.approx(1.02)
@@ -451,7 +449,7 @@ class TestMoments:
             with pytest.raises(ParameterError, match="time: expected a number from 0 to 2 s"):
                 record.at(time)
 
-    def test_a_run_until_a_time_is_the_run_that_was_stopped_then(self, record: Record) -> None:
+    def test_until_gives_the_run_that_was_stopped_then(self, record: Record) -> None:
         part = record.until(1.0)
         again = Simulation(
             record.environment, Rapf(k_rep=0.2, attraction_limit=None), record.positions[0], record.team, 0.02
@@ -465,7 +463,7 @@ class TestMoments:
 
 
 class TestFrame:
-    def test_every_number_of_the_record_is_in_one_row_and_column(self, record: Record) -> None:
+    def test_the_data_frame_contains_every_number_once(self, record: Record) -> None:
         frame = record.to_pandas()
         assert list(frame.columns) == [
             *("time_s", "robot", "x_m", "y_m", "vx_m_s", "vy_m_s", "fx_N", "fy_N"),
@@ -480,7 +478,7 @@ class TestFrame:
             wanted = [getattr(record, name)[moment, robot] for name in ARRAYS[1:]]
             np.testing.assert_array_equal(row, [record.time[moment], robot, *np.concatenate(wanted)])
 
-    def test_it_is_tidy(self, record: Record) -> None:
+    def test_the_data_frame_is_tidy(self, record: Record) -> None:
         """What is asked of it every day: one robot's path, and the team by robots."""
         frame = record.to_pandas()
         path = frame[frame.robot == 2][["x_m", "y_m"]].to_numpy()
@@ -488,18 +486,18 @@ class TestFrame:
         wide = frame.pivot(index="time_s", columns="robot", values="fy_N").to_numpy()
         np.testing.assert_array_equal(wide, record.forces[:, :, 1])
 
-    def test_what_is_done_to_it_leaves_the_record_alone(self, record: Record) -> None:
+    def test_changes_of_the_data_frame_do_not_change_the_record(self, record: Record) -> None:
         before = record.positions.copy()
         frame = record.to_pandas()
         frame["x_m"] += 1.0
         frame.loc[:, "y_m"] = 0.0
         np.testing.assert_array_equal(record.positions, before)
 
-    def test_a_law_without_goals_has_none_in_it(self, empty: Environment) -> None:
+    def test_a_data_frame_without_goals_has_no_goal_columns(self, empty: Environment) -> None:
         frame = Simulation(empty, Rpf(), empty.start().sample(3)).run(0.1).to_pandas()
         assert frame[["goal_x_m", "goal_y_m"]].isna().all(axis=None)
 
-    def test_without_pandas_it_says_what_brings_it(
+    def test_without_pandas_the_error_says_what_to_install(
         self, record: Record, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setitem(sys.modules, "pandas", None)
@@ -508,13 +506,13 @@ class TestFrame:
         assert str(caught.value) == 'pandas is not installed: pip install "robocov[pandas]"'
 
 
-def test_it_is_short_in_words(record: Record, empty: Environment) -> None:
+def test_the_repr_is_short(record: Record, empty: Environment) -> None:
     assert repr(record) == "<Record rapf on cluttered, 4 robots, 2.0 s>"
     assert repr(record.at(1.0)) == "<Snapshot at 1.00 s, 4 robots>"
     assert repr(Simulation(empty, Rpf(), [[5.0, 5.0]]).run(0.1)) == "<Record rpf on empty, 1 robot, 0.1 s>"
 
 
-def test_a_record_of_unicycles_holds_their_headings(cluttered: Environment, tmp_path: Path) -> None:
+def test_records_of_unicycles_contain_their_headings(cluttered: Environment, tmp_path: Path) -> None:
     team = Team.homogeneous(3, kinematics="unicycle", turning_rate=2.0)
     made = Simulation(cluttered, Rapf(), cluttered.start().sample(3, seed=2), team).run(1.0)
     made.save(tmp_path)
@@ -534,7 +532,7 @@ def test_a_record_of_unicycles_holds_their_headings(cluttered: Environment, tmp_
         Record.load(tmp_path)
 
 
-def test_a_record_of_points_is_as_ever(record: Record, tmp_path: Path) -> None:
+def test_records_of_points_have_no_steering(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path)
     assert set(np.load(tmp_path / "record.npz")) == set(ARRAYS)
     assert not {"track_width_m", "turning_rate_rad_per_s"} & set(record.to_json()["team"])
