@@ -254,7 +254,7 @@ class TestSensedObstacles:
     def test_without_knowledge_there_is_nothing(self):
         scene = scene_of(run_of(ROOMS, 4))
         assert len(changed(scene, "sensed")[0]) == 0
-        assert not layer_named("sensed").has(scene)
+        assert not layer_named("sensed").can_draw(scene)
 
 
 WAY = np.array([[1.0, 1.0], [4.0, 2.0], [6.0, 6.0]])
