@@ -17,20 +17,22 @@ from robocov_app.jobs.messages import READY, Wire, receive, send
 from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.jobs.workers import DirectWorker, LatestWorker
 
-PATIENCE = 60.0
-"""Seconds after which nothing will come any more."""
+HANG_LIMIT_S = 60.0
+"""Time after which a test fails instead of waiting."""
 SERVICE = "slow_service:Doubling"
 
 
-def until(condition):
-    end = time.monotonic() + PATIENCE
+def wait_for(condition):
+    """Wait until a condition returns something true, and return it."""
+    end = time.monotonic() + HANG_LIMIT_S
     while not (result := condition()):
-        assert time.monotonic() < end, "it does not come"
+        assert time.monotonic() < end, "the condition is never met"
         time.sleep(0.002)
     return result
 
 
-def answer_of(worker, question):
+def ask(worker, question):
+    """Ask a worker, and return the answer; None if there is none."""
     worker.put(question)
     answer = None
     while worker.is_busy:
@@ -47,94 +49,100 @@ def worker():
 
 def test_questions_are_answered_by_one_process(worker):
     assert (worker.poll(), worker.is_busy, worker.is_alive) == (None, False, False)
-    assert answer_of(worker, 4) == 8
+    assert ask(worker, 4) == 8
     assert (worker.poll(), worker.is_alive, worker.problem) == (None, True, "")
-    pid = answer_of(worker, "print")
+    pid = ask(worker, "print")
     assert pid == worker.process.pid != os.getpid()
-    assert answer_of(worker, "bad") is None
+    assert ask(worker, "bad") is None
     assert worker.problem == "bad: it is"
-    assert answer_of(worker, None) is None
+    assert ask(worker, None) is None
     assert worker.problem.startswith("it could not be doubled: unsupported operand")
     for number in range(2000):
         worker.put(number)
-    until(lambda: worker.poll() == 3998)
+    wait_for(lambda: worker.poll() == 3998)
     assert (worker.is_busy, worker.problem) == (False, "")
-    heard = answer_of(worker, "heard")
+    heard = ask(worker, "heard")
     assert len(heard) < 1000
-    assert answer_of(worker, "print") == pid
+    assert ask(worker, "print") == pid
 
 
-def test_how_far_it_is_and_that_there_is_a_newer_one(worker):
-    assert answer_of(worker, 1) == 2
+def test_progress_and_newer_questions_are_passed_on(worker):
+    assert ask(worker, 1) == 2
     worker.put("slow")
-    assert until(lambda: worker.progress) >= 1
+    assert wait_for(lambda: worker.progress) >= 1
     worker.put(5)
     assert worker.progress is None
-    assert until(worker.poll) == 10
+    assert wait_for(worker.poll) == 10
 
 
-def test_patience_ends_with_an_older_question():
+def test_a_process_that_works_too_long_is_replaced():
     with closing(LatestWorker(SERVICE, "doubles", patience=0.0)) as worker:
         worker.put("sleep")
         first = worker.process
         time.sleep(0.01)
-        assert answer_of(worker, 3) == 6
+        assert ask(worker, 3) == 6
         assert first.poll() is not None
-        pid = answer_of(worker, "print")
+        pid = ask(worker, "print")
         time.sleep(0.01)
-        assert answer_of(worker, "print") == pid, "what is answered is waited for"
+        assert ask(worker, "print") == pid, "the patience does not apply to answered questions"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
-def test_a_process_that_dies_is_said_and_replaced(worker):
-    assert answer_of(worker, 1) == 2
+def test_a_process_that_dies_is_reported_and_replaced(worker):
+    assert ask(worker, 1) == 2
     worker.put("sleep")
     worker.process.kill()
-    problem = until(lambda: worker.poll() or worker.problem)
+    problem = wait_for(lambda: worker.poll() or worker.problem)
     assert problem.startswith("the process that doubles has ended")
     assert not problem.endswith("while starting")
     assert not worker.is_busy and not worker.is_alive
-    assert answer_of(worker, 2) == 4
+    assert ask(worker, 2) == 4
     assert worker.problem == ""
 
 
-def test_no_call_waits(monkeypatch, worker):
-    """A frame loop goes on while nobody reads."""
-    gate, waited = threading.Event(), []
-    monkeypatch.setattr(module, "send", lambda *what: (waited.append(gate.wait(PATIENCE)), send(*what)))
+def test_no_call_of_a_worker_blocks(monkeypatch, worker):
+    """The loop of a window continues while the process reads no questions."""
+    gate = threading.Event()
+    was_opened = []
+
+    def send_behind_gate(stream, message):
+        was_opened.append(gate.wait(HANG_LIMIT_S))
+        send(stream, message)
+
+    monkeypatch.setattr(module, "send", send_behind_gate)
     for number in range(300):
         worker.put(number)
         assert worker.poll() is None
     gate.set()
-    until(lambda: worker.poll() == 598)
-    assert all(waited), "nobody had to wait until the gate gave up"
+    wait_for(lambda: worker.poll() == 598)
+    assert all(was_opened), "no message had to wait until the time limit"
 
 
 def test_each_process_has_its_own_wire():
-    class Counting(Wire):
+    class CountingWire(Wire):
         def __init__(self):
-            self.said = 0
+            self.encoded = 0
 
         def encode(self, question):
-            self.said += 1
-            return self.said * question
+            self.encoded += 1
+            return self.encoded * question
 
         def decode(self, answer):
             return -answer
 
-    with closing(LatestWorker(SERVICE, "doubles", Counting)) as worker:
-        assert [answer_of(worker, 1), answer_of(worker, 1)] == [-2, -4]
+    with closing(LatestWorker(SERVICE, "doubles", CountingWire)) as worker:
+        assert [ask(worker, 1), ask(worker, 1)] == [-2, -4]
         worker.close()
-        assert answer_of(worker, 1) == -2
-    direct = DirectWorker(Doubling(), Counting())
+        assert ask(worker, 1) == -2
+    direct = DirectWorker(Doubling(), CountingWire())
     direct.put(10)
     assert (direct.poll(), direct.poll(), direct.is_busy) == (-20, None, False)
 
 
-def test_in_this_process(capsys):
+def test_a_direct_worker_answers_at_once(capsys):
     worker = DirectWorker(Doubling())
     assert worker.poll() is None
-    assert answer_of(worker, 4) is None, "it is never busy"
+    assert ask(worker, 4) is None, "it is never busy"
     assert (worker.poll(), worker.poll()) == (8, None)
     worker.put(None)
     assert worker.poll() is None
@@ -143,7 +151,7 @@ def test_in_this_process(capsys):
     worker.close()
 
 
-def test_closing_twice_or_without_a_process_is_no_fault(worker):
+def test_a_worker_may_be_closed_twice_or_without_a_process(worker):
     worker.close()
     worker.put(1)
     worker.close()
@@ -151,7 +159,7 @@ def test_closing_twice_or_without_a_process_is_no_fault(worker):
     assert not worker.is_alive
 
 
-def test_one_that_waits_asks_one_after_the_other():
+def test_questions_to_a_process_are_answered_one_by_one():
     process = start_process(SERVICE)
     assert [ask_process(process, number).answer for number in (1, 2)] == [2, 4]
     assert ask_process(process, "bad").problem == "bad: it is"
@@ -160,7 +168,7 @@ def test_one_that_waits_asks_one_after_the_other():
     assert end_process(process) != 0
 
 
-def test_one_without_a_service_ends(capfd):
+def test_a_process_without_a_service_ends(capfd):
     process = start_process("slow_service:Nothing")
     assert receive(process.stdout) != READY
     assert end_process(process) == 1
@@ -169,7 +177,7 @@ def test_one_without_a_service_ends(capfd):
 
 PARENT = """
 import signal, time
-# whoever starts the tests may have had this one ignored
+# It may be ignored where the tests were started.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from robocov_app.jobs.workers import LatestWorker
 worker = LatestWorker("slow_service:Doubling", "doubles")
@@ -178,16 +186,17 @@ while worker.poll() is None:
     time.sleep(0.01)
 worker.put("sleep")
 print(worker.process.pid, flush=True)
-while True:  # a signal just before a sleep does not end it
+while True:  # A signal just before a sleep does not end it.
     time.sleep(0.1)
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 @pytest.mark.parametrize(
-    "way", ["SIGKILL", *(pytest.param(way, marks=pytest.mark.slow) for way in ("SIGTERM", "SIGINT"))]
+    "signal_name",
+    ["SIGKILL", *(pytest.param(name, marks=pytest.mark.slow) for name in ("SIGTERM", "SIGINT"))],
 )
-def test_no_process_outlives_its_parent(way):
+def test_no_process_outlives_its_parent(signal_name):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", PARENT]
     with subprocess.Popen(
@@ -195,30 +204,30 @@ def test_no_process_outlives_its_parent(way):
     ) as parent:
         try:
             child = int(parent.stdout.readline())
-            parent.send_signal(getattr(signal, way))
-            parent.wait(PATIENCE)
+            parent.send_signal(getattr(signal, signal_name))
+            parent.wait(HANG_LIMIT_S)
         finally:
             parent.kill()
 
-    def gone():
+    def has_ended():
         try:
             os.kill(child, 0)
         except ProcessLookupError:
             return True
-        # in a container there may be nobody to take away what has ended
+        # In a container, ended processes may stay as zombies.
         with open(f"/proc/{child}/stat") as file:  # noqa: PTH123
             return file.read().rpartition(")")[2].split()[0] == "Z"
 
-    until(gone)
+    wait_for(has_ended)
 
 
-@pytest.mark.parametrize("cut", [0, 3, 8, 20])
-def test_a_message_that_ends_too_early_is_the_end(tmp_path, cut):
+@pytest.mark.parametrize("length", [0, 3, 8, 20])
+def test_an_incomplete_message_is_the_end_of_a_stream(tmp_path, length):
     path = tmp_path / "pipe"
     with path.open("wb") as file:
         send(file, {"a": np.arange(5)})
-    whole = path.read_bytes()
-    path.write_bytes(whole + whole[:cut])
+    message = path.read_bytes()
+    path.write_bytes(message + message[:length])
     with path.open("rb") as file:
         assert receive(file)["a"].tolist() == [0, 1, 2, 3, 4]
         assert receive(file) is None

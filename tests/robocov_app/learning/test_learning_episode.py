@@ -23,7 +23,7 @@ from robocov_app.learning.rewards import compute_reference_distance
 STARTS = np.array([[1.0, 1.0], [2.0, 1.0], [1.0, 2.0]])
 
 
-def begun(environment: Environment, positions: np.ndarray = STARTS, **changes: Any) -> Episode:
+def start_episode(environment: Environment, positions: np.ndarray = STARTS, **changes: Any) -> Episode:
     task = CoverageTask(**{"maps": environment, "robots": len(positions), "lattice": 16, **changes})
     scenario = Scenario(
         environment,
@@ -36,15 +36,16 @@ def begun(environment: Environment, positions: np.ndarray = STARTS, **changes: A
     return Episode(task, scenario, CoverageCost(environment, task.lattice))
 
 
-def pushed(episode: Episode, cycles: int, seed: int = 0) -> list[np.ndarray]:
+def take_random_actions(episode: Episode, cycles: int, seed: int = 0) -> list[np.ndarray]:
+    """Take random actions, and return the rewards of each."""
     rng = np.random.default_rng(seed)
-    n = len(episode.team)
-    return [episode.advance(rng.normal(scale=2.0, size=(n, 2))).rewards for _ in range(cycles)]
+    shape = (len(episode.team), 2)
+    return [episode.advance(rng.normal(scale=2.0, size=shape)).rewards for _ in range(cycles)]
 
 
 def test_shared_rewards_sum_up_to_the_decrease_of_the_cost(cluttered: Environment) -> None:
-    episode = begun(cluttered, contact_penalty=0.0)
-    rewards = np.array(pushed(episode, 20))
+    episode = start_episode(cluttered, contact_penalty=0.0)
+    rewards = np.array(take_random_actions(episode, 20))
     cost = CoverageCost(cluttered, 16)
     decrease = cost(STARTS).mean_distance - cost(episode.simulation.positions).mean_distance
     unit = compute_reference_distance(cluttered.free_area, 3)
@@ -54,53 +55,53 @@ def test_shared_rewards_sum_up_to_the_decrease_of_the_cost(cluttered: Environmen
 
 
 @pytest.mark.parametrize("reward", ["shared", "own"])
-def test_rewarding_less_often_rewards_the_same_in_all(cluttered: Environment, reward: str) -> None:
-    often, seldom = (
-        begun(cluttered, reward=reward, reward_every=every, contact_penalty=0.0) for every in (1, 4)
-    )
-    dense, sparse = np.array(pushed(often, 12)), np.array(pushed(seldom, 12))
+def test_rewarding_less_often_gives_the_same_sum_of_rewards(cluttered: Environment, reward: str) -> None:
+    often = start_episode(cluttered, reward=reward, reward_every=1, contact_penalty=0.0)
+    seldom = start_episode(cluttered, reward=reward, reward_every=4, contact_penalty=0.0)
+    dense = np.array(take_random_actions(often, 12))
+    sparse = np.array(take_random_actions(seldom, 12))
     assert (sparse[[0, 1, 2, 4]] == 0.0).all() and sparse[3].any()
     assert sparse.sum() == pytest.approx(dense.sum(), abs=1e-12)
     assert seldom.result.mean_distance == often.result.mean_distance
 
 
 def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None:
-    episode = begun(cluttered, reward_every=100)
+    episode = start_episode(cluttered, reward_every=100)
     assert not episode.advance(np.ones((3, 2))).rewards.any()
     assert episode.advance(np.ones((3, 2)), is_last=True).rewards.any()
 
 
-def test_contacts_are_told_and_cost(empty: Environment) -> None:
-    """Robot 1 is driven into the wall for a second and stays there; the record says when it got there."""
-    episode = begun(empty, STARTS, recording=True, contact_penalty=0.5)
+def test_contacts_are_reported_and_penalized(empty: Environment) -> None:
+    """Robot 1 is driven into the wall and stays there; the record shows when it arrives."""
+    episode = start_episode(empty, STARTS, recording=True, contact_penalty=0.5)
     forces = np.zeros((3, 2))
     forces[0] = -4.0, 0.0
-    touched = np.zeros(3)
+    contact_time = np.zeros(3)
     for _ in range(15):
         before = episode.result.mean_distance
         outcome = episode.advance(forces)
-        touched += outcome.contact_time
+        contact_time += outcome.contact_time
         decrease = (before - episode.result.mean_distance) / episode.reference
         np.testing.assert_allclose(outcome.rewards, decrease - 0.5 * outcome.contact_time, atol=1e-12)
     record = episode.record()
-    clear = compute_clearances(record)
-    expected = ((clear[1:] <= 1e-3) * record.dt).sum(axis=0)
-    assert count_contacts(record, clear) == 1
-    np.testing.assert_allclose(touched, expected, atol=1e-12)
-    assert touched[0] > 0.3 and not touched[1:].any()
+    clearances = compute_clearances(record)
+    expected = ((clearances[1:] <= 1e-3) * record.dt).sum(axis=0)
+    assert count_contacts(record, clearances) == 1
+    np.testing.assert_allclose(contact_time, expected, atol=1e-12)
+    assert contact_time[0] > 0.3 and not contact_time[1:].any()
 
 
-def test_two_that_touch(empty: Environment) -> None:
-    episode = begun(empty, np.array([[5.0, 5.0], [5.5, 5.0], [8.0, 8.0]]))
+def test_contact_between_two_robots_counts_for_both(empty: Environment) -> None:
+    episode = start_episode(empty, np.array([[5.0, 5.0], [5.5, 5.0], [8.0, 8.0]]))
     towards = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 0.0]])
-    touched = sum(episode.advance(towards).contact_time for _ in range(12))
-    assert touched[0] == touched[1] > 0.1 and touched[2] == 0.0
+    contact_time = sum(episode.advance(towards).contact_time for _ in range(12))
+    assert contact_time[0] == contact_time[1] > 0.1 and contact_time[2] == 0.0
 
 
-def test_one_that_has_not_joined_is_not_touched(empty: Environment) -> None:
-    """Robot 1 drives over the place where robot 2 is to appear long after."""
+def test_a_robot_that_has_not_joined_has_no_contact(empty: Environment) -> None:
+    """Robot 1 drives over the position at which robot 2 appears much later."""
     absent = Conditions(joins=((2, 100.0),))
-    episode = begun(empty, np.array([[4.0, 5.0], [5.0, 5.0]]), conditions=absent, recording=True)
+    episode = start_episode(empty, np.array([[4.0, 5.0], [5.0, 5.0]]), conditions=absent, recording=True)
     forces = np.array([[3.0, 0.0], [3.0, 0.0]])
     assert not any(episode.advance(forces).contact_time.any() for _ in range(25))
     assert episode.simulation.positions[0, 0] > 5.5
@@ -108,76 +109,77 @@ def test_one_that_has_not_joined_is_not_touched(empty: Environment) -> None:
 
 
 def test_the_record_is_that_of_a_simulation_under_the_same_forces(cluttered: Environment) -> None:
-    """One that goes on from the start by `Simulation.step` alone ends in the same state, bit for bit."""
-    episode = begun(cluttered, recording=True, repeat=3)
-    pushed(episode, 10)
+    """A simulation with the same forces has the same states, bit for bit."""
+    episode = start_episode(cluttered, recording=True, repeat=3)
+    take_random_actions(episode, 10)
     record = episode.record()
     assert len(record.time) == 31 and not record.forces[-1].any()
-    twin = Simulation(cluttered, Rapf(), STARTS)
+    simulation = Simulation(cluttered, Rapf(), STARTS)
     for k in range(30):
-        assert twin.positions.tobytes() == record.positions[k].tobytes()
-        assert twin.velocities.tobytes() == record.velocities[k].tobytes()
-        twin.step(forces=record.forces[k])
-    assert twin.positions.tobytes() == record.positions[-1].tobytes()
+        assert simulation.positions.tobytes() == record.positions[k].tobytes()
+        assert simulation.velocities.tobytes() == record.velocities[k].tobytes()
+        simulation.step(forces=record.forces[k])
+    assert simulation.positions.tobytes() == record.positions[-1].tobytes()
     with pytest.raises(ParameterError, match="expected a task with recording=True"):
-        begun(cluttered).record()
+        start_episode(cluttered).record()
 
 
-def test_who_fails_changes_nothing_for_the_others_rewards(cluttered: Environment) -> None:
-    """Their rewards are those of a team that never had the one that fails, while it works and after."""
+def test_a_failing_robot_does_not_change_the_rewards_of_the_others(cluttered: Environment) -> None:
+    """After the failure their rewards are those of a team without the failed robot."""
     failing = Conditions(failures=((3, 0.45),))
-    episode = begun(cluttered, conditions=failing, contact_penalty=0.0)
-    rewards, working = [], []
+    episode = start_episode(cluttered, conditions=failing, contact_penalty=0.0)
+    rewards = []
+    working = []
     forces = np.zeros((3, 2))
     forces[0] = 1.0, 0.5
     for _ in range(8):
         rewards.append(episode.advance(forces).rewards)
         working.append(episode.working.tolist())
     assert working[3] == [True] * 3 and working[5] == [True, True, False]
-    fails = next(k for k, row in enumerate(working) if not row[2])
-    alone = CoverageCost(cluttered, 16)
-    for k in range(fails, 8):
-        decrease = (
-            alone(episode.trail[k][:2]).mean_distance - alone(episode.trail[k + 1][:2]).mean_distance
-        ) / episode.reference
+    first_failed = next(k for k, row in enumerate(working) if not row[2])
+    cost = CoverageCost(cluttered, 16)
+    for k in range(first_failed, 8):
+        before = cost(episode.trail[k][:2]).mean_distance
+        after = cost(episode.trail[k + 1][:2]).mean_distance
+        decrease = (before - after) / episode.reference
         np.testing.assert_allclose(rewards[k], [decrease, decrease, 0.0], atol=1e-12)
     assert len(episode.result.positions) == 2
 
 
-def test_an_episode_goes_on_when_nobody_is_left(empty: Environment) -> None:
-    gone = Conditions(failures=tuple((k, 0.15) for k in (1, 2, 3)))
-    episode = begun(empty, conditions=gone)
-    rewards = pushed(episode, 4)
+def test_an_episode_continues_without_working_robots(empty: Environment) -> None:
+    failures = Conditions(failures=tuple((k, 0.15) for k in (1, 2, 3)))
+    episode = start_episode(empty, conditions=failures)
+    rewards = take_random_actions(episode, 4)
     assert not episode.working.any() and not np.array(rewards[2:]).any()
     assert np.isfinite(episode.build_rows()).all()
 
 
-def test_obstacles_that_move_count_where_they_are(empty: Environment) -> None:
+def test_moving_obstacles_count_at_their_present_position(empty: Environment) -> None:
     pillar = CircleObstacle((3.0, 5.0), 0.8, path=ObstaclePath(((3.0, 5.0), (7.0, 5.0)), speed=1.0))
     moving = replace(empty, obstacles=(pillar,))
-    episode = begun(moving, STARTS, repeat=30, contact_penalty=0.0)
-    gained = np.array([episode.advance(np.zeros((3, 2))).rewards for _ in range(3)])
-    then = CoverageCost(moving.at(1.5), 16)(episode.simulation.positions)
-    assert episode.result.mean_distance == pytest.approx(then.mean_distance, abs=1e-9)
-    decrease = episode.initial.mean_distance - then.mean_distance
-    assert gained[:, 0].sum() == pytest.approx(decrease / episode.reference, abs=1e-12) and decrease != 0.0
+    episode = start_episode(moving, STARTS, repeat=30, contact_penalty=0.0)
+    rewards = np.array([episode.advance(np.zeros((3, 2))).rewards for _ in range(3)])
+    final = CoverageCost(moving.at(1.5), 16)(episode.simulation.positions)
+    assert episode.result.mean_distance == pytest.approx(final.mean_distance, abs=1e-9)
+    decrease = episode.initial.mean_distance - final.mean_distance
+    assert rewards[:, 0].sum() == pytest.approx(decrease / episode.reference, abs=1e-12) and decrease != 0.0
 
 
-def test_scans_are_those_of_the_moment(cluttered: Environment) -> None:
-    episode = begun(cluttered, observation=ObservationLayout(2, 12))
-    place = episode.task.observation.blocks["rays"]
+def test_scans_are_those_of_the_present_positions(cluttered: Environment) -> None:
+    episode = start_episode(cluttered, observation=ObservationLayout(2, 12))
+    columns = episode.task.observation.blocks["rays"]
     for _ in range(3):
         distances, hit = episode.simulation.sensor.scan(
             episode.simulation.positions, 12, episode.team.sensing_range
         )
-        rows = episode.build_rows()[:, place]
+        rows = episode.build_rows()[:, columns]
         np.testing.assert_allclose(rows, np.where(hit, distances / 3.0, 1.0), atol=1e-6)
         assert hit.any()
         episode.advance(np.ones((3, 2)))
 
 
-def test_state_is_where_all_are(empty: Environment) -> None:
-    episode = begun(empty, action="velocity")
+def test_the_state_consists_of_positions_and_velocities(empty: Environment) -> None:
+    episode = start_episode(empty, action="velocity")
     for _ in range(8):
         episode.advance(np.full((3, 2), 0.4))
     state = episode.build_state().reshape(3, 4)
@@ -185,46 +187,48 @@ def test_state_is_where_all_are(empty: Environment) -> None:
     np.testing.assert_allclose(state[:, 2:], 0.4, atol=0.01)
 
 
-def test_what_is_drawn_and_what_is_given(empty: Environment, cluttered: Environment) -> None:
+def test_options_replace_random_values(empty: Environment, cluttered: Environment) -> None:
     task = CoverageTask(maps=[empty, cluttered], robots=3, start="*", lattice=8)
-    scenarios = MapSampler(task.maps, 8)
+    sampler = MapSampler(task.maps, 8)
 
-    def names(seed: int) -> list[tuple[str, bytes]]:
+    def list_starts(seed: int) -> list[tuple[str, bytes]]:
         rng = np.random.default_rng(seed)
-        episodes = [draw_episode(task, scenarios, rng) for _ in range(6)]
-        return [(each.environment.name, each.simulation.positions.tobytes()) for each in episodes]
+        episodes = [draw_episode(task, sampler, rng) for _ in range(6)]
+        return [(episode.environment.name, episode.simulation.positions.tobytes()) for episode in episodes]
 
-    assert names(1) == names(1) != names(2)
-    assert {name for name, _ in names(1)} == {"empty", "cluttered"}
+    assert list_starts(1) == list_starts(1) != list_starts(2)
+    assert {name for name, _ in list_starts(1)} == {"empty", "cluttered"}
     rng = np.random.default_rng(0)
-    given = {"map": cluttered, "start": "uniform", "start_seed": 7, "nothing": 1}
-    episode = draw_episode(task, scenarios, rng, given)
+    options = {"map": cluttered, "start": "uniform", "start_seed": 7, "nothing": 1}
+    episode = draw_episode(task, sampler, rng, options)
     expected = cluttered.start("uniform").sample(3, seed=7)
     assert episode.environment is cluttered and np.array_equal(episode.simulation.positions, expected)
-    placed = draw_episode(task, scenarios, rng, {"map": empty, "positions": STARTS.tolist()})
+    placed = draw_episode(task, sampler, rng, {"map": empty, "positions": STARTS.tolist()})
     assert np.array_equal(placed.simulation.positions, STARTS)
 
 
-def test_conditions_are_seeded_anew(empty: Environment) -> None:
+def test_each_episode_has_another_seed_of_its_conditions(empty: Environment) -> None:
     task = CoverageTask(maps=empty, robots=3, lattice=8, conditions=Conditions(position_noise=0.1))
-    scenarios = MapSampler(empty, 8)
+    sampler = MapSampler(empty, 8)
     rng = np.random.default_rng(0)
-    seeds = [draw_episode(task, scenarios, rng).simulation.conditions.seed for _ in range(3)]
+    seeds = [draw_episode(task, sampler, rng).simulation.conditions.seed for _ in range(3)]
     assert len(set(seeds)) == 3
-    given = draw_episode(task, scenarios, rng, {"conditions_seed": 5})
-    assert given.simulation.conditions.seed == 5
+    seeded = draw_episode(task, sampler, rng, {"conditions_seed": 5})
+    assert seeded.simulation.conditions.seed == 5
 
 
-def test_what_cannot_be_done(empty: Environment) -> None:
-    episode = begun(empty)
+def test_invalid_actions_and_options_are_rejected(empty: Environment) -> None:
+    episode = start_episode(empty)
     with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \(2, 2\)"):
         episode.advance(np.zeros((2, 2)))
     with pytest.raises(ParameterError, match=r"action of robot_2: expected finite numbers"):
         episode.advance(np.array([[0.0, 0.0], [np.nan, 0.0], [0.0, 0.0]]))
     with pytest.raises(StartError, match="starts: expected one for each of 3 robots, got 2"):
-        begun(empty, STARTS[:2], robots=3)
-    scenarios, rng = MapSampler(empty, 8), np.random.default_rng(0)
-    overlapping, ragged = {"positions": [[5.0, 5.0]] * 3}, {"positions": [[1.0], [2.0, 1.0]]}
+        start_episode(empty, STARTS[:2], robots=3)
+    sampler = MapSampler(empty, 8)
+    rng = np.random.default_rng(0)
+    overlapping = {"positions": [[5.0, 5.0]] * 3}
+    ragged = {"positions": [[1.0], [2.0, 1.0]]}
     for options in (overlapping, ragged, {"map": "nowhere"}, {"map": 3}, {"start": "nowhere"}):
         with pytest.raises(InputError):
-            draw_episode(CoverageTask(maps=empty, robots=3), scenarios, rng, options)
+            draw_episode(CoverageTask(maps=empty, robots=3), sampler, rng, options)

@@ -35,34 +35,37 @@ def test_gymnasiums_check_passes(changes: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_the_id_is_known_once_the_module_is() -> None:
+def test_importing_the_module_registers_the_environment() -> None:
     assert gymnasium.spec("robocov/Coverage-v0").entry_point == "robocov_app.learning.gym:CoverageEnv"
     assert gymnasium.make("robocov/Coverage-v0", **SMALL).unwrapped.task.robots == 3
     script = f"import gymnasium; print(gymnasium.make({ID!r}, robots=2).reset(seed=0)[0].shape)"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == "(2, 19)\n"
+    finished = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert finished.stdout == "(2, 19)\n"
 
 
 def test_it_is_the_parallel_environment_with_one_learner(cluttered: Environment) -> None:
     options = {**SMALL, "maps": cluttered, "reward": "own", "contact_penalty": 0.3, "reward_every": 3}
-    single, parallel = CoverageEnv(**options), CoverageParallelEnv(**options)
+    single = CoverageEnv(**options)
+    parallel = CoverageParallelEnv(**options)
     rows, info = single.reset(seed=5)
-    apart, infos = parallel.reset(seed=5)
+    rows_by_agent, infos = parallel.reset(seed=5)
     rng = np.random.default_rng(0)
     over = False
     while not over:
-        assert rows.tobytes() == b"".join(apart[agent].tobytes() for agent in parallel.agents)
+        assert rows.tobytes() == b"".join(rows_by_agent[agent].tobytes() for agent in parallel.agents)
         action = rng.normal(scale=2.0, size=(3, 2))
         rows, reward, ended, over, info = single.step(action)
-        apart, rewards, _, truncated, infos = parallel.step(dict(zip(parallel.agents, action, strict=True)))
+        rows_by_agent, rewards, _, truncated, infos = parallel.step(
+            dict(zip(parallel.agents, action, strict=True))
+        )
         assert reward == pytest.approx(np.mean([*rewards.values()]), abs=1e-15)
         assert not ended and set(truncated.values()) == {over}
         assert info["mean_distance_m"] == infos["robot_1"]["mean_distance_m"]
     assert parallel.agents == []
 
 
-def test_many_at_once_are_as_one_at_a_time() -> None:
-    """In processes of their own, each with its own seed, to the last bit."""
+def test_environments_in_processes_behave_as_single_ones() -> None:
+    """Each has its own seed, and the results are the same, bit for bit."""
     several = gymnasium.vector.AsyncVectorEnv([partial(CoverageEnv, **SMALL)] * 2)
     actions = np.random.default_rng(0).normal(size=(4, 2, 3, 2)).astype(np.float32)
     try:
@@ -83,12 +86,12 @@ def test_many_at_once_are_as_one_at_a_time() -> None:
             assert np.array_equal(rows, together[cycle + 1][k]) and reward == rewards[cycle][k]
 
 
-def test_one_that_has_not_begun_can_be_sent_to_another_process() -> None:
+def test_an_environment_without_an_episode_can_be_pickled() -> None:
     env = pickle.loads(pickle.dumps(CoverageEnv(**SMALL)))
     assert np.array_equal(env.reset(seed=3)[0], CoverageEnv(**SMALL).reset(seed=3)[0])
 
 
-def test_it_ends_when_nobody_is_left() -> None:
+def test_an_episode_ends_when_no_robot_works() -> None:
     env = CoverageEnv(**SMALL, conditions=Conditions(failures=((1, 0.15), (2, 0.15), (3, 0.35))))
     env.reset(seed=0)
     ended = []
@@ -111,7 +114,7 @@ def test_actions_may_be_rescaled_and_observations_flattened() -> None:
     )
 
 
-def test_what_is_wrong_is_said() -> None:
+def test_steps_before_a_reset_and_invalid_actions_are_rejected() -> None:
     env = CoverageEnv(**SMALL)
     with pytest.raises(RobocovError, match=r"call reset\(\) first"):
         env.step(env.action_space.sample())
@@ -123,7 +126,7 @@ def test_what_is_wrong_is_said() -> None:
 @pytest.mark.parametrize(
     ("name", "package"), [("CoverageEnv", "gymnasium"), ("CoverageParallelEnv", "pettingzoo")]
 )
-def test_without_the_extra_it_says_how_it_is_had(
+def test_without_the_extra_the_message_names_it(
     name: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
@@ -141,12 +144,12 @@ def test_public_names() -> None:
 
 
 @pytest.mark.slow
-def test_a_policy_loads_neither() -> None:
+def test_policies_do_not_import_gymnasium_or_pettingzoo() -> None:
     script = "import sys, robocov_app.learning as learning\n"
     script += "learning.PolicyController, learning.ControllerPolicy, learning.CoverageTask\n"
     script += "print({'gymnasium', 'pettingzoo', 'pygame', 'matplotlib'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == "set()\n"
+    finished = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert finished.stdout == "set()\n"
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
@@ -158,7 +161,9 @@ def test_a_policy_loads_neither() -> None:
         {"conditions": Conditions(loss=0.5)},
     ],
 )
-def test_many_moved_together_are_as_one_at_a_time(mode: AutoresetMode, changes: dict[str, Any]) -> None:
+def test_environments_that_share_a_simulation_behave_as_single_ones(
+    mode: AutoresetMode, changes: dict[str, Any]
+) -> None:
     """Observations, rewards, ends and infos, bit for bit, over the ends of episodes."""
     options = {**SMALL, "maps": "rooms", "duration": 0.4, **changes}
     together = CoverageVectorEnv(3, autoreset_mode=mode, **options)
@@ -167,20 +172,21 @@ def test_many_moved_together_are_as_one_at_a_time(mode: AutoresetMode, changes: 
     assert together.observation_space == apart.observation_space
     assert together.metadata == apart.metadata
     rng = np.random.default_rng(0)
-    answers = [each.reset(seed=5) for each in (together, apart)]
+    environments = (together, apart)
+    answers = [environment.reset(seed=5) for environment in environments]
     for step in range(12):
         assert data_equivalence(*answers, exact=True)
         action = rng.normal(scale=20.0, size=(3, 3, 2))
-        answers = [each.step(action) for each in (together, apart)]
+        answers = [environment.step(action) for environment in environments]
         if mode == AutoresetMode.DISABLED and answers[0][3].any():
             mask = answers[0][3]
-            answers = [each.reset(options={"reset_mask": mask.copy()}) for each in (together, apart)]
+            answers = [environment.reset(options={"reset_mask": mask.copy()}) for environment in environments]
         if step == 5:
             other = {"map": "square", "reset_mask": np.array([False, True, False])}
-            answers = [each.reset(seed=9, options=dict(other)) for each in (together, apart)]
+            answers = [environment.reset(seed=9, options=dict(other)) for environment in environments]
 
 
-def test_many_are_asked_for_actions_of_the_right_shape() -> None:
+def test_vector_environments_reject_invalid_actions() -> None:
     several = CoverageVectorEnv(2, **SMALL)
     with pytest.raises(RobocovError, match="reset"):
         several.step(np.zeros((2, 3, 2)))

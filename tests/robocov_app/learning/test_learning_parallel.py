@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 with warnings.catch_warnings():
-    # its tests load games by ways that it has deprecated itself
+    # Its tests load games in ways that it has deprecated.
     warnings.simplefilter("ignore", DeprecationWarning)
     from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, seed_test
 
@@ -20,7 +20,7 @@ from robocov_app.learning import CoverageParallelEnv, CoverageTask, ObservationL
 SMALL = {"robots": 3, "lattice": 8, "duration": 2.0, "dt": 0.05, "repeat": 2}
 
 
-def made(environment: Environment, **changes: Any) -> CoverageParallelEnv:
+def build_environment(environment: Environment, **changes: Any) -> CoverageParallelEnv:
     return CoverageParallelEnv(**{"maps": environment, **SMALL, **changes})
 
 
@@ -33,20 +33,25 @@ VARIANTS: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("changes", VARIANTS)
-def test_pettingzoos_checks_pass(cluttered: Environment, changes: dict[str, Any]) -> None:
-    if not changes.get("conditions") or not changes["conditions"].joins:  # it knows of nobody who joins
-        parallel_api_test(made(cluttered, **changes), 25)
-    parallel_seed_test(partial(made, cluttered, **changes), 25)
+def test_the_checks_of_pettingzoo_pass(cluttered: Environment, changes: dict[str, Any]) -> None:
+    if not changes.get("conditions") or not changes["conditions"].joins:
+        # This check does not support agents that join.
+        parallel_api_test(build_environment(cluttered, **changes), 25)
+    parallel_seed_test(partial(build_environment, cluttered, **changes), 25)
 
 
 @pytest.mark.parametrize("changes", VARIANTS[:2])
-def test_its_checks_of_robots_that_act_in_turn_pass(cluttered: Environment, changes: dict[str, Any]) -> None:
+def test_the_checks_of_pettingzoo_for_agents_in_turn_pass(
+    cluttered: Environment, changes: dict[str, Any]
+) -> None:
     options = {"maps": cluttered, **SMALL, **changes}
     api_test(coverage_v0.env(**options), 15)
     seed_test(partial(coverage_v0.env, **options), 15)
 
 
-def test_its_check_of_truncation_passes(monkeypatch: pytest.MonkeyPatch, empty: Environment) -> None:
+def test_the_check_of_pettingzoo_for_truncation_passes(
+    monkeypatch: pytest.MonkeyPatch, empty: Environment
+) -> None:
     class Module:
         parallel_env = staticmethod(partial(coverage_v0.parallel_env, maps=empty, **SMALL))
         env = staticmethod(partial(coverage_v0.env, maps=empty, **SMALL))
@@ -54,36 +59,41 @@ def test_its_check_of_truncation_passes(monkeypatch: pytest.MonkeyPatch, empty: 
     max_cycles_test(Module)
 
 
-def played(env: CoverageParallelEnv, seed: int, cycles: int = 6) -> list[bytes]:
+def play(env: CoverageParallelEnv, seed: int, cycles: int = 6) -> list[bytes]:
+    """Take random actions, and return all observations, rewards and infos."""
     observations, infos = env.reset(seed=seed)
     rng = np.random.default_rng(0)
-    told = [row.tobytes() for row in observations.values()]
+    results = [row.tobytes() for row in observations.values()]
     for _ in range(cycles):
-        observations, rewards, _, _, infos = env.step({a: rng.normal(size=2) for a in env.agents})
-        told += [row.tobytes() for row in observations.values()]
-        told.append(repr((rewards, infos)).encode())
-    return told
+        observations, rewards, _, _, infos = env.step({agent: rng.normal(size=2) for agent in env.agents})
+        results += [row.tobytes() for row in observations.values()]
+        results.append(repr((rewards, infos)).encode())
+    return results
 
 
 @pytest.mark.parametrize("changes", VARIANTS)
 def test_the_same_seed_gives_the_same_bits(cluttered: Environment, changes: dict[str, Any]) -> None:
-    one, other = made(cluttered, **changes), made(cluttered, **changes)
-    first = played(one, 3)
-    assert first == played(other, 3)
-    assert first == played(one, 3)  # whatever was played before
-    assert first != played(one, 4)
+    env = build_environment(cluttered, **changes)
+    other = build_environment(cluttered, **changes)
+    first = play(env, 3)
+    assert first == play(other, 3)
+    assert first == play(env, 3)
+    assert first != play(env, 4)
 
 
-def test_the_random_numbers_go_on_without_a_seed(cluttered: Environment) -> None:
-    one, other = made(cluttered), made(cluttered)
-    one.reset(seed=1), other.reset(seed=1)
-    first, second = one.reset()[0]["robot_1"], one.reset()[0]["robot_1"]
+def test_without_a_seed_the_random_numbers_continue(cluttered: Environment) -> None:
+    env = build_environment(cluttered)
+    other = build_environment(cluttered)
+    env.reset(seed=1)
+    other.reset(seed=1)
+    first = env.reset()[0]["robot_1"]
+    second = env.reset()[0]["robot_1"]
     assert not np.array_equal(first, second)
     assert np.array_equal(other.reset()[0]["robot_1"], first)
 
 
 def test_an_episode_is_truncated_after_its_time(empty: Environment) -> None:
-    env = made(empty, duration=0.5)
+    env = build_environment(empty, duration=0.5)
     env.reset(seed=0)
     for cycle in range(5):
         assert env.agents == ["robot_1", "robot_2", "robot_3"]
@@ -95,7 +105,7 @@ def test_an_episode_is_truncated_after_its_time(empty: Environment) -> None:
 def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None:
     returns = []
     for every in (1, 1000):
-        env = made(cluttered, reward_every=every, contact_penalty=0.0)
+        env = build_environment(cluttered, reward_every=every, contact_penalty=0.0)
         env.reset(seed=0)
         rewards = []
         while env.agents:
@@ -105,10 +115,11 @@ def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None
     assert sum(returns[0]) == pytest.approx(returns[1][-1], abs=1e-12)
 
 
-def test_who_fails_is_terminated_and_who_joins_appears(empty: Environment) -> None:
-    env = made(empty, conditions=Conditions(failures=((1, 0.35),), joins=((3, 0.65),)))
+def test_robots_that_fail_are_terminated_and_robots_that_join_appear(empty: Environment) -> None:
+    env = build_environment(empty, conditions=Conditions(failures=((1, 0.35),), joins=((3, 0.65),)))
     env.reset(seed=0)
-    agents, ended = [], []
+    agents = []
+    ended = []
     for _ in range(8):
         agents.append(env.agents)
         observations, rewards, terminated, _, _ = env.step(dict.fromkeys(env.agents, (0.5, 0.0)))
@@ -116,28 +127,30 @@ def test_who_fails_is_terminated_and_who_joins_appears(empty: Environment) -> No
         ended.append([agent for agent in terminated if terminated[agent]])
     assert agents[3] == ["robot_1", "robot_2"] and ended[3] == ["robot_1"]
     assert agents[4] == ["robot_2"] and agents[7] == ["robot_2", "robot_3"]
-    assert [agent for each in ended for agent in each] == ["robot_1"]
+    assert [agents for agents in ended if agents] == [["robot_1"]]
 
 
-def test_spaces_of_unequal_robots(empty: Environment) -> None:
+def test_spaces_depend_on_the_limits_of_each_robot(empty: Environment) -> None:
     from robocov.team import Team
 
-    fast = Team(*(np.array(pair) for pair in ([0.1, 0.2], [1, 2], [1, 0.5], [2, 1], [2, 4], [3, 1], [9, 9])))
-    env = made(empty, team=fast)
+    limits = ([0.1, 0.2], [1, 2], [1, 0.5], [2, 1], [2, 4], [3, 1], [9, 9])
+    team = Team(*(np.array(pair) for pair in limits))
+    env = build_environment(empty, team=team)
     assert env.action_space("robot_1").high.tolist() == [4.0, 4.0]  # 1 x 2 + 2 x 1
     assert env.action_space("robot_2").high.tolist() == [4.0, 4.0]  # 2 x 1 + 4 x 0.5
-    assert made(empty, team=fast, action="velocity").action_space("robot_2").high.tolist() == [0.5, 0.5]
+    driven = build_environment(empty, team=team, action="velocity")
+    assert driven.action_space("robot_2").high.tolist() == [0.5, 0.5]
     assert env.state_space.contains(env.reset(seed=0) and env.state())
 
 
-def test_a_task_and_changes_of_it(empty: Environment) -> None:
+def test_attributes_of_a_task_can_be_changed(empty: Environment) -> None:
     task = CoverageTask(maps=empty, **SMALL)
     assert CoverageParallelEnv(task).task.robots == 3
     assert CoverageParallelEnv(task, robots=2).possible_agents == ["robot_1", "robot_2"]
 
 
-def test_what_is_wrong_is_said(empty: Environment) -> None:
-    env = made(empty)
+def test_invalid_actions_and_options_are_rejected(empty: Environment) -> None:
+    env = build_environment(empty)
     with pytest.raises(RobocovError, match=r"call reset\(\) first"):
         env.step({})
     env.reset(seed=0)
@@ -147,6 +160,6 @@ def test_what_is_wrong_is_said(empty: Environment) -> None:
         with pytest.raises(ParameterError, match=r"action of robot_1: expected two finite numbers, got"):
             env.step({"robot_1": bad})
     with pytest.raises(ParameterError, match="max_cycles: expected a whole number of at least 1, got 0"):
-        made(empty, max_cycles=0)
+        build_environment(empty, max_cycles=0)
     with pytest.raises(ParameterError, match="unknown part of a task 'map': did you mean 'maps'"):
         CoverageParallelEnv(map="rooms")

@@ -31,16 +31,16 @@ from robocov_app.learning import (
 REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))
 
 
-def linear(layout: ObservationLayout, seed: int = 0) -> Any:
+def build_linear_policy(layout: ObservationLayout, seed: int = 0) -> Any:
     weights = np.random.default_rng(seed).normal(size=(layout.size, 2))
     return lambda observation: observation @ weights
 
 
 @dataclass(frozen=True)
-class Shying:
-    """Goes where the last scan was longest."""
+class OpenSpaceSeeker:
+    """Moves in the direction of the longest ray of the last scan."""
 
-    name = label = summary = "shying"
+    name = label = summary = "seeker"
     scanning = Scanning(rays=16, period=0.25)
 
     def begin(self, region: Region, team: Team) -> np.ndarray:
@@ -52,30 +52,30 @@ class Shying:
         return Decision(memory.copy(), memory=memory)
 
 
-@pytest.mark.parametrize(("kind", "touches"), [(Rapf, 0), (Lloyd, 1), (Shying, 0)])
-def test_a_controller_through_the_environment_makes_its_record_again(
-    cluttered: Environment, kind: Any, touches: int
+@pytest.mark.parametrize(("controller_class", "min_contacts"), [(Rapf, 0), (Lloyd, 1), (OpenSpaceSeeker, 0)])
+def test_a_controller_in_an_environment_has_the_record_of_its_run(
+    cluttered: Environment, controller_class: Any, min_contacts: int
 ) -> None:
     """Every state and force of `Simulation.run`, bit for bit, contacts with walls included."""
     env = CoverageParallelEnv(
         maps=cluttered, robots=5, repeat=1, duration=6.0, lattice=8, reward_every=999, recording=True
     )
     env.reset(options={"start": "corner", "start_seed": 3})
-    expert = ControllerPolicy(kind())
+    expert = ControllerPolicy(controller_class())
     while env.agents:
         env.step(expert(env))
     record = env.episode.record()
     starts = cluttered.start("corner").sample(5, seed=3)
-    expected = Simulation(cluttered, kind(), starts).run(6.0)
+    expected = Simulation(cluttered, controller_class(), starts).run(6.0)
     assert len(record.time) == 361
     for name in ("time", "positions", "velocities", "obstacle_points"):
         assert getattr(record, name).tobytes() == getattr(expected, name).tobytes(), name
     assert record.forces[:-1].tobytes() == expected.forces[:-1].tobytes()
-    assert count_contacts(record, compute_clearances(record)) >= touches
+    assert count_contacts(record, compute_clearances(record)) >= min_contacts
 
 
-def test_an_expert_can_be_asked_in_velocities(cluttered: Environment) -> None:
-    """They give its forces up to rounding, and so nearly its way."""
+def test_a_controller_as_a_policy_of_velocities_has_nearly_the_same_run(cluttered: Environment) -> None:
+    """Velocities give its forces up to rounding."""
     env = CoverageEnv(maps=cluttered, robots=3, repeat=1, duration=2.0, lattice=8, action="velocity")
     env.reset(options={"start": "corner", "start_seed": 3})
     expert = ControllerPolicy(Rapf())
@@ -86,21 +86,22 @@ def test_an_expert_can_be_asked_in_velocities(cluttered: Environment) -> None:
     np.testing.assert_allclose(env.episode.simulation.positions, expected.positions[-1], atol=1e-9)
 
 
-def test_an_expert_says_the_same_twice_and_begins_anew(cluttered: Environment) -> None:
+def test_a_policy_repeats_its_actions_and_restarts_with_each_episode(cluttered: Environment) -> None:
     env = CoverageEnv(maps=cluttered, robots=3, lattice=8)
-    expert, fresh = ControllerPolicy(Rapf()), ControllerPolicy(Rapf())
+    expert = ControllerPolicy(Rapf())
+    other = ControllerPolicy(Rapf())
     for seed in (0, 1):
         env.reset(seed=seed)
         first = expert(env)
-        first[:] = 0.0  # what it said is the caller's own
-        assert expert(env).any() and np.array_equal(expert(env), fresh(env))
+        first[:] = 0.0  # The caller may change the actions.
+        assert expert(env).any() and np.array_equal(expert(env), other(env))
         env.step(expert(env))
-        assert np.array_equal(expert(env), fresh(env))
+        assert np.array_equal(expert(env), other(env))
 
 
 @dataclass(frozen=True)
-class Counting:
-    """Pushes harder each time that it is asked."""
+class CountingController:
+    """Increases its forces with each decision."""
 
     name = label = summary = "counting"
 
@@ -111,17 +112,17 @@ class Counting:
         return Decision(np.full_like(seen.positions, 0.1 * memory), memory=memory + 1)
 
 
-def test_what_an_expert_remembers(empty: Environment) -> None:
+def test_a_policy_keeps_the_memory_of_its_controller(empty: Environment) -> None:
     env = CoverageParallelEnv(maps=empty, robots=2, lattice=8)
-    expert = ControllerPolicy(Counting())
+    expert = ControllerPolicy(CountingController())
     for seed in (0, 1):
         env.reset(seed=seed)
-        said = []
+        actions = []
         for _ in range(3):
             expert(env)
-            said.append(expert(env)["robot_2"].tolist())
+            actions.append(expert(env)["robot_2"].tolist())
             env.step(expert(env))
-        np.testing.assert_allclose(said, [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])
+        np.testing.assert_allclose(actions, [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])
 
 
 @pytest.mark.parametrize("action", ["force", "velocity"])
@@ -129,8 +130,8 @@ def test_what_an_expert_remembers(empty: Environment) -> None:
 def test_a_policy_moves_as_in_training(
     cluttered: Environment, layout: ObservationLayout, action: Any
 ) -> None:
-    """The environment and the ordinary simulation with the policy as its controller, bit for bit."""
-    act = linear(layout)
+    """A simulation with the policy as its controller has the same positions, bit for bit."""
+    act = build_linear_policy(layout)
     env = CoverageParallelEnv(
         maps=cluttered, robots=4, duration=3.0, lattice=8, observation=layout, action=action, recording=True
     )
@@ -145,53 +146,52 @@ def test_a_policy_moves_as_in_training(
 
 
 @settings(max_examples=30)
-@given(seed=st.integers(0, 2**32), n=st.integers(2, 30), reach=st.floats(0.5, 6.0))
-def test_a_robot_uses_only_what_it_knows(seed: int, n: int, reach: float) -> None:
-    """Changing anything outside robot i's ranges changes nothing in row i, not one bit."""
+@given(seed=st.integers(0, 2**32), n=st.integers(2, 30), communication_range=st.floats(0.5, 6.0))
+def test_a_policy_uses_only_the_knowledge_of_the_robot(seed: int, n: int, communication_range: float) -> None:
+    """Changes beyond the ranges of robot i do not change its forces, not one bit."""
     layout = ObservationLayout(3, centroid=True)
-    controller, team = (
-        PolicyController(linear(layout), layout),
-        Team.homogeneous(n, communication_range=reach),
-    )
+    controller = PolicyController(build_linear_policy(layout), layout)
+    team = Team.homogeneous(n, communication_range=communication_range)
     rng = np.random.default_rng(seed)
     positions = rng.uniform((0, 0), (8, 6), size=(n, 2))
     points = np.where(rng.random((n, 1)) < 0.4, np.nan, positions + 0.5)
     velocities = rng.normal(size=(n, 2))
     i = int(rng.integers(n))
 
-    def force(places: np.ndarray) -> bytes:
-        own = np.arange(n)[:, None] == i
+    def compute_force(positions: np.ndarray) -> bytes:
+        """Return the force of robot i; everything that it does not know is random."""
+        is_own = np.arange(n)[:, None] == i
         seen = Observations(
-            places,
-            np.where(own, velocities, rng.normal(size=(n, 2))),
-            Neighbors.from_ranges(places, np.full(n, reach)),
-            np.where(own, points, places + rng.normal(size=(n, 2))),
+            positions,
+            np.where(is_own, velocities, rng.normal(size=(n, 2))),
+            Neighbors.from_ranges(positions, np.full(n, communication_range)),
+            np.where(is_own, points, positions + rng.normal(size=(n, 2))),
             REGION,
         )
         return controller.decide(seen, controller.begin(REGION, team)).forces[i].tobytes()
 
-    heard = np.hypot(*(positions - positions[i]).T) <= reach
+    is_known = np.hypot(*(positions - positions[i]).T) <= communication_range
     moved = positions.copy()
-    for k in np.flatnonzero(~heard):
-        place = rng.uniform((0, 0), (8, 6))
-        if np.hypot(*(place - positions[i])) > reach:
-            moved[k] = place
-    assert force(positions) == force(moved)
+    for k in np.flatnonzero(~is_known):
+        position = rng.uniform((0, 0), (8, 6))
+        if np.hypot(*(position - positions[i])) > communication_range:
+            moved[k] = position
+    assert compute_force(positions) == compute_force(moved)
 
 
-def test_actions_are_held(empty: Environment) -> None:
-    asked: list[float] = []
+def test_actions_are_held_for_a_period(empty: Environment) -> None:
+    observed: list[float] = []
 
     def act(observation: np.ndarray) -> tuple[float, float]:
-        asked.append(float(observation[0]))
+        observed.append(float(observation[0]))
         return 0.5, 0.0
 
     simulation = Simulation(empty, PolicyController(act, period=0.25), [[2.0, 2.0]], dt=0.01)
     simulation.run(1.0)
-    assert len(asked) == 5 and len(set(asked)) == 5
+    assert len(observed) == 5 and len(set(observed)) == 5
 
 
-MINE = '''
+POLICY_MODULE = '''
 from dataclasses import dataclass
 
 import numpy as np
@@ -201,7 +201,7 @@ from robocov_app.learning import ObservationLayout, PolicyController
 
 @dataclass(frozen=True)
 class Outwards(PolicyController):
-    """Goes away from the nearest neighbor."""
+    """Moves away from the nearest neighbor."""
 
     layout: ObservationLayout = ObservationLayout(neighbors=1)
     action: str = "velocity"
@@ -212,8 +212,8 @@ class Outwards(PolicyController):
 
 
 @pytest.mark.slow
-def test_the_command_line_takes_a_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "mine.py").write_text(MINE)
+def test_the_command_line_accepts_a_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.py").write_text(POLICY_MODULE)
     name = f"{tmp_path / 'mine.py'}:Outwards"
     command = [
         "run",
@@ -231,11 +231,12 @@ def test_the_command_line_takes_a_policy(tmp_path: Path, capsys: pytest.CaptureF
     assert main([*command, "--set", "period=0.2", "--out", str(tmp_path / "out")]) == 0
     run = json.loads((tmp_path / "out" / "run.json").read_text())
     assert run["controller"]["name"] == name and run["controller"]["gains"] == {"period": 0.2}
-    kind = type(make_controller(name))
-    assert (kind.name, kind.label, kind.summary) == ("Outwards", "Outwards", "a policy that was learned")
+    policy_class = type(make_controller(name))
+    assert policy_class.name == policy_class.label == "Outwards"
+    assert policy_class.summary == "a policy that was learned"
 
 
-def test_what_is_no_policy(empty: Environment) -> None:
+def test_invalid_policies_are_rejected(empty: Environment) -> None:
     def run(controller: PolicyController) -> None:
         Simulation(empty, controller, [[2.0, 2.0]]).step()
 

@@ -1,4 +1,4 @@
-"""Work that is kept aside in a thread, and found again after its program was killed."""
+"""Drafts are written in a thread, and recovered after their program was killed."""
 
 import json
 import os
@@ -31,26 +31,26 @@ from pathlib import Path
 from robocov_app.storage.autosave import Autosaver
 
 path = None if sys.argv[2] == "none" else Path(sys.argv[2])
-keeper = Autosaver(Path(sys.argv[1]), "robocov-test", path)
+autosaver = Autosaver(Path(sys.argv[1]), "robocov-test", path)
 for k in range(100_000):
-    keeper.save_draft(lambda k=k: {"work": k})
+    autosaver.save_draft(lambda k=k: {"work": k})
     if k == 4:
-        assert keeper.flush()
-        print("kept", flush=True)
+        assert autosaver.flush()
+        print("saved", flush=True)
         sys.stdin.readline()
 """
 
 
-def found(folder: Path | None) -> tuple[dict, ...]:
-    return find_drafts(folder, KIND, lambda record: record if "work" in record.content else None)
+def find_test_drafts(folder: Path | None) -> tuple[dict, ...]:
+    return find_drafts(folder, KIND, lambda draft: draft if "work" in draft.content else None)
 
 
-def works(folder: Path) -> list[object]:
-    return [record.content["work"] for record in found(folder)]
+def list_works(folder: Path) -> list[object]:
+    return [record.content["work"] for record in find_test_drafts(folder)]
 
 
-def program(folder: Path, path: str) -> subprocess.Popen[str]:
-    """Start a program that has kept its work 4, and goes on when it is told to."""
+def start_program(folder: Path, path: str) -> subprocess.Popen[str]:
+    """Start a program that has saved its work 4, and continues after a line of input."""
     process = subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(folder), path],
         stdin=subprocess.PIPE,
@@ -58,11 +58,11 @@ def program(folder: Path, path: str) -> subprocess.Popen[str]:
         text=True,
     )
     assert process.stdout is not None
-    assert process.stdout.readline() == "kept\n"
+    assert process.stdout.readline() == "saved\n"
     return process
 
 
-def killed(process: subprocess.Popen[str]) -> None:
+def kill(process: subprocess.Popen[str]) -> None:
     process.kill()
     process.wait()
     for stream in (process.stdin, process.stdout):
@@ -75,145 +75,146 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "drafts"
 
 
-def test_what_a_killed_program_did_is_found_again_and_goes_on(folder, tmp_path):
+def test_the_work_of_a_killed_program_is_found_and_continued(folder, tmp_path):
     path = tmp_path / "hall.json"
-    process = program(folder, str(path))
+    process = start_program(folder, str(path))
     try:
-        assert found(folder) == (), "it lives"
+        assert find_test_drafts(folder) == (), "the program is running"
         assert is_open_elsewhere(folder, KIND, path)
         assert not is_open_elsewhere(folder, KIND, tmp_path / "other.json")
         assert not is_open_elsewhere(folder, "robocov-other", path)
     finally:
-        killed(process)
+        kill(process)
     assert not is_open_elsewhere(folder, KIND, path)
-    (record,) = found(folder)
+    (record,) = find_test_drafts(folder)
     assert (record.path, record.content) == (path, {"work": 4})
-    assert find_drafts(folder, "robocov-other", lambda record: record) == (), "that is for others"
-    # it goes on in the same folder, and is offered to nobody else meanwhile
-    keeper = Autosaver(folder, KIND, record.path, record.folder)
-    assert found(folder) == ()
+    assert find_drafts(folder, "robocov-other", lambda draft: draft) == (), "the draft has another kind"
+    # The work continues in the same folder, which is not offered to other programs.
+    autosaver = Autosaver(folder, KIND, record.path, record.folder)
+    assert find_test_drafts(folder) == ()
     with pytest.raises(OutputError, match="another process"):
         Autosaver(folder, KIND, None, record.folder)
-    keeper.save_draft(lambda: {"work": 5})
-    assert keeper.flush()
-    keeper.close(discard=False)
-    (record,) = found(folder)
+    autosaver.save_draft(lambda: {"work": 5})
+    assert autosaver.flush()
+    autosaver.close(discard=False)
+    (record,) = find_test_drafts(folder)
     assert (record.path, record.content) == (path, {"work": 5})
     remove_draft(record.folder)
-    assert found(folder) == ()
+    assert find_test_drafts(folder) == ()
     assert list(folder.iterdir()) == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("moment", [0.0, 0.02, 0.1, 0.3])
-def test_killed_in_the_middle_of_writing_there_is_whole_work(folder, moment):
-    process = program(folder, "none")
+@pytest.mark.parametrize("delay_s", [0.0, 0.02, 0.1, 0.3])
+def test_a_program_that_is_killed_while_it_writes_leaves_a_complete_draft(folder, delay_s):
+    process = start_program(folder, "none")
     assert process.stdin is not None
     process.stdin.write("\n")
     process.stdin.flush()
-    time.sleep(moment)
-    killed(process)
-    (record,) = found(folder)
+    time.sleep(delay_s)
+    kill(process)
+    (record,) = find_test_drafts(folder)
     assert record.content["work"] >= 4
     assert record.path is None
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_a_stopped_program_still_has_its_work(folder):
-    process = program(folder, "none")
+def test_the_draft_of_a_suspended_program_is_not_offered(folder):
+    process = start_program(folder, "none")
     process.send_signal(signal.SIGSTOP)
     try:
-        assert found(folder) == ()
+        assert find_test_drafts(folder) == ()
     finally:
         process.send_signal(signal.SIGCONT)
-        killed(process)
-    assert len(found(folder)) == 1
+        kill(process)
+    assert len(find_test_drafts(folder)) == 1
 
 
-def test_programs_do_not_meet(folder):
-    first, second = Autosaver(folder, KIND), Autosaver(folder, KIND)
+def test_each_program_has_its_own_draft(folder):
+    first = Autosaver(folder, KIND)
+    second = Autosaver(folder, KIND)
     first.save_draft(lambda: {"work": 1})
     second.save_draft(lambda: {"work": 2})
     assert first.flush()
     assert second.flush()
     assert len(list(folder.iterdir())) == 2
     first.close(discard=False)
-    assert works(folder) == [1]
+    assert list_works(folder) == [1]
     second.close(discard=True)
     assert len(list(folder.iterdir())) == 1
 
 
-def test_what_was_saved_is_forgotten(folder, tmp_path):
-    keeper = Autosaver(folder, KIND)
-    keeper.save_draft(lambda: {"work": 1})
-    assert keeper.flush()
-    keeper.mark_saved(tmp_path / "hall.json")
-    assert keeper.flush()
+def test_saved_work_has_no_draft(folder, tmp_path):
+    autosaver = Autosaver(folder, KIND)
+    autosaver.save_draft(lambda: {"work": 1})
+    assert autosaver.flush()
+    autosaver.mark_saved(tmp_path / "hall.json")
+    assert autosaver.flush()
     assert is_open_elsewhere(folder, KIND, tmp_path / "hall.json")
-    keeper.close(discard=False)
+    autosaver.close(discard=False)
     assert list(folder.iterdir()) == []
 
 
-def test_keeping_waits_for_nothing_and_only_the_newest_is_written(folder):
-    asked = []
+def test_saving_a_draft_does_not_wait_and_only_the_newest_is_written(folder):
+    was_opened = []
     gate = threading.Event()
 
-    def work(number: int) -> dict[str, int]:
-        asked.append(gate.wait(60.0))
+    def build_content(number: int) -> dict[str, int]:
+        was_opened.append(gate.wait(60.0))
         return {"work": number}
 
-    keeper = Autosaver(folder, KIND)
+    autosaver = Autosaver(folder, KIND)
     for number in range(200):
-        keeper.save_draft(lambda number=number: work(number))
-    assert len(asked) <= 1
+        autosaver.save_draft(lambda number=number: build_content(number))
+    assert len(was_opened) <= 1
     gate.set()
-    assert keeper.flush()
-    assert all(asked), "nobody had to wait until the gate gave up"
-    assert len(asked) <= 2
-    keeper.close(discard=False)
-    assert works(folder) == [199]
+    assert autosaver.flush()
+    assert all(was_opened), "no draft had to wait until the time limit"
+    assert len(was_opened) <= 2
+    autosaver.close(discard=False)
+    assert list_works(folder) == [199]
 
 
-def test_trouble_is_told_of_and_tried_again(folder, monkeypatch):
+def test_a_failed_draft_is_reported_and_retried(folder, monkeypatch):
     monkeypatch.setattr(autosave, "_RETRY_S", 0.05)
-    keeper = Autosaver(folder, KIND)
-    full = threading.Event()
-    full.set()
+    autosaver = Autosaver(folder, KIND)
+    is_full = threading.Event()
+    is_full.set()
 
-    def work() -> dict[str, int]:
-        if full.is_set():
+    def build_content() -> dict[str, int]:
+        if is_full.is_set():
             raise OSError(28, "No space left on device")
         return {"work": 2}
 
-    keeper.save_draft(work)
-    assert not keeper.flush()
-    assert "No space left" in keeper.problem
-    full.clear()
+    autosaver.save_draft(build_content)
+    assert not autosaver.flush()
+    assert "No space left" in autosaver.problem
+    is_full.clear()
     end = time.monotonic() + 60.0
-    while keeper.problem and time.monotonic() < end:
+    while autosaver.problem and time.monotonic() < end:
         time.sleep(0.01)
-    assert keeper.flush()
-    keeper.close(discard=False)
-    assert works(folder) == [2]
+    assert autosaver.flush()
+    autosaver.close(discard=False)
+    assert list_works(folder) == [2]
 
 
-def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
+def test_without_a_folder_for_drafts_programs_still_work(tmp_path):
     (tmp_path / "file").write_text("")
-    keeper = Autosaver(tmp_path / "file" / "drafts", KIND)
-    assert "cannot be saved" in keeper.problem
-    keeper.save_draft(dict)
-    assert not keeper.flush()
-    keeper.close(discard=False)
-    nothing = Autosaver(None, KIND)
-    nothing.save_draft(dict)
-    assert nothing.problem == ""
-    assert nothing.flush()
-    nothing.mark_saved(None)
-    nothing.close(discard=True)
-    assert found(None) == ()
+    autosaver = Autosaver(tmp_path / "file" / "drafts", KIND)
+    assert "cannot be saved" in autosaver.problem
+    autosaver.save_draft(dict)
+    assert not autosaver.flush()
+    autosaver.close(discard=False)
+    without_folder = Autosaver(None, KIND)
+    without_folder.save_draft(dict)
+    assert without_folder.problem == ""
+    assert without_folder.flush()
+    without_folder.mark_saved(None)
+    without_folder.close(discard=True)
+    assert find_test_drafts(None) == ()
     assert not is_open_elsewhere(None, KIND, tmp_path / "x")
-    assert found(tmp_path / "none") == ()
+    assert find_test_drafts(tmp_path / "none") == ()
 
 
 @pytest.mark.parametrize(
@@ -230,44 +231,44 @@ def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
         '{"format": "robocov-test", "version": 1, "path": {"bytes": "x"}, "when": "2030-05-17", "work": 1}',
     ],
 )
-def test_what_cannot_be_read_is_left_alone(folder, content):
-    place = folder / "broken"
-    place.mkdir(parents=True)
-    (place / "draft.json").write_text(content)
-    os.utime(place, (0, 0))
-    assert found(folder) == ()
-    assert (place / "draft.json").read_text() == content
+def test_unreadable_drafts_are_left_alone(folder, content):
+    draft_folder = folder / "broken"
+    draft_folder.mkdir(parents=True)
+    (draft_folder / "draft.json").write_text(content)
+    os.utime(draft_folder, (0, 0))
+    assert find_test_drafts(folder) == ()
+    assert (draft_folder / "draft.json").read_text() == content
 
 
-def test_a_draft_for_which_reading_raises_anything_is_left_alone(folder):
-    keeper = Autosaver(folder, KIND)
-    keeper.save_draft(lambda: {"work": 1})
-    keeper.close(discard=False)
-    assert find_drafts(folder, KIND, lambda record: record.content["missing"]) == ()
-    assert works(folder) == [1]
+def test_a_draft_that_cannot_be_interpreted_is_left_alone(folder):
+    autosaver = Autosaver(folder, KIND)
+    autosaver.save_draft(lambda: {"work": 1})
+    autosaver.close(discard=False)
+    assert find_drafts(folder, KIND, lambda draft: draft.content["missing"]) == ()
+    assert list_works(folder) == [1]
 
 
-def test_work_that_cannot_be_written_does_not_stop_the_thread(folder):
-    keeper = Autosaver(folder, KIND)
-    keeper.save_draft(lambda: {"work": "\udcff"})
-    assert not keeper.flush() and "cannot be saved" in keeper.problem
-    keeper.save_draft(lambda: {"work": 2})
-    assert keeper.flush() and keeper.problem == ""
-    keeper.close(discard=False)
-    assert works(folder) == [2]
+def test_content_that_cannot_be_written_does_not_stop_the_thread(folder):
+    autosaver = Autosaver(folder, KIND)
+    autosaver.save_draft(lambda: {"work": "\udcff"})
+    assert not autosaver.flush() and "cannot be saved" in autosaver.problem
+    autosaver.save_draft(lambda: {"work": 2})
+    assert autosaver.flush() and autosaver.problem == ""
+    autosaver.close(discard=False)
+    assert list_works(folder) == [2]
 
 
-def test_folders_without_work_are_removed_when_they_are_old(folder):
+def test_old_folders_without_a_draft_are_removed(folder):
     for name in ("young", "old"):
         (folder / name).mkdir(parents=True)
     (folder / "old" / ".lock").write_text("")
     os.utime(folder / "old", (0, 0))
     (folder / "a file").write_text("")
-    assert found(folder) == ()
-    assert sorted(place.name for place in folder.iterdir()) == ["a file", "young"]
+    assert find_test_drafts(folder) == ()
+    assert sorted(path.name for path in folder.iterdir()) == ["a file", "young"]
 
 
-def test_the_folder_can_be_named(monkeypatch, tmp_path):
+def test_a_variable_selects_the_folder_of_drafts(monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     assert find_draft_folder() == tmp_path
     monkeypatch.setenv(FOLDER_VARIABLE, "")
@@ -285,39 +286,39 @@ def test_drafts_of_a_served_window_are_hidden_in_its_folder(monkeypatch, tmp_pat
     assert find_draft_folder(tmp_path) is None
 
 
-def test_drafts_are_removed_where_only_one_folder_may_be_used(tmp_path, folder):
-    keeper = Autosaver(folder, KIND)
-    keeper.save_draft(lambda: {"work": 1})
-    assert keeper.flush()
+def test_drafts_are_removed_while_files_are_confined(tmp_path, folder):
+    autosaver = Autosaver(folder, KIND)
+    autosaver.save_draft(lambda: {"work": 1})
+    assert autosaver.flush()
     with confine_files(folder):
-        keeper.close(discard=True)
+        autosaver.close(discard=True)
     assert list(folder.iterdir()) == []
 
 
-def test_a_record_says_what_it_is(folder, tmp_path):
-    keeper = Autosaver(folder, KIND, tmp_path / "hall.json")
-    keeper.save_draft(lambda: {"work": "ø"})
-    assert keeper.flush()
+def test_a_draft_is_a_documented_json_file(folder, tmp_path):
+    autosaver = Autosaver(folder, KIND, tmp_path / "hall.json")
+    autosaver.save_draft(lambda: {"work": "ø"})
+    assert autosaver.flush()
     (file,) = folder.glob("*/draft.json")
-    held = json.loads(file.read_text(encoding="utf-8"))
-    held.pop("when")
-    assert held == {"format": KIND, "version": 1, "path": str(tmp_path / "hall.json"), "work": "ø"}
-    keeper.close(discard=True)
+    content = json.loads(file.read_text(encoding="utf-8"))
+    content.pop("when")
+    assert content == {"format": KIND, "version": 1, "path": str(tmp_path / "hall.json"), "work": "ø"}
+    autosaver.close(discard=True)
 
 
-def test_a_program_that_is_disturbed_while_it_begins_takes_another_folder(folder, monkeypatch):
-    times = []
+def test_a_program_takes_another_folder_if_its_first_one_is_locked(folder, monkeypatch):
+    attempted = []
     lock = autosave.lock_folder
 
-    def disturbed(place):
-        times.append(place)
-        if len(times) == 1:
-            raise OutputError(f"{place}: another process is using this folder")
-        return lock(place)
+    def fail_first(path):
+        attempted.append(path)
+        if len(attempted) == 1:
+            raise OutputError(f"{path}: another process is using this folder")
+        return lock(path)
 
-    monkeypatch.setattr(autosave, "lock_folder", disturbed)
-    keeper = Autosaver(folder, KIND)
-    assert keeper.problem == ""
-    assert keeper.flush()
-    assert len(times) == 2
-    keeper.close(discard=True)
+    monkeypatch.setattr(autosave, "lock_folder", fail_first)
+    autosaver = Autosaver(folder, KIND)
+    assert autosaver.problem == ""
+    assert autosaver.flush()
+    assert len(attempted) == 2
+    autosaver.close(discard=True)
