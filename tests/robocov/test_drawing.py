@@ -23,38 +23,38 @@ from robocov.simulation import Simulation
 
 
 class Sketches(ModuleType):
-    """A backend that notes what it was asked."""
+    """A backend that records the calls of its functions."""
 
     def __init__(self) -> None:
         super().__init__("sketches")
-        self.asked: list[tuple[Any, ...]] = []
+        self.calls: list[tuple[Any, ...]] = []
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith(("plot_", "render_")):
             raise AttributeError(name)
 
-        def noted(*given: Any, **options: Any) -> Any:
-            self.asked.append((name, *given, options))
+        def record_call(*arguments: Any, **options: Any) -> Any:
+            self.calls.append((name, *arguments, options))
             return f"{name} of sketches"
 
-        return noted
+        return record_call
 
 
 @pytest.fixture
 def sketches(monkeypatch: pytest.MonkeyPatch) -> Sketches:
-    made = Sketches()
-    monkeypatch.setitem(sys.modules, "sketches", made)
-    return made
+    backend = Sketches()
+    monkeypatch.setitem(sys.modules, "sketches", backend)
+    return backend
 
 
-def offering(monkeypatch: pytest.MonkeyPatch, **offered: str) -> None:
-    """Let these be the entry points that installed packages have."""
-    entries = [EntryPoint(name, value, drawing.ENTRY_POINT_GROUP) for name, value in offered.items()]
+def install_backends(monkeypatch: pytest.MonkeyPatch, **backends: str) -> None:
+    """Replace the entry points of installed packages by these, as names and values."""
+    entries = [EntryPoint(name, value, drawing.ENTRY_POINT_GROUP) for name, value in backends.items()]
 
-    def found(*, group: str) -> list[EntryPoint]:
+    def select_entries(*, group: str) -> list[EntryPoint]:
         return [entry for entry in entries if entry.group == group]
 
-    monkeypatch.setattr(drawing, "entry_points", found)
+    monkeypatch.setattr(drawing, "entry_points", select_entries)
 
 
 @pytest.fixture(scope="module")
@@ -65,20 +65,20 @@ def record(empty: Environment) -> Record:
 def test_the_application_is_installed_as_the_backend() -> None:
     assert load_drawing_backend().__name__ == "robocov_app.notebook"  # type: ignore[attr-defined]
     assert load_drawing_backend("matplotlib") is load_drawing_backend()
-    wanted = list(drawing.DrawingBackend.__annotations__)
-    assert len(wanted) == 12
-    assert all(callable(getattr(load_drawing_backend(), name)) for name in wanted)
+    names = list(drawing.DrawingBackend.__annotations__)
+    assert len(names) == 12
+    assert all(callable(getattr(load_drawing_backend(), name)) for name in names)
 
 
-def test_another_backend_is_asked_for_by_name(
+def test_backends_are_selected_by_name(
     monkeypatch: pytest.MonkeyPatch, sketches: Sketches, record: Record, empty: Environment
 ) -> None:
-    offering(monkeypatch, matplotlib="robocov_app.notebook", sketches="sketches")
+    install_backends(monkeypatch, matplotlib="robocov_app.notebook", sketches="sketches")
     cost = CoverageCost(empty, 8)
     result = cost(record.positions[-1])
     history = compute_cost_history(record, cost, 2.0)
     comparison = Comparison(records={"RAPF": record}, histories={"RAPF": history})
-    for thing, name in (
+    for item, name in (
         (empty, "plot_environment"),
         (record, "plot_record"),
         (result, "plot_result"),
@@ -86,16 +86,16 @@ def test_another_backend_is_asked_for_by_name(
         (comparison, "plot_comparison"),
     ):
         axes = object()
-        assert thing.plot(axes, backend="sketches", theme="dark") == f"{name} of sketches"
-        assert sketches.asked[-1] == (name, thing, axes, {"theme": "dark"})
-        thing.plot(backend="sketches")
-        assert sketches.asked[-1] == (name, thing, None, {})
+        assert item.plot(axes, backend="sketches", theme="dark") == f"{name} of sketches"
+        assert sketches.calls[-1] == (name, item, axes, {"theme": "dark"})
+        item.plot(backend="sketches")
+        assert sketches.calls[-1] == (name, item, None, {})
 
 
-def test_without_matplotlib_the_first_by_name_draws(
+def test_without_matplotlib_the_first_backend_by_name_is_used(
     monkeypatch: pytest.MonkeyPatch, sketches: Sketches, record: Record, empty: Environment
 ) -> None:
-    offering(monkeypatch, zeichnungen="nowhere", sketches="sketches")
+    install_backends(monkeypatch, zeichnungen="nowhere", sketches="sketches")
     assert load_drawing_backend() is sketches
     assert record._repr_html_() == "render_record_html of sketches"
     assert record._repr_png_() == "render_record_png of sketches"
@@ -103,24 +103,24 @@ def test_without_matplotlib_the_first_by_name_draws(
     assert empty._repr_png_() == "render_environment_png of sketches"
 
 
-def test_a_name_that_is_none_is_refused_with_the_nearest(record: Record) -> None:
+def test_unknown_backends_get_a_suggestion(record: Record) -> None:
     with pytest.raises(ParameterError, match="unknown drawing backend 'matplot': did you mean 'matplotlib'"):
         record.plot(backend="matplot")
 
 
-@pytest.mark.parametrize("offered", [{}, {"broken": "no_such_module"}, {"broken": "json:no_such_name"}])
-def test_where_nobody_draws_plots_say_so_and_notebooks_show_the_text(
-    monkeypatch: pytest.MonkeyPatch, offered: dict[str, str], record: Record, empty: Environment
+@pytest.mark.parametrize("backends", [{}, {"broken": "no_such_module"}, {"broken": "json:no_such_name"}])
+def test_without_a_backend_plots_fail_and_notebooks_show_the_repr(
+    monkeypatch: pytest.MonkeyPatch, backends: dict[str, str], record: Record, empty: Environment
 ) -> None:
-    offering(monkeypatch, **offered)
+    install_backends(monkeypatch, **backends)
     message = (
-        r"drawing backend 'broken' of entry point .* cannot be loaded" if offered else "no drawing backend"
+        r"drawing backend 'broken' of entry point .* cannot be loaded" if backends else "no drawing backend"
     )
     with pytest.raises(RobocovError, match=message):
         empty.plot()
-    for thing in (record, empty):
-        assert thing._repr_html_() is None
-        assert thing._repr_png_() is None
+    for item in (record, empty):
+        assert item._repr_html_() is None
+        assert item._repr_png_() is None
 
 
 _LIGHT = """

@@ -32,7 +32,7 @@ def total(distance: np.ndarray, sources: np.ndarray) -> float:
 
 @settings(max_examples=40)
 @given(seed=st.integers(0, 10_000), k=st.integers(1, 5), given_=st.integers(0, 5))
-def test_plans_get_better_and_keep_what_is_given(seed: int, k: int, given_: int) -> None:
+def test_placements_improve_and_keep_the_fixed_candidates(seed: int, k: int, given_: int) -> None:
     distance = table(seed)
     begin = np.random.default_rng(seed).permutation(12)[:k]
     stays = np.arange(k) < min(given_, k)
@@ -223,7 +223,7 @@ def test_giving_up():
 
 
 @given(seed=st.integers(0, 10_000), k=st.integers(1, 4))
-def test_greedy_places_gain_most_of_what_the_best_ones_do(seed: int, k: int) -> None:
+def test_greedy_candidates_achieve_most_of_the_best_reduction(seed: int, k: int) -> None:
     """Nemhauser, Wolsey and Fisher (1978): 1 - 1/e of it; and each is the best beside the earlier ones."""
     distance = table(seed, sources=9)
     chosen = choose_greedily(distance, k)

@@ -18,7 +18,7 @@ def test_one_that_is_not_says_how_it_is_had() -> None:
     assert str(caught.value) == 'no_such_module is not installed: pip install "robocov[frames]"'
 
 
-def test_one_that_misses_something_itself_is_not_said_to_be_missing(tmp_path, monkeypatch) -> None:
+def test_a_missing_dependency_of_a_package_is_not_reported_as_the_package(tmp_path, monkeypatch) -> None:
     (tmp_path / "half_there.py").write_text("import nothing_of_that_name\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="nothing_of_that_name"):

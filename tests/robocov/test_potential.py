@@ -86,13 +86,13 @@ def test_attraction_is_minus_the_gradient_of_its_potential(
     np.testing.assert_allclose(force, expected, rtol=1e-3, atol=1e-4 * k_att)
 
 
-def test_equation_24_at_a_hand_computed_place() -> None:
+def test_equation_24_agrees_with_a_value_computed_by_hand() -> None:
     force = repulsive_force(np.array([[0.5, 0.0]]), k_rep=1.0, rho_0=2.0)
     np.testing.assert_allclose(force, [[(2.0 - 0.5) / 0.25, 0.0]])
     np.testing.assert_allclose(repulsive_potential(np.array([0.5]), 1.0, 2.0), [0.5 * 1.5**2])
 
 
-def test_equation_27_at_a_hand_computed_place() -> None:
+def test_equation_27_agrees_with_a_value_computed_by_hand() -> None:
     np.testing.assert_allclose(attractive_force(np.array([[0.0, 2.0]]), 3.0), [[0.0, 24.0]])
     np.testing.assert_allclose(attractive_potential(np.array([2.0]), 3.0), [12.0])
 

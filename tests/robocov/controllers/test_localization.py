@@ -48,7 +48,7 @@ def lines(n: int, steps: int, seed: int = 0) -> Array:
 
 
 @given(st.integers(0, 99), st.sampled_from([0.0, 0.3, 0.5]))
-def test_late_messages_of_who_goes_straight_on_are_made_up_for(seed: int, delay: float) -> None:
+def test_latency_is_compensated_for_robots_that_move_straight(seed: int, delay: float) -> None:
     paths = lines(3, 60, seed)
     known, _, errors = driven(paths, Conditions(delay=delay, message_rate=4.0))
     assert max(map(np.max, errors)) < 1e-9
@@ -88,7 +88,7 @@ def test_noise_is_averaged_out(seed: int) -> None:
     assert np.sqrt(np.mean(off**2)) < 0.09  # 0.141 m without a filter; of these seeds 20 is the worst, 0.0841
 
 
-def test_who_is_carried_away_notices_it_at_once() -> None:
+def test_a_robot_that_is_moved_notices_it_at_once() -> None:
     paths = lines(2, 100)
     paths[60:] += [3.0, 0.0]
     conditions = Conditions(position_noise=0.02)
@@ -104,7 +104,7 @@ def test_who_is_carried_away_notices_it_at_once() -> None:
 
 
 @given(st.integers(0, 20))
-def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
+def test_robots_out_of_range_do_not_affect_the_estimates(seed: int) -> None:
     """The first two and the last two are out of range of each other."""
     team = Team.homogeneous(4, communication_range=5.0)
     perception = Perception(Conditions(position_noise=0.1, loss=0.2), team, DT)
@@ -137,7 +137,7 @@ def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
 
 
 @pytest.mark.slow
-def test_atlas_touches_nobody_though_positions_are_noisy() -> None:
+def test_atlas_has_no_contacts_with_noisy_positions() -> None:
     room = Environment("room", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)), ())
     starts = [[0.5 + 0.35 * (k % 3), 0.5 + 0.35 * (k // 3)] for k in range(6)]
     for seed in range(4):

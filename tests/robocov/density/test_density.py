@@ -129,7 +129,7 @@ def test_values_of_all_kinds():
     assert WeightedPolygons((on_top, room)).evaluate(points).tolist() == [5.0, 1.0]
 
 
-def test_a_raster_has_its_lowest_row_first_and_goes_on_beyond_its_border():
+def test_a_raster_has_its_lowest_row_first_and_extends_beyond_its_border():
     values = [[1.0, 2.0], [3.0, 4.0]]
     flat = Raster(np.array(values), (0.0, 0.0, 4.0, 2.0), "cells")
     points = np.array([[1.0, 0.5], [3.0, 0.5], [1.0, 1.5], [3.0, 1.5], [9.0, -3.0]])
@@ -139,7 +139,7 @@ def test_a_raster_has_its_lowest_row_first_and_goes_on_beyond_its_border():
     assert smooth.evaluate(np.array([[2.0, 1.0]])).tolist() == [2.5]
 
 
-def test_sampled_keeps_what_is_linear():
+def test_sampling_keeps_linear_densities():
     values = np.arange(6.0)[None, :] + 2.0 * np.arange(4.0)[:, None] + 1.0
     raster = Raster(values, (0.0, 0.0, 6.0, 4.0))
     finer = sample_density(raster, (0.5, 0.5, 5.5, 3.5), 50, 30)
@@ -184,7 +184,7 @@ def test_cells_that_touch_and_coincide_with_areas():
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=12, deadline=None)
-def test_weighted_polygons_are_what_shapely_cuts_out(seed):
+def test_weighted_polygons_agree_with_intersections_by_shapely(seed):
     """An independent second way: the cells cut by the areas, the later ones on top."""
     rng = np.random.default_rng(seed)
     areas, above = [], shapely.MultiPolygon()
@@ -223,7 +223,7 @@ def test_a_raster_of_cells_is_that_many_polygons(seed, rows, columns):
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
-def test_a_cell_depends_on_nothing_but_what_its_robot_hears(density):
+def test_a_cell_depends_only_on_robots_within_range(density):
     """To the last bit, however many others there are, and wherever they are."""
     rng = np.random.default_rng(5)
     points = rng.uniform(0.5, 7.5, (40, 2))

@@ -118,6 +118,6 @@ def test_region_is_the_convex_hull_without_collinear_vertices() -> None:
         region.vertices[0, 0] = 1.0
 
 
-def test_it_is_short_in_words(cluttered: Environment, empty: Environment) -> None:
+def test_the_repr_is_short(cluttered: Environment, empty: Environment) -> None:
     assert repr(cluttered) == "<Environment cluttered, 10 x 10 m, 3 obstacles>"
     assert repr(empty) == "<Environment empty, 10 x 10 m, 0 obstacles>"

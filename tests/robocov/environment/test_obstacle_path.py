@@ -77,7 +77,7 @@ def build_moving_hall() -> Environment:
     )
 
 
-def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
+def test_the_map_at_a_time_has_obstacles_at_their_current_positions() -> None:
     environment = build_moving_hall()
     assert environment.has_moving_obstacles
     now = environment.at(4.0)
@@ -97,7 +97,7 @@ def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
     assert environment.static.obstacles == environment.obstacles[:1]
 
 
-def test_what_comes_by_again_stands_in_the_very_same_place_holes_and_all() -> None:
+def test_periodic_obstacles_return_exactly_including_holes() -> None:
     frame = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
     hole = ((1.0, 1.0), (2.0, 1.0), (2.0, 2.0))
     path = ObstaclePath(((0.0, 0.0), (0.7, 0.3)), 0.37)

@@ -102,7 +102,7 @@ def test_a_start_without_room_says_so() -> None:
 
 
 @pytest.mark.parametrize("spec", [DiscStart((5.0, 5.0), 0.9), DiscStart((0.0, 0.0), 1.5)])
-def test_one_number_says_how_many_fit_whatever_was_asked_for(spec: DiscStart) -> None:
+def test_the_capacity_of_a_start_does_not_depend_on_the_request(spec: DiscStart) -> None:
     start = Start("tight", spec, SQUARE)
     capacity = start.estimate_capacity(0.1)
     assert Start("tight", spec, SQUARE).estimate_capacity(0.1) == capacity

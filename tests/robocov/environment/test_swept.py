@@ -70,7 +70,7 @@ def test_what_is_only_touched_is_not_in_the_way() -> None:
     assert find_overlaps(area, {}) == ({}, None)
 
 
-def test_what_leaves_the_boundary_is_told() -> None:
+def test_obstacles_that_leave_the_boundary_are_reported() -> None:
     area = compute_swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
     _, beyond = find_overlaps(area, {}, shapely.box(-1, -1, 4, 1))
     assert beyond is not None and beyond.bounds == pytest.approx((4.0, -0.5, 4.5, 0.5), abs=1e-2)

@@ -27,14 +27,14 @@ def test_new_folder_is_private(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", [0o720, 0o702])
-def test_folder_that_others_may_write_to_is_refused(tmp_path: Path, mode: int) -> None:
+def test_folders_that_others_may_write_to_are_rejected(tmp_path: Path, mode: int) -> None:
     folder = tmp_path / "cache"
     folder.mkdir()
     folder.chmod(mode)
     assert open_private_folder(folder) is None
 
 
-def test_folder_that_others_may_replace_is_refused(tmp_path: Path) -> None:
+def test_folders_that_others_may_replace_are_rejected(tmp_path: Path) -> None:
     folder = tmp_path / "shared" / "cache"
     folder.mkdir(parents=True, mode=0o700)
     assert is_private(folder)
@@ -45,7 +45,7 @@ def test_folder_that_others_may_replace_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32" or os.geteuid() != 0, reason="only root gives files away")
-def test_folder_of_another_user_is_refused(tmp_path: Path) -> None:
+def test_folders_of_another_user_are_rejected(tmp_path: Path) -> None:
     folder = tmp_path / "cache"
     folder.mkdir(mode=0o700)
     os.chown(folder, 12345, -1)

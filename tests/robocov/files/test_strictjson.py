@@ -78,7 +78,7 @@ def test_of_a_key_given_twice_the_last_counts() -> None:
 
 
 @pytest.mark.parametrize("number", ["9" * 10_000, "1e999", "NaN", "-Infinity", "0.1"])
-def test_numbers_are_skipped_whatever_they_are(number: str) -> None:
+def test_numbers_of_any_form_are_skipped(number: str) -> None:
     assert find_offset(f"[{number}, 1]", (1,)) == len(number) + 3
 
 

@@ -81,7 +81,7 @@ def integrate_by_quadrature(
 
 @pytest.mark.parametrize("f", FUNCTIONS[:2] + FUNCTIONS[3:], ids=repr)
 @pytest.mark.parametrize("p", [(2.1, 1.7), (-1.0, 1.5), (6.0, -2.0)], ids=["inside", "corner", "outside"])
-def test_values_are_what_quadrature_finds(f: Performance, p: tuple[float, float]) -> None:
+def test_values_agree_with_quadrature(f: Performance, p: tuple[float, float]) -> None:
     found = compute_locational_costs(build_cell_edges(PENTAGON.vertices), np.array([p]), f)[0]
     assert found == pytest.approx(integrate_by_quadrature(PENTAGON.vertices, np.array(p), f, 1e-8), rel=3e-8)
 

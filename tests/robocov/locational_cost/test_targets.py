@@ -47,7 +47,7 @@ def test_a_density_that_is_the_same_everywhere_changes_nothing() -> None:
             )
 
 
-def test_other_words_are_refused() -> None:
+def test_unknown_targets_are_rejected() -> None:
     cells = partition(POINTS, PENTAGON)
     with pytest.raises(ParameterError, match="unknown target 'mediane': did you mean 'median'"):
         find_targets(cells, None, "mediane", 1.0)

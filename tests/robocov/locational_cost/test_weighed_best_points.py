@@ -87,7 +87,7 @@ def test_where_nothing_counts_the_centroid_stays():
 
 
 @pytest.mark.parametrize("target", ["median", "sensing"])
-def test_a_target_depends_on_nothing_but_what_its_robot_hears(target):
+def test_a_target_depends_only_on_robots_within_range(target):
     density = GAUSSIANS["two"]
     points = np.random.default_rng(5).uniform(0.5, 7.5, (30, 2))
     ranges = np.full(len(points), 1.6)

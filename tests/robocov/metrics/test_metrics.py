@@ -179,7 +179,7 @@ def test_only_working_robots_count_in_run_metrics(changing: Record) -> None:
     assert metrics.components.tolist() == [1, 1, 1]
 
 
-def test_metrics_use_the_map_of_each_moment() -> None:
+def test_metrics_use_the_map_of_each_time() -> None:
     path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), 2.0)
     wall = PolygonObstacle(((3.0, 0.0), (3.5, 0.0), (3.5, 4.0), (3.0, 4.0)), path=path)
     hall = Environment("hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), (wall,))

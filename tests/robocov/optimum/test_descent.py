@@ -96,7 +96,7 @@ def test_the_end_is_a_local_minimum_that_is_never_above_the_start(seed, count):
             assert moved is None or COST(moved).mean_distance >= result.mean_distance * (1.0 - 2e-5)
 
 
-def test_one_robot_ends_at_the_geometric_median_whatever_the_start():
+def test_one_robot_ends_at_the_geometric_median_from_any_start():
     triangle = Environment("triangle", ((0, 0), (6, 0), (0, 4)))
     cost, room = CoverageCost(triangle, 48), ConfigurationSpace(triangle.free, 0.1)
     # Weiszfeld's iteration over the same sites

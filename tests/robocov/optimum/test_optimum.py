@@ -36,7 +36,7 @@ TRAP = build_room(
 )
 
 
-def test_one_robot_stands_in_the_middle_of_a_square():
+def test_the_optimum_of_one_robot_is_the_center_of_a_square():
     best = find_optimum(build_room(4, 4), 1, restarts=3)
     np.testing.assert_allclose(best.positions, [[2, 2]], atol=1e-3)
     # the mean distance in a square from its middle
@@ -46,7 +46,7 @@ def test_one_robot_stands_in_the_middle_of_a_square():
     assert best.compute_agreement() == 1.0
 
 
-def test_four_robots_stand_in_the_middles_of_the_quarters():
+def test_the_optima_of_four_robots_are_the_centers_of_the_quarters():
     best = find_optimum(build_room(4, 4), 4)
     np.testing.assert_allclose(best.positions, [[1, 1], [1, 3], [3, 1], [3, 3]], atol=2e-3)
 
@@ -56,7 +56,7 @@ def test_two_robots_halve_a_corridor():
     np.testing.assert_allclose(best.positions, [[5, 0.25], [15, 0.25]], atol=0.01)
 
 
-def test_one_robot_stands_where_a_search_of_the_whole_plane_finds_it():
+def test_the_optimum_of_one_robot_agrees_with_an_exhaustive_search():
     arms = build_room(9, 5, build_box(0, 0, 4, 4), build_box(5, 0, 9, 4), name="T")
     best = find_optimum(arms, 1, restarts=4)
     cost = CoverageCost(arms, 64)

@@ -49,7 +49,7 @@ def test_a_team_survives_json(robots: list[tuple[float, float]]) -> None:
         ({"communication_range": -2.0}, r"or null for no limit, got -2.0 m"),
     ],
 )
-def test_limits_out_of_range_are_refused(wrong: dict[str, float], message: str) -> None:
+def test_limits_out_of_range_are_rejected(wrong: dict[str, float], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         Team.homogeneous(3, **wrong)
 
@@ -66,7 +66,7 @@ def test_teams_have_robots_and_one_value_for_each() -> None:
         Team.from_dict({"robots": 2})
 
 
-def test_it_is_short_in_words() -> None:
+def test_the_repr_is_short() -> None:
     team = Team.homogeneous(3, max_speed=0.5)
     assert repr(team) == (
         "<Team of 3 robots: radius 0.1 m, mass 1 kg, max_speed 0.5 m/s, max_acceleration 2 m/s², "

@@ -49,7 +49,7 @@ def test_json_is_the_same(tmp_path: Path) -> None:
     assert team.mass.tolist() == [1.0, 2.5]
 
 
-def test_what_a_group_leaves_open_is_as_said_for_all(tmp_path: Path) -> None:
+def test_groups_take_missing_values_from_the_defaults(tmp_path: Path) -> None:
     team = read_team(write_file(tmp_path, TEAM), {"radius": 0.3, "viscosity": 1.0, "sensing_range": None})
     assert team.radius.tolist() == [0.3, 0.3, 0.2, 0.2, 0.2]
     assert team.viscosity.tolist() == [1.0] * 5
@@ -104,7 +104,7 @@ def test_teams_survive_the_way_to_json_and_back(groups: list[dict[str, float]]) 
         ("[[group]\n", "team.toml: not TOML"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, text: str, message: str) -> None:
+def test_mistakes_in_team_files_are_reported(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as told:
         read_team(write_file(tmp_path, text))
     assert "\n" not in str(told.value)

@@ -227,7 +227,7 @@ def test_unicycles_brake_for_lateral_acceleration_that_turning_does_not_provide(
     assert np.hypot(*world.velocities[0]) == pytest.approx(0.8 - team.max_acceleration[0] * DT)
 
 
-def test_unicycles_that_are_placed_anew_face_along_x(empty: Environment) -> None:
+def test_placed_unicycles_face_along_x(empty: Environment) -> None:
     """Robots of the other run keep their heading."""
     starts = np.array([[2.0, 2.0], [5.0, 5.0]])
     steering = np.array([[1.0, 0.5], [2.0, 0.25]])
