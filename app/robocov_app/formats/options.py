@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from robocov.errors import ParameterError, quote, require_number
 from robocov_app.formats.colors import ROLES, ColorKey
@@ -14,6 +14,14 @@ _MIN_LENGTH_M = 1e-6
 _MAX_LENGTH_M = 1e4
 _LENGTH_RANGE = (_MIN_LENGTH_M, _MAX_LENGTH_M, "m")
 _STROKE_WIDTH = re.compile(r"(\d{1,6}(?:\.\d{0,9})?|\.\d{1,9})\s*(px|m)?", re.ASCII)
+
+
+_Value = TypeVar("_Value")
+
+
+def get_or_default(value: _Value | None, default: _Value) -> _Value:
+    """Return the value of an option, or a default if it is not given."""
+    return default if value is None else value
 
 
 @dataclass(frozen=True)
@@ -158,7 +166,7 @@ class ReadOptions(Options):
         ParameterError
             If a color is unknown, or given twice.
         """
-        tolerance = default_tolerance if self.color_tolerance is None else self.color_tolerance
+        tolerance = get_or_default(self.color_tolerance, default_tolerance)
         names = {role: getattr(self, f"{role}_color") or () for role in ROLES}
         return ColorKey.from_names(names, tolerance)
 

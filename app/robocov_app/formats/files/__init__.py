@@ -1,6 +1,6 @@
 """Reading foreign files safely: limits, text, JSON, YAML, XML and the other files that a file names."""
 
-from robocov_app.formats.files.json_file import JsonFile, is_number
+from robocov_app.formats.files.json_file import JsonFile, get_member, is_number
 from robocov_app.formats.files.limits import (
     MAX_CELLS,
     MAX_DEPTH,
@@ -40,6 +40,7 @@ __all__ = [
     "Value",
     "find_named_file",
     "get_map_name",
+    "get_member",
     "is_number",
     "parse_integers",
     "parse_number",

@@ -87,6 +87,11 @@ class JsonFile:
         return np.array(value, dtype=float)
 
 
+def get_member(value: object, name: str) -> Any:
+    """Return a member of a JSON object, or None if a value is not an object or does not have it."""
+    return value.get(name) if isinstance(value, dict) else None
+
+
 def is_number(value: object) -> bool:
     """Return whether a JSON value is a number that is small enough to compute with."""
     return type(value) in (int, float) and -1e100 < value < 1e100  # type: ignore[operator]

@@ -68,7 +68,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     """
     content = files.read_content(path, files.MAX_TEXT_BYTES)
     sequence = _convert_to_list(content, path.suffix.lower())
-    file = JsonFile(path, content if sequence is None else sequence)
+    if sequence is not None:
+        content = sequence
+    file = JsonFile(path, content)
     shapes = Shapes(file.where, options)
     collector = GeometryCollector(file, shapes)
     collector.collect(is_sequence=sequence is not None)
@@ -129,7 +131,10 @@ def _convert_records_to_list(text: bytes) -> bytes:
     pieces = [b"[", first]
     for record in others:
         is_empty = not record.strip()
-        pieces.append(b"," if has_record and not is_empty else b" ")
+        if has_record and not is_empty:
+            pieces.append(b",")
+        else:
+            pieces.append(b" ")
         pieces.append(record)
         has_record |= not is_empty
     return b"".join(pieces) + b"]"
@@ -170,7 +175,7 @@ class GeometryCollector:
 
     def _add_text(self, text: Any, at: JsonPath) -> None:
         """Add a GeoJSON text: a geometry, a feature or a collection of features."""
-        kind = text.get("type") if isinstance(text, dict) else None
+        kind = files.get_member(text, "type")
         if kind == "FeatureCollection":
             features = text.get("features")
             if not isinstance(features, list):
@@ -215,7 +220,7 @@ class GeometryCollector:
         MapError
             If it is not a geometry.
         """
-        kind = geometry.get("type") if isinstance(geometry, dict) else None
+        kind = files.get_member(geometry, "type")
         expected = f"one of {', '.join(_GEOMETRIES)}"
         if kind is None:
             raise self.file.build_error(at, geometry, expected)
@@ -263,8 +268,7 @@ class GeometryCollector:
         value = member.get("crs")
         if value is None:
             return
-        properties = value.get("properties") if isinstance(value, dict) else None
-        name = properties.get("name") if isinstance(properties, dict) else None
+        name = files.get_member(files.get_member(value, "properties"), "name")
         if not isinstance(name, str):
             raise self.file.build_error((*at, "crs"), value, "the name of a reference system")
         if self.crs not in (None, name):
@@ -317,7 +321,9 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     origin = options.origin
     digits = options.digits
     if digits is None:
-        digits = DEFAULT_DIGITS if origin is None else DEFAULT_DIGITS + _EXTRA_DIGITS_OF_DEGREES
+        digits = DEFAULT_DIGITS
+        if origin is not None:
+            digits += _EXTRA_DIGITS_OF_DEGREES
     header: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
     if environment.description:
         header["description"] = environment.description
@@ -381,7 +387,9 @@ def _format_shape(
     if not polygons:
         written.lost += 1
         return
-    geometry = polygons[0] if len(polygons) == 1 else MultiPolygon(polygons)
+    geometry = MultiPolygon(polygons)
+    if len(polygons) == 1:
+        geometry = polygons[0]
     feature = {"type": "Feature", "properties": properties, "geometry": mapping(geometry)}
     written.features.append(json.dumps(feature, ensure_ascii=False))
 

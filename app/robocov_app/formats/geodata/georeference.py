@@ -16,6 +16,7 @@ from robocov.mapfile.models import MAX_SIZE_M
 from robocov.optional_imports import import_optional
 from robocov_app.formats.files import require_shapes
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
+from robocov_app.formats.options import get_or_default
 
 DEGREES = "OGC:CRS84"
 """Longitude and latitude on WGS 84, the system of all GeoJSON (RFC 7946, section 4)."""
@@ -79,7 +80,7 @@ def convert_to_meters(
         shapes.notes.append("coordinates taken as meters: as degrees the map would be larger than 10 km")
     if crs is not None:
         shapes.notes.append(f"coordinates of {crs} taken as they are")
-    meters_per_unit = 1.0 if scale is None else scale
+    meters_per_unit = get_or_default(scale, 1.0)
     return _replace_points(geometries, _join_points(geometries) * meters_per_unit)
 
 

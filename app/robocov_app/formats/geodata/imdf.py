@@ -81,7 +81,7 @@ class _Archive:
         if file is None:
             return []
         document = file.document
-        features = document.get("features") if isinstance(document, dict) else None
+        features = files.get_member(document, "features")
         if not isinstance(features, list):
             raise file.build_error(("features",), features, "a list of features")
         for k, feature in enumerate(features):
@@ -130,7 +130,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                     shapes.leave_out(name, "that is no area")
                     continue
                 roles.append(role)
-                geometries.append(_straighten(geometry) if role == "opening" else geometry)
+                if role == "opening":
+                    geometry = _straighten(geometry)
+                geometries.append(geometry)
     if without_floor:
         shapes.notes.append(f"stairs, lifts and openings to below taken as solid: {without_floor}")
     geometries = convert_to_meters(geometries, shapes, DEGREES)
@@ -159,7 +161,9 @@ def _choose_role(name: str, feature: dict[str, Any], geometry: SourceGeometry) -
     category = _get_category(feature)
     if category in _SOLID or category in _NO_FLOOR:
         return "solid"
-    return "open" if category in _OPEN else "walled"
+    if category in _OPEN:
+        return "open"
+    return "walled"
 
 
 def _read_folder(path: Path) -> dict[str, bytes]:
@@ -288,7 +292,10 @@ def _get_level_id(feature: dict[str, Any]) -> str | None:
 def _get_category(feature: dict[str, Any]) -> str:
     """Return the category of a feature up to the first dot."""
     category = feature["properties"].get("category")
-    return to_one_line(category).partition(".")[0] if isinstance(category, str) else ""
+    if not isinstance(category, str):
+        return ""
+    first, _, _ = to_one_line(category).partition(".")
+    return first
 
 
 def _collect_geometries(

@@ -20,7 +20,7 @@ from robocov_app.formats import files
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, GridFrame, build_grid_map
 from robocov_app.formats.geometry.cells.rasterize import build_grid, build_grid_report, find_free_cells
-from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.options import ReadOptions, WriteOptions, get_or_default
 from robocov_app.formats.reports import ExportReport
 
 DEFAULT_CELL_M = 1.0
@@ -79,8 +79,10 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         row, column = np.argwhere(is_unknown)[0].tolist()
         place = f"{where}: line {header.body_line + row}, column {column + 1}"
         raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(letters[row, column]))}")
-    cell = DEFAULT_CELL_M if options.cell is None else options.cell
-    notes = (f"no cell size was given: {DEFAULT_CELL_M:g} m taken",) if options.cell is None else ()
+    cell = get_or_default(options.cell, DEFAULT_CELL_M)
+    notes: tuple[str, ...] = ()
+    if options.cell is None:
+        notes = (f"no cell size was given: {DEFAULT_CELL_M:g} m taken",)
     return build_grid_map(
         cells,
         GridFrame(cell),
@@ -96,8 +98,11 @@ def _build_letter_table(options: ReadOptions) -> NDArray[np.uint8]:
     table = np.full(256, _UNKNOWN_LETTER, np.uint8)
     table[list(_PASSABLE_LETTERS)] = FREE
     table[list(_SOLID_LETTERS)] = BLOCKED
-    table[ord("T")] = FREE if options.trees == "free" else BLOCKED
-    table[ord("W")] = FREE if options.water == "free" else BLOCKED
+    table[[ord("T"), ord("W")]] = BLOCKED
+    if options.trees == "free":
+        table[ord("T")] = FREE
+    if options.water == "free":
+        table[ord("W")] = FREE
     return table
 
 
@@ -126,8 +131,12 @@ def _parse_header(content: bytes, where: str) -> _Header:
     for number in range(1, _MAX_HEADER_LINES + 1):
         limit = at + _MAX_HEADER_LINE_BYTES
         end = content.find(b"\n", at, limit)
-        line = content[at:end] if end >= 0 else content[at:limit]
-        at = end + 1 if end >= 0 else len(content)
+        if end >= 0:
+            line = content[at:end]
+            at = end + 1
+        else:
+            line = content[at:limit]
+            at = len(content)
         words = line.decode("ascii", "replace").split()
         place = f"{where}: line {number}"
         if not words:

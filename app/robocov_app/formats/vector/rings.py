@@ -16,7 +16,7 @@ from robocov.errors import JsonPath
 from robocov_app.formats.files import JsonFile, get_map_name, require_shapes
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.shapes.collection import Shapes
-from robocov_app.formats.options import ReadOptions
+from robocov_app.formats.options import ReadOptions, get_or_default
 
 _NESTED_LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")
 _FLAT_VERTICES = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
@@ -41,7 +41,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     polygons = parser.parse_polygons()
     shapes = parser.shapes
     require_shapes(len(polygons), shapes.where)
-    scale = 1.0 if options.scale is None else options.scale
+    scale = get_or_default(options.scale, 1.0)
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}")
     remark = "" if options.scale else " (the file says none; --scale)"

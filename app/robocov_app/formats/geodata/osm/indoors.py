@@ -51,13 +51,17 @@ def _choose_role(element: OsmElement) -> Role | None:
     if element.kind == "node":
         if {"door", "entrance"} & tags.keys() or indoor == "door":
             return "opening"
-        return "post" if indoor in ("column", "pillar") else None
+        if indoor in ("column", "pillar"):
+            return "post"
+        return None
     if _is_stairs(tags) and indoor not in ("", "no"):
         return "solid"
     if indoor in ("column", "pillar") or (indoor == "wall" and tags.get("area") == "yes"):
         return "solid"
+    if indoor == "wall" and element.kind == "way":
+        return "wall"
     if indoor == "wall":
-        return "wall" if element.kind == "way" else "solid"
+        return "solid"
     return _SPACES.get(indoor)
 
 
@@ -167,20 +171,20 @@ def _find_neighbors(doors: set[int], data: OsmData, walls: list[OsmElement]) -> 
 
 def _get_adjacent_nodes(nodes: list[int], k: int) -> tuple[int, int]:
     """Return the nodes before and after node `k` of a way; at an open end, the node itself."""
-    before = k - 1
-    after = k + 1
     is_closed = len(nodes) > 2 and nodes[0] == nodes[-1]
-    if before < 0:
-        before = len(nodes) - 2 if is_closed else k
-    if after == len(nodes):
-        after = 1 if is_closed else k
-    return nodes[before], nodes[after]
+    if is_closed:
+        # The first node is the last one, too.
+        side_count = len(nodes) - 1
+        return nodes[(k - 1) % side_count], nodes[(k + 1) % side_count]
+    return nodes[max(k - 1, 0)], nodes[min(k + 1, len(nodes) - 1)]
 
 
 def _build_opening(door: SourceGeometry) -> SourceGeometry:
     """Return the line across an opening, in meters, of a door as of `_find_doors`."""
     before, middle, after = door.rings[0]
-    direction = after - before if (after != before).any() else after - middle
+    direction = after - before
+    if not direction.any():
+        direction = after - middle
     length = float(np.hypot(*direction))
     width = door.width or DEFAULT_DOOR_WIDTH_M
     half: Array = direction * (width / 2 / max(length, _MIN_LENGTH_M))

@@ -115,7 +115,7 @@ def _read_json(path: Path) -> OsmData:
     file = JsonFile(path)
     data = OsmData(file.where)
     document = file.document
-    elements = document.get("elements") if isinstance(document, dict) else None
+    elements = files.get_member(document, "elements")
     if not isinstance(elements, list):
         raise file.build_error(("elements",), elements, "a list of elements")
     bounds = document.get("bounds")

@@ -18,6 +18,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.crossings import extract_sides
+from robocov_app.formats.options import get_or_default
 from robocov_app.formats.reports import ExportReport
 
 DEFAULT_CELL_M = 0.05
@@ -145,7 +146,7 @@ def build_grid(environment: Environment, cell: float | None, maximum: int = MAX_
     ParameterError
         If there would be more cells.
     """
-    cell = DEFAULT_CELL_M if cell is None else cell
+    cell = get_or_default(cell, DEFAULT_CELL_M)
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
     # To a thousandth of a cell, so that a wall on the last line of cells does not need another one.
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2

@@ -177,7 +177,7 @@ def _fill_notches(outline: Polygon, conversion: Conversion) -> Polygon:
     know is the same.
     """
     outline = Polygon(outline.exterior)
-    walls = [each for each in conversion.foreign.primitives if isinstance(each, WallObstacle)]
+    walls = [wall for wall in conversion.foreign.primitives if isinstance(wall, WallObstacle)]
     if not walls:
         return outline
     tolerance = conversion.tolerance

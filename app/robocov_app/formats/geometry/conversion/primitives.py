@@ -115,7 +115,7 @@ def _match_primitives(
         transform_numbers(primitive, lambda value: round(value, conversion.digits) + 0.0): primitive
         for primitive in conversion.foreign.primitives
     }
-    usable = [each for each in rounded_primitives if _fits_map(each) and each not in rejected]
+    usable = [shape for shape in rounded_primitives if _fits_map(shape) and shape not in rejected]
     if not usable or len(usable) > MAX_PRIMITIVES:
         return layout
     # The exact primitives, as a circle of a slightly different radius may have another number of sides.

@@ -12,7 +12,7 @@ from robocov.environment import MIN_START_GAP_RADII
 from robocov.errors import MapError, ParameterError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats.foreign_map import ForeignMap
-from robocov_app.formats.options import Options
+from robocov_app.formats.options import Options, get_or_default
 
 DEFAULT_TOLERANCE_M = 0.02
 """Distance by which walls of vector formats may move."""
@@ -95,7 +95,7 @@ class Conversion:
     @property
     def min_obstacle_area(self) -> float:
         """Area below which obstacles are dropped as specks, m²."""
-        return self.foreign.specks if self.shaping.specks is None else self.shaping.specks
+        return get_or_default(self.shaping.specks, self.foreign.specks)
 
     @cached_property
     def digits(self) -> int:

@@ -18,6 +18,7 @@ from robocov_app.formats.geometry.shapes.snapping import (
     join_line_ends,
     union_on_grid,
 )
+from robocov_app.formats.options import get_or_default
 
 DEFAULT_AROUND_M = 1.0
 """Distance from the shapes to the rectangle around them."""
@@ -75,7 +76,7 @@ def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozen
     if enclosed is not None:
         source = f"the outer edge of the walls, around {enclosed.area:.4g} m²"
         return Boundary(MultiPolygon([enclosed]), source)
-    around = DEFAULT_AROUND_M if drawing.options.around is None else drawing.options.around
+    around = get_or_default(drawing.options.around, DEFAULT_AROUND_M)
     everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
     x, y, right, top = shapely.total_bounds(everything)
     box = shapely.box(x - around, y - around, right + around, top + around)
@@ -184,7 +185,9 @@ def _find_nested_pairs(areas: Array, tree: STRtree) -> tuple[Array, Array]:
 def _find_covering_outline(drawing: Drawing) -> Boundary | None:
     """Return the largest outline if all others lie wholly in it."""
     largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
-    members = {each for each in drawing.outlines if each.whole != "" and each.whole == largest.whole}
+    members = {
+        outline for outline in drawing.outlines if outline.whole != "" and outline.whole == largest.whole
+    }
     if len(members) == len(drawing.outlines):
         members = set()
     members.add(largest)

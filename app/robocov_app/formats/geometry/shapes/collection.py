@@ -29,7 +29,7 @@ from robocov_app.formats.geometry.shapes.shape_types import (
     WallLine,
     get_obstacle_name,
 )
-from robocov_app.formats.options import ReadOptions
+from robocov_app.formats.options import ReadOptions, get_or_default
 
 __all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
 DEFAULT_THICKNESS_M = 0.1
@@ -74,7 +74,7 @@ class Shapes:
         self.labels = LabelFilter(where, options)
         self.tally = ImportTally()
         self.vertices = 0
-        self.thickness = DEFAULT_THICKNESS_M if options.thickness is None else options.thickness
+        self.thickness = get_or_default(options.thickness, DEFAULT_THICKNESS_M)
         self.robots: list[tuple[float, float]] = []
         self.notes: list[str] = []
         self.cell: float | None = None

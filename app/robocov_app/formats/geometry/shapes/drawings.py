@@ -43,6 +43,11 @@ class Boundary:
     is_guess: bool = False
 
 
+def get_outlines(boundary: Boundary | None) -> frozenset[ClosedOutline]:
+    """Return the outlines that a boundary consists of, none if there is no boundary."""
+    return frozenset() if boundary is None else boundary.outlines
+
+
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """The shapes of a file.

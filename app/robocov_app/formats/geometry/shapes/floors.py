@@ -8,7 +8,7 @@ from shapely import LineString, MultiPolygon, Polygon
 
 from robocov_app.formats.colors import WHITE, count_colors
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
-from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing, InterpretationReport
+from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing, InterpretationReport, get_outlines
 from robocov_app.formats.geometry.shapes.painting import (
     PaintLayer,
     find_evident_floors,
@@ -66,14 +66,15 @@ def find_floors(
     -------
     Floors
     """
-    used = frozenset() if boundary is None else boundary.outlines
+    used = get_outlines(boundary)
     others = [outline for outline in drawing.outlines if outline not in used]
     chosen = {outline for outline in others if outline.role == "free"}
     is_slab = are_solid and boundary is not None and _is_slab(drawing, boundary)
     if are_solid and drawing.options.outlines is None:
-        undecided = [each for each in others if each.role is None and each.color is not None]
+        undecided = [outline for outline in others if outline.role is None and outline.color is not None]
         if is_slab:
-            pale_floors = _PaleFloors([each for each in undecided if is_pale(each.color)], "on a dark ground")
+            pale = [outline for outline in undecided if is_pale(outline.color)]
+            pale_floors = _PaleFloors(pale, "on a dark ground")
         else:
             pale_floors = _find_pale_floors(drawing, boundary, others, undecided)
         _report_pale(drawing, undecided, pale_floors, report)
@@ -87,23 +88,24 @@ def find_nested_areas(
     drawing: Drawing, boundary: Boundary | None, report: InterpretationReport
 ) -> NestedAreas | None:
     """Divide the outlines of a drawing, which are free and solid in turns; None if there are none."""
-    used = frozenset() if boundary is None else boundary.outlines
-    areas = [each.area for each in drawing.outlines if each not in used and each.role is None]
+    used = get_outlines(boundary)
+    others = [outline for outline in drawing.outlines if outline not in used]
+    areas = [outline.area for outline in others if outline.role is None]
     if not areas:
         return None
     odd, even = split_alternating(areas)
     if boundary is not None:
         report.notes.append("what lies in an odd number of outlines within the boundary is solid")
         return NestedAreas(boundary, PaintLayer(odd, -1))
-    is_odd_free = odd.area >= even.area
-    if is_odd_free:
+    if odd.area >= even.area:
+        number = "an odd number"
         free = odd
         solid = even
     else:
+        number = "an even number"
         free = even
         solid = odd
     whole = to_multipolygon(unite([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
-    number = "an odd number" if is_odd_free else "an even number"
     size = format_area(free.area, 3)
     report.notes.append(f"what lies in {number} of outlines is free, {size}, as the larger area")
     return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, -1))
@@ -137,8 +139,8 @@ def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
     (outline,) = boundary.outlines
     if outline.role is not None:
         return outline.role == "solid"
-    later = [each for each in drawing.outlines if each.order > outline.order and each.role != "solid"]
-    return is_dark(outline.color) and any(is_pale(each.color) for each in later)
+    later = [other for other in drawing.outlines if other.order > outline.order and other.role != "solid"]
+    return is_dark(outline.color) and any(is_pale(other.color) for other in later)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,14 +163,15 @@ def _find_pale_floors(
     marks += [PaintLayer(LineString(line.points), line.order, line.color) for line in lines]
     is_evident = find_evident_floors([outline.paint_layer for outline in undecided], marks)
     chosen = [outline for outline, evident in zip(undecided, is_evident, strict=True) if evident]
-    chosen += [each for each in undecided if each not in chosen and _is_unseen(each, boundary)]
+    rest = [outline for outline in undecided if outline not in chosen]
+    chosen += [outline for outline in rest if _is_unseen(outline, boundary)]
     reason = "as darker paint lies on such" if any(is_evident) else "in the color of the ground"
     return _PaleFloors(chosen, reason)
 
 
 def _is_unseen(outline: ClosedOutline, boundary: Boundary | None) -> bool:
     """Return whether an outline has the pale color of the ground and no stroke: it only covers others."""
-    ground = [] if boundary is None else [each.color for each in boundary.outlines]
+    ground = [background.color for background in get_outlines(boundary)]
     return is_pale(outline.color) and not outline.edges and outline.color in (ground or [WHITE])
 
 

@@ -12,10 +12,10 @@ Lines and pillars are obstacles in both cases. The boundary is, in this order,
 4. a rectangle around everything, at the distance of the option ``around``.
 
 If the colors of a drawing are known, a fill covers the shapes that were painted before it, and colors that
-the user declares free are free. Floors are pale fills with something darker painted on them, and others of their
-color or of the size of a room; pale fills in the color of the ground, without a stroke; and all pale fills
-on a dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free and
-solid in turns, from the outside in.
+the user declares free are free. Floors are pale fills with something darker painted on them, and others of
+their color or of the size of a room; pale fills in the color of the ground, without a stroke; and all pale
+fills on a dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free
+and solid in turns, from the outside in.
 
 In drawings whose outlines are free by default, 2 is different: if an outline is in a larger one, the boundary
 is all outlines that are in no other, and those that are in another one are obstacles.
@@ -45,6 +45,7 @@ from robocov_app.formats.geometry.shapes.drawings import (
     Interpretation,
     InterpretationReport,
     fill_area_holes,
+    get_outlines,
 )
 from robocov_app.formats.geometry.shapes.floors import (
     Floors,
@@ -101,7 +102,9 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     else:
         obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=False)
         ground = nested.solid
-    layers = [*obstacles.layers] if ground is None else [*obstacles.layers, ground]
+    layers = [*obstacles.layers]
+    if ground is not None:
+        layers.append(ground)
     free = _subtract(region, uncover(layers, floors.layers))
     _describe(drawing, boundary, obstacles, report, are_solid=are_solid)
     return Interpretation(
@@ -148,18 +151,19 @@ def _are_solid(drawing: Drawing, boundary: Boundary | None, *, solid: bool) -> b
 def _build_region(
     drawing: Drawing, boundary: Boundary | None, report: InterpretationReport, *, are_solid: bool
 ) -> MultiPolygon:
-    """Return what would be free without any obstacle, m; MapError if there is nothing."""
+    """Return the area that is free without any obstacle, m. Raises MapError if it is empty."""
     if are_solid:
         assert boundary is not None
         region = boundary.area
     else:
-        used = frozenset() if boundary is None else boundary.outlines
+        used = get_outlines(boundary)
         outlines = [outline for outline in drawing.outlines if outline.role != "solid"]
         areas = [outline.area for outline in outlines if outline not in used]
+        region = MultiPolygon()
         if areas:
             region = report.join_areas(areas, drawing.snap)
-        else:
-            region = MultiPolygon() if boundary is None else boundary.area
+        elif boundary is not None:
+            region = boundary.area
     if region.is_empty:
         reason = "no closed outline, expected one that encloses free space"
         raise MapError(f"{drawing.where}: {reason}")
@@ -204,8 +208,9 @@ def _find_obstacles(
 ) -> _Obstacles:
     """Return the obstacles in a region, m, that has the given boundary."""
     used = Boundary(region) if boundary is None else boundary
-    others = [each for each in drawing.outlines if each not in used.outlines and each not in floors.outlines]
-    outlines = [each for each in others if are_solid or each.role == "solid"]
+    excluded = used.outlines | floors.outlines
+    others = [outline for outline in drawing.outlines if outline not in excluded]
+    outlines = [outline for outline in others if are_solid or outline.role == "solid"]
     edges = [edge for outline in drawing.outlines if outline in floors.outlines for edge in outline.edges]
     lines = [line for line in drawing.lines if line not in used.lines]
     walls = [line for line in (*lines, *edges) if line.role != "free"]

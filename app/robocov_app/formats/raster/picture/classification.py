@@ -11,7 +11,7 @@ from robocov.errors import MapError, format_count
 from robocov_app.formats.colors import NO_ROLE, ROLES, Role
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.geometry.cells.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
-from robocov_app.formats.options import ReadOptions
+from robocov_app.formats.options import ReadOptions, get_or_default
 from robocov_app.formats.raster.picture.brightness import OPAQUE_ALPHA, STRIP_ROWS, Brightness
 from robocov_app.formats.reports import format_area
 
@@ -23,6 +23,8 @@ _LINE_WIDTH_FRACTION = 0.05
 """Width of a line, of the shorter side of a picture: no line is as wide."""
 _SOFT_EDGE_PX = 2
 """Number of pixels from one color to the next."""
+_DEFAULT_THRESHOLD = 0.5
+"""Brightness, from 0 to 1, of the darkest free pixels."""
 _ROLE_LABELS: dict[Role, str] = {"free": "free", "solid": "obstacles", "ignore": "left out"}
 
 
@@ -60,9 +62,11 @@ def _get_role_code(role: Role) -> int:
 
 def _classify_brightness(picture: Brightness, options: ReadOptions) -> Cells:
     """Return light pixels as free cells, or dark ones if the option ``invert`` is set."""
-    threshold = 0.5 if options.threshold is None else options.threshold
+    threshold = get_or_default(options.threshold, _DEFAULT_THRESHOLD)
     shade = np.arange(picture.full + 1) / picture.full
-    is_free = shade <= 1.0 - threshold if options.invert else shade >= threshold
+    is_free = shade >= threshold
+    if options.invert:
+        is_free = shade <= 1.0 - threshold
     table = np.where(is_free, FREE, BLOCKED).astype(np.uint8)
     return table[picture.level]
 

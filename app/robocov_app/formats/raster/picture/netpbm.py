@@ -5,7 +5,7 @@ thresholds of ROS give, and takes half a second for a million pixels.
 """
 
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,40 +45,70 @@ def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
     MapError
         If the picture is broken or too large.
     """
-    width, height, maximum, at = _parse_header(data, where)
-    channels = 3 if data[1:2] in b"36" else 1
-    count = width * height * channels
+    header = _parse_header(data, where)
+    maximum = header.maximum
     if data[1:2] in b"56":
-        levels: Any = _decode_raw(data, at, count, maximum, channels, where)
+        levels: Any = _decode_raw(data, header, where)
     else:
-        levels = _parse_plain(data[at:], count, where)
+        levels = _parse_plain(data[header.end :], header.level_count, where)
     highest = int(levels.max())
     if highest > maximum:
         raise MapError(f"{where}: expected at most {maximum}, the largest value, got a pixel of {highest}")
-    pixels = levels.reshape(height, width, channels)
-    roles = np.zeros((height, width), np.uint8) if key else None
+    pixels = levels.reshape(header.height, header.width, header.channels)
+    roles = None
+    if key:
+        roles = np.zeros((header.height, header.width), np.uint8)
     pieces = []
-    step = choose_thumbnail_step(width, height)
-    for top in range(0, height, STRIP_ROWS):
+    step = choose_thumbnail_step(header.width, header.height)
+    for top in range(0, header.height, STRIP_ROWS):
         strip = pixels[top : top + STRIP_ROWS]
         if roles is not None:
             roles[top : top + STRIP_ROWS] = key.classify(to_rgb(strip, maximum))
         pieces.append(to_rgb(strip[::step, ::step], maximum))
     thumbnail = np.concatenate(pieces)
-    if channels == 1:
+    if header.channels == 1:
         return Brightness(pixels[:, :, 0], maximum, roles=roles, thumbnail=thumbnail)
     total = pixels.sum(axis=2, dtype=np.uint32)
     return Brightness(total, 3 * maximum, roles=roles, thumbnail=thumbnail)
 
 
-def _parse_header(data: bytes, where: str) -> tuple[int, int, int, int]:
-    """Return the width, the height, the largest value, and where the header ends."""
+class _Header(NamedTuple):
+    """The header of a picture.
+
+    Attributes
+    ----------
+    width, height : int, px
+    channels : int
+        1 for gray, 3 for red, green and blue.
+    maximum : int
+        Level of white.
+    end : int
+        Index of the byte after the header.
+    """
+
+    width: int
+    height: int
+    channels: int
+    maximum: int
+    end: int
+
+    @property
+    def level_count(self) -> int:
+        """Number of levels, one for each pixel and channel."""
+        return self.width * self.height * self.channels
+
+
+def _parse_header(data: bytes, where: str) -> _Header:
+    """Parse the type, the width, the height and the maximum level."""
     numbers = []
     at = 2
     for name in ("width", "height", "largest value"):
         blank = _BLANK.match(data, at)
-        start = blank.end() if blank else at
-        digits = _DIGITS.match(data, start) if blank else None
+        start = at
+        digits = None
+        if blank is not None:
+            start = blank.end()
+            digits = _DIGITS.match(data, start)
         if digits is None or len(digits[0]) > _MAX_NUMBER_DIGITS:
             actual = quote(data[start:][:12])
             raise MapError(f"{where}: {name}: expected a whole number, got {actual}")
@@ -88,20 +118,27 @@ def _parse_header(data: bytes, where: str) -> tuple[int, int, int, int]:
     files.require_cells(width, height, where)
     if not 1 <= maximum <= _MAX_LEVEL:
         raise MapError(f"{where}: largest value: expected a number from 1 to {_MAX_LEVEL}, got {maximum}")
-    return width, height, maximum, at
+    channels = 1
+    if data[1:2] in b"36":
+        channels = 3
+    return _Header(width, height, channels, maximum, at)
 
 
-def _decode_raw(data: bytes, at: int, count: int, maximum: int, channels: int, where: str) -> Any:
-    """Return `count` levels of one or two bytes each; what comes after the picture is ignored."""
-    raw = np.dtype(np.uint8 if maximum < 256 else ">u2")
+def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
+    """Return the levels, of one or two bytes each; bytes after the picture are ignored."""
+    raw: np.dtype[Any] = np.dtype(np.uint8)
+    if header.maximum > 255:
+        raw = np.dtype(">u2")
+    count = header.level_count
     size = count * raw.itemsize
     # One blank ends the header, or a line end of two bytes.
-    has_long_line_end = data[at : at + 2] == b"\r\n" and len(data) - at - 2 >= size
-    at += 2 if has_long_line_end else 1
-    if len(data) - at < size:
-        complete = max(0, len(data) - at) // raw.itemsize
-        raise MapError(f"{where}: cut off after {complete // channels} of {count // channels} pixels")
-    return np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
+    start = header.end + 1
+    if data[header.end : header.end + 2] == b"\r\n" and len(data) - header.end - 2 >= size:
+        start = header.end + 2
+    if len(data) - start < size:
+        complete = max(0, len(data) - start) // raw.itemsize // header.channels
+        raise MapError(f"{where}: cut off after {complete} of {count // header.channels} pixels")
+    return np.frombuffer(data, raw, count, start).astype(raw.newbyteorder("="), copy=False)
 
 
 def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
@@ -116,15 +153,21 @@ def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     at = 0
     while done < count and at < len(text):
         blank = _BLANK.search(text, at + _PIECE_BYTES)
-        end = blank.start() if blank else len(text)
-        numbers = files.parse_integers(text[at:end], " ")
-        at = blank.end() if blank else len(text)
+        piece = text[at:]
+        next_piece = len(text)
+        if blank is not None:
+            piece = text[at : blank.start()]
+            next_piece = blank.end()
+        numbers = files.parse_integers(piece, " ")
+        at = next_piece
         if numbers is None:
             raise MapError(f"{where}: pixels that are not whole numbers, of {count}")
         numbers = numbers[: count - done]
         invalid = numbers[(numbers < 0) | (numbers > _MAX_LEVEL)]
         if len(invalid):
-            worst = min(invalid) if min(invalid) < 0 else max(invalid)
+            worst = max(invalid)
+            if min(invalid) < 0:
+                worst = min(invalid)
             raise MapError(f"{where}: expected a number from 0 to {_MAX_LEVEL}, got a pixel of {worst}")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)

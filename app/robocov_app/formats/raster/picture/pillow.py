@@ -169,14 +169,23 @@ def _convert_bytes(
     has_alpha: bool,
 ) -> Brightness:
     """Convert a picture of 8 bits; only a strip of it is copied at a time."""
-    mode = "L" if is_gray else "RGB"
+    shape = (image.height, image.width)
+    level: Any
+    if is_gray:
+        mode = "L"
+        channels = 1
+        level = np.empty(shape, np.uint8)
+    else:
+        mode = "RGB"
+        channels = 3
+        level = np.empty(shape, np.uint16)
+    alpha = None
     if has_alpha:
         mode += "A"
-    channels = 1 if is_gray else 3
-    shape = (image.height, image.width)
-    level: Any = np.empty(shape, np.uint8 if is_gray else np.uint16)
-    alpha = np.empty(shape, np.uint8) if has_alpha else None
-    roles = np.empty(shape, np.uint8) if key else None
+        alpha = np.empty(shape, np.uint8)
+    roles = None
+    if key:
+        roles = np.empty(shape, np.uint8)
     step = choose_thumbnail_step(image.width, image.height)
     pieces = []
     for top in range(0, image.height, STRIP_ROWS):
@@ -206,7 +215,9 @@ def _shrink(strip: Image, step: int) -> NDArray[np.uint8]:
     """Return a strip of a picture in its colors on white, `step` times smaller, (rows, columns, 3)."""
     import PIL.Image
 
-    small = strip.reduce(step) if step > 1 else strip
+    small = strip
+    if step > 1:
+        small = strip.reduce(step)
     if small.mode in ("LA", "RGBA"):
         small = small.convert("RGBA")
         white = PIL.Image.new("RGBA", small.size, "white")

@@ -15,7 +15,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.errors import ParameterError
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
-from robocov_app.formats.options import ReadOptions
+from robocov_app.formats.options import ReadOptions, get_or_default
 from robocov_app.formats.raster.picture import Brightness
 from robocov_app.formats.raster.ros.metadata import Metadata
 
@@ -43,7 +43,7 @@ def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, wher
     ParameterError
         If the option ``threshold`` is given for the mode trinary, which has two of its own.
     """
-    threshold = _DEFAULT_OCCUPANCY if options.threshold is None else options.threshold
+    threshold = get_or_default(options.threshold, _DEFAULT_OCCUPANCY)
     if metadata.mode == "raw":
         return classify_raw(picture, threshold)
     if metadata.mode == "scale":

@@ -20,6 +20,7 @@ from robocov_app.formats.geometry.frames import transform_points
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule
 from robocov_app.formats.geometry.shapes.shape_types import PenStroke
+from robocov_app.formats.options import get_or_default
 from robocov_app.formats.vector.svg.element_state import ElementState
 from robocov_app.formats.vector.svg.numbers import METERS_PER_UNIT, parse_length, parse_numbers
 from robocov_app.formats.vector.svg.path_data import MAX_COMMANDS, Subpath, parse_path
@@ -58,7 +59,7 @@ class ShapeReader:
 
     def __init__(self, shapes: Shapes, sheet: StyleSheet, elements_by_id: dict[str, Element]) -> None:
         self.shapes = shapes
-        self.unit = METERS_PER_UNIT if shapes.options.scale is None else shapes.options.scale
+        self.unit = get_or_default(shapes.options.scale, METERS_PER_UNIT)
         self.key = shapes.options.build_color_key()
         self.dashed = 0
         self._sheet = sheet
@@ -81,11 +82,11 @@ class ShapeReader:
         has_fill = has_fill and not self._is_ignored(fill, "fill")
         has_stroke = has_stroke and not self._is_ignored(stroke, "stroke")
         if has_fill:
-            self._add_filled(element, state, fill, stroke if has_stroke else None)
+            self._add_fill(element, state, fill, stroke if has_stroke else None)
         elif has_stroke:
             self._add_walls(self._compute_subpaths(element, state), state, stroke, element)
 
-    def _add_filled(self, element: Element, state: ElementState, fill: Paint, stroke: Paint | None) -> None:
+    def _add_fill(self, element: Element, state: ElementState, fill: Paint, stroke: Paint | None) -> None:
         """Add a filled shape with its stroke, if any; a shape without an area is only its stroke."""
         if self._add_disc(element, state, fill):
             if stroke is not None:
@@ -147,7 +148,9 @@ class ShapeReader:
         if not subpaths:
             return False
         rings = [transform_points(state.matrix, subpath.points) for subpath in subpaths]
-        rule: Rule = "evenodd" if state.style["fill-rule"].lower() == "evenodd" else "nonzero"
+        rule: Rule = "nonzero"
+        if state.style["fill-rule"].lower() == "evenodd":
+            rule = "evenodd"
         return self.shapes.add_outline(
             rings, state.labels, rule=rule, at=_format_line(element), thing="", paint=paint
         )
@@ -185,21 +188,26 @@ class ShapeReader:
         thickness = self.shapes.options.thickness
         smallest, largest = compute_stretch(state.matrix)
         pen_width = parse_length(style["stroke-width"], state.diagonal)
-        width = pen_width * math.sqrt(smallest * largest) if thickness is None else thickness
+        width = get_or_default(thickness, pen_width * math.sqrt(smallest * largest))
         if not width > 0.0:
             return []
-        limit = parse_numbers(style["stroke-miterlimit"])
+        mitre_limit = _DEFAULT_MITRE_LIMIT
+        limits = parse_numbers(style["stroke-miterlimit"])
+        if limits and limits[0] >= 1.0:
+            mitre_limit = limits[0]
         is_stretched = thickness is None and largest > _MAX_EVEN_STRETCH * smallest
         lines = []
         for points, is_closed in subpaths:
-            path = np.concatenate([points, points[:1]]) if is_closed else points
+            path = points
+            if is_closed:
+                path = np.concatenate([points, points[:1]])
             line = WallLine(
                 transform_points(state.matrix, path),
                 width,
                 state.labels,
                 cap=_CAPS.get(style["stroke-linecap"].lower(), "flat"),
                 join=_JOINS.get(style["stroke-linejoin"].lower(), "mitre"),
-                mitre_limit=limit[0] if limit and limit[0] >= 1.0 else _DEFAULT_MITRE_LIMIT,
+                mitre_limit=mitre_limit,
                 stretched=PenStroke(path, pen_width, state.matrix) if is_stretched else None,
                 color=paint.color,
                 role=paint.role,
@@ -218,7 +226,9 @@ class ShapeReader:
             case "polyline" | "polygon":
                 values = parse_numbers(attributes.get("points", ""))
                 points = np.array(values[: len(values) // 2 * 2]).reshape(-1, 2)
-                return [Subpath(points, element.tag == "polygon")] if len(points) > 1 else []
+                if len(points) < 2:
+                    return []
+                return [Subpath(points, element.tag == "polygon")]
             case "line":
                 ends = state.parse_lengths(element, "x1", "y1", "x2", "y2")
                 return [Subpath(np.array(ends).reshape(2, 2), False)]

@@ -12,7 +12,7 @@ from robocov.files.writing import replace_file
 from robocov_app.formats.geometry.cells.rasterize import describe_unsupported
 from robocov_app.formats.geometry.conversion.primitives import transform_numbers
 from robocov_app.formats.geometry.polygons import compute_free_area, format_decimal
-from robocov_app.formats.options import WriteOptions
+from robocov_app.formats.options import WriteOptions, get_or_default
 from robocov_app.formats.reports import ExportReport
 from robocov_app.look.theme import DARK, LIGHT, Theme
 
@@ -97,8 +97,8 @@ class _ShapeWriter:
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     """Write a map as an SVG drawing."""
-    scale = DEFAULT_SCALE if options.scale is None else options.scale
-    writer = _ShapeWriter(scale, DEFAULT_DIGITS if options.digits is None else options.digits)
+    scale = get_or_default(options.scale, DEFAULT_SCALE)
+    writer = _ShapeWriter(scale, get_or_default(options.digits, DEFAULT_DIGITS))
     vertices = np.asarray(environment.boundary, dtype=float)
     margin = _MARGIN * float(np.ptp(vertices, axis=0).max())
     low = vertices.min(axis=0) - margin

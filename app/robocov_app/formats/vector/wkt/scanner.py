@@ -70,5 +70,7 @@ class Scanner:
 
     def refuse(self, problem: str, position: int | None = None) -> NoReturn:
         """Raise a MapError about a position, by default the next character."""
-        line, column = find_line_and_column(self.text, self.position if position is None else position)
+        if position is None:
+            position = self.position
+        line, column = find_line_and_column(self.text, position)
         raise MapError(f"{self._where}:{line}:{column}: {problem}")

@@ -8,7 +8,7 @@ from robocov.environment import Environment
 from robocov.files.writing import replace_file
 from robocov_app.formats.geometry.cells.rasterize import describe_unsupported
 from robocov_app.formats.geometry.polygons import DEFAULT_DIGITS, format_decimal, list_rings, snap_to_grid
-from robocov_app.formats.options import WriteOptions
+from robocov_app.formats.options import WriteOptions, get_or_default
 from robocov_app.formats.reports import ExportReport
 
 
@@ -20,10 +20,12 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     OutputError
         If the file cannot be written.
     """
-    digits = DEFAULT_DIGITS if options.digits is None else options.digits
+    digits = get_or_default(options.digits, DEFAULT_DIGITS)
     polygons = snap_to_grid(environment.free, digits)
     texts = [_format_polygon(polygon, digits) for polygon in polygons]
-    text = f"POLYGON {texts[0]}" if len(texts) == 1 else f"MULTIPOLYGON ({', '.join(texts)})"
+    text = f"MULTIPOLYGON ({', '.join(texts)})"
+    if len(texts) == 1:
+        text = f"POLYGON {texts[0]}"
     with replace_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="ascii")
     notes = [f"in meters, {digits} decimals"]
