@@ -102,7 +102,13 @@ class Oracle(BaseController):
             memory = replace(memory, stage=stage, routes=routes, legs=legs, plan_time=seen.time)
         returns = update_returns(seen, memory.returns)
         forces, goals, legs = follow_routes(
-            seen, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
+            seen,
+            memory.team,
+            routes=memory.routes,
+            legs=memory.legs,
+            returns=returns,
+            k_prop=self.k_prop,
+            response_time=self.response_time,
         )
         memory = replace(memory, legs=legs, returns=returns)
         return Decision(forces, goals, {"attraction": forces}, memory=memory)

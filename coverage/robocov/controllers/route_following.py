@@ -55,6 +55,7 @@ class RouteCommand(NamedTuple):
 def follow_routes(
     seen: Observations,
     team: Team,
+    *,
     routes: Sequence[Array],
     legs: IntArray,
     returns: Array | None,

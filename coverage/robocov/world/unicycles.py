@@ -198,7 +198,7 @@ def compute_drive_command(
         motion = _approach_motion(motion, target, limits)
         new_steering[i, 1] = motion.turning_rate
         heading += new_steering[i, 1] * dt
-        new_steering[i, 0] = heading - 2.0 * math.pi * math.floor(heading / (2.0 * math.pi) + 0.5)
+        new_steering[i, 0] = _wrap_angle(heading)
         velocity_loss[i] = 0.0
         velocity_per_force[i] = 1.0 / response.force_per_velocity[i]
         max_velocity_change[i] = np.inf
@@ -214,6 +214,12 @@ def compute_drive_command(
         max_speed=max_speed,
     )
     return DriveCommand(new_forces, new_steering, new_response)
+
+
+@kernel
+def _wrap_angle(angle: float) -> float:
+    """Return the angle from -π up to π with the same direction."""
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
 @kernel
