@@ -1,4 +1,4 @@
-"""The benchmark end to end: runs, result, verification, page; what is forged is found."""
+"""The benchmark end to end: runs, result, verification and page; forged results are detected."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ MAPS = ("blocks-a", "blocks-b")
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
+def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of one second, in this process."""
     for name in ("ideal", "lossy"):
         track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,))
@@ -51,7 +51,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", InProcess)
 
 
-def ran(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> dict[str, Any]:
+def run_short_benchmark(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> dict[str, Any]:
     selection = Selection(tracks=tracks or ("ideal",), maps=MAPS)
     with Interruption() as stop:
         result = run_benchmark(RatedController(controller, gains), selection, out, stop=stop, quiet=True)
@@ -59,21 +59,23 @@ def ran(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> di
     return result
 
 
-def checked(out: Path, **how: Any) -> tuple[int, list[str]]:
+def verify(out: Path, **options: Any) -> tuple[int, list[str]]:
     with Interruption() as stop:
-        return verify_result(out, stop=stop, quiet=True, **how)
+        return verify_result(out, stop=stop, quiet=True, **options)
 
 
-def forged(out: Path, change: Any) -> None:
+def forge(out: Path, change: Any) -> None:
     result = json.loads((out / RESULT_FILE).read_text())
     change(result)
     (out / RESULT_FILE).write_text(json.dumps(result))
 
 
-@pytest.mark.usefixtures("short")
-def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    ran(tmp_path / "a", "rapf", "ideal", "lossy")
-    ran(tmp_path / "b", "rapf", "ideal", k_rep=0.5)
+@pytest.mark.usefixtures("short_runs")
+def test_runs_are_rated_verified_and_shown_on_a_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_short_benchmark(tmp_path / "a", "rapf", "ideal", "lossy")
+    run_short_benchmark(tmp_path / "b", "rapf", "ideal", k_rep=0.5)
     result = read_result(tmp_path / "a")
     assert [(row["track"], row["map"]) for row in result["rows"]] == [
         (track, name) for track in ("ideal", "lossy") for name in MAPS
@@ -83,83 +85,80 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert row["gap"] == row["mean_distance_m"] / best - 1.0 > 0.0
         assert row["told_bytes"] == pytest.approx(6 * 20 * (60 if row["track"] == "ideal" else 2))
         assert row["deciding_s"] > 0.0
-    assert checked(tmp_path / "a", sample=1) == (1, [])
+    assert verify(tmp_path / "a", sample=1) == (1, [])
     page = str(tmp_path / "page.html")
-    assert (
-        answer(capsys, "benchmark", "page", *(str(tmp_path / k) for k in "ab"), "--alone", "--out", page)[
-            "entries"
-        ]
-        == 2
-    )
+    folders = [str(tmp_path / name) for name in "ab"]
+    assert answer(capsys, "benchmark", "page", *folders, "--alone", "--out", page)["entries"] == 2
     text = Path(page).read_text()
     assert "RAPF (k_rep 0.5)" in text and "Gap and path length" in text and "<h2" in text
 
 
-def test_built_in_entries_are_whole() -> None:
-    """Each holds every run of all tracks that count, with gaps that follow from its costs."""
+def test_bundled_results_are_complete() -> None:
+    """Each has all runs of the rated tracks, with gaps that agree with its costs."""
     results = load_bundled_results()
     assert {"rapf", "lloyd", "rpf", "oracle"} <= {result["entry"]["controller"] for result in results}
-    runs = {
-        (name, each, seed) for name, maps, seeds in Selection().list_runs() for each in maps for seed in seeds
-    }
+    runs = set()
+    for track, maps, seeds in Selection().list_runs():
+        runs |= {(track, map_name, seed) for map_name, seed in product(maps, seeds)}
     for result in results:
         # `verify` needs no file for controllers that are part of robocov.
         assert result["entry"]["source_sha256"] is None
         assert {(row["track"], row["map"], row["seed"]) for row in result["rows"]} == runs
         for row in result["rows"]:
             assert "error" in row or row.items() >= compute_gaps(row["track"], row["map"], row).items()
-    # who gives a result of the same controller has it on the page in the place of the built-in one
+    # A result of the same controller replaces the bundled one on the page.
     assert len(load_bundled_results(results[:1])) == len(results) - 1
 
 
 @pytest.mark.slow
-def test_built_in_entries_are_what_comes_out() -> None:
+def test_bundled_results_are_reproducible() -> None:
     path = ENTRIES / "rapf.json.gz"
     with Interruption() as stop:
-        count, found = verify_result(path, sample=2, seed=3, workers=2, quiet=True, stop=stop)
+        count, differences = verify_result(path, sample=2, seed=3, workers=2, quiet=True, stop=stop)
     assert count == 2
-    # other processors' libraries of linear algebra may round the last bit differently
-    for words in found:
-        numbers = re.search(r": expected ([\d.e-]+), got ([\d.e-]+)$", words)
-        alike = numbers and float(numbers[1]) == pytest.approx(float(numbers[2]), rel=1e-3)
-        assert words.startswith("made with") or alike, words
+    # Libraries of linear algebra may round the last bit differently on other processors.
+    for difference in differences:
+        numbers = re.search(r": expected ([\d.e-]+), got ([\d.e-]+)$", difference)
+        are_close = numbers and float(numbers[1]) == pytest.approx(float(numbers[2]), rel=1e-3)
+        assert difference.startswith("made with") or are_close, difference
 
 
-PLACE = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abcde", min_size=3, max_size=16))
+LABELED_POINTS = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abcde", min_size=3, max_size=16))
 
 
-@given(st.lists(PLACE, min_size=2, max_size=4))
-def test_labels_of_few_points_stay_apart(given_points: list[tuple[float, float, str]]) -> None:
+@given(st.lists(LABELED_POINTS, min_size=2, max_size=4))
+def test_labels_of_a_few_points_do_not_overlap(given_points: list[tuple[float, float, str]]) -> None:
     points = [ParetoPoint(choose_curve_styles(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
-    middles = place_labels(np.array([(x, y) for x, y, _ in given_points]), [each.label for each in points])
-    half = np.array([(3.0 * len(each.label), 6.5) for each in points])
+    labels = [point.label for point in points]
+    centers = place_labels(np.array([(x, y) for x, y, _ in given_points]), labels)
+    half_sizes = np.array([(3.0 * len(label), 6.5) for label in labels])
     for k, j in combinations(range(len(points)), 2):
-        apart = np.abs(middles[k] - middles[j]) - half[k] - half[j]
-        assert apart.max() > -1e-6
+        gaps = np.abs(centers[k] - centers[j]) - half_sizes[k] - half_sizes[j]
+        assert gaps.max() > -1e-6
 
 
-@pytest.mark.usefixtures("short")
-def test_the_oracle_is_delivered_as_a_file(tmp_path: Path) -> None:
-    ran(tmp_path / "out", "oracle")
-    assert checked(tmp_path / "out", sample=1) == (1, [])
+@pytest.mark.usefixtures("short_runs")
+def test_the_oracle_can_be_rated_and_verified(tmp_path: Path) -> None:
+    run_short_benchmark(tmp_path / "out", "oracle")
+    assert verify(tmp_path / "out", sample=1) == (1, [])
     entry = read_result(tmp_path / "out")["entry"]
     assert entry["information"] == "whole map" and entry["label"] == "Oracle"
 
 
 @pytest.mark.slow
-def test_the_oracle_arrives_though_its_robots_meet_in_corridors(tmp_path: Path) -> None:
+def test_robots_of_the_oracle_reach_their_goals_through_corridors(tmp_path: Path) -> None:
     selection = Selection(tracks=("ideal",), maps=("mazes-7006",))
     with Interruption() as stop:
         result = run_benchmark(RatedController("oracle", {}), selection, tmp_path, stop=stop, quiet=True)
     assert result is not None and max(row["gap"] for row in result["rows"]) < 1e-3
 
 
-@pytest.mark.usefixtures("short")
-def test_what_is_forged_is_found(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("short_runs")
+def test_forged_results_are_detected(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    ran(out)
+    run_short_benchmark(out)
     honest = (out / RESULT_FILE).read_text()
-    for change, words in (
+    for change, message in (
         (lambda result: result["rows"][1].update(work_J=1.0), "blocks-b, seed 0: work_J: expected"),
         (lambda result: result["rows"][0].update(gap=0.01), "blocks-a, seed 0: gap: expected"),
         (lambda result: result["rows"].pop(), "blocks-b, seed 0: missing row"),
@@ -167,29 +166,31 @@ def test_what_is_forged_is_found(tmp_path: Path) -> None:
         (lambda result: result["versions"].update(numpy="1.0"), "made with numpy 1.0 instead of"),
     ):
         (out / RESULT_FILE).write_text(honest)
-        forged(out, change)
-        assert any(words in each for each in checked(out, sample=9)[1]), words
+        forge(out, change)
+        _, differences = verify(out, sample=9)
+        assert any(message in difference for difference in differences), message
 
 
-@pytest.mark.usefixtures("short")
-def test_code_in_a_file_is_verified_only_if_it_is_named_and_the_same(
+@pytest.mark.usefixtures("short_runs")
+def test_controllers_in_files_are_verified_only_if_named_and_unchanged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    mine, out = tmp_path / "mine.py", tmp_path / "out"
+    mine = tmp_path / "mine.py"
+    out = tmp_path / "out"
     mine.write_text(HEAD + PULL)
-    ran(out, f"{mine}:Mine")
+    run_short_benchmark(out, f"{mine}:Mine")
     assert str(tmp_path) not in (out / RESULT_FILE).read_text()
     assert "pass --controller FILE.py:CLASS" in complaint(capsys, "benchmark", "verify", str(out))
-    assert checked(out, controller=f"{mine}:Mine", sample=1) == (1, [])
+    assert verify(out, controller=f"{mine}:Mine", sample=1) == (1, [])
     mine.write_text(HEAD + PULL + "\n# changed\n")
-    wrong = complaint(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
-    assert "is not the source that was rated" in wrong
+    message = complaint(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
+    assert "is not the source that was rated" in message
 
 
-@pytest.mark.usefixtures("short")
-def test_damaged_results_are_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("short_runs")
+def test_damaged_results_are_rejected_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    ran(out)
+    run_short_benchmark(out)
     honest = json.loads((out / RESULT_FILE).read_text())
     for part in ("", "entry", "selection", "rows"):
         for name in honest["rows"][0] if part == "rows" else honest[part] if part else honest:
@@ -203,15 +204,15 @@ def test_damaged_results_are_one_clear_line(tmp_path: Path, capsys: pytest.Captu
                     assert str(out / RESULT_FILE) in complaint(capsys, "benchmark", "verify", str(out)), name
 
 
-@pytest.mark.usefixtures("short")
-def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = ran(tmp_path / "out")
+@pytest.mark.usefixtures("short_runs")
+def test_finished_runs_are_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = run_short_benchmark(tmp_path / "out")
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", None)
-    assert ran(tmp_path / "out") == expected
+    assert run_short_benchmark(tmp_path / "out") == expected
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("--controller", "rapff"), "--controller: unknown controller 'rapff': did you mean 'rapf'"),
         (("--controller", "rapf", "--set", "k_re=1"), "unknown gain 'k_re'"),
@@ -226,40 +227,46 @@ def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Mon
         (("verify", "OTHER"), "expected a result of robocov benchmark"),
     ],
 )
-def test_bad_input(
-    words: tuple[str, ...], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_invalid_commands_are_rejected(
+    words: tuple[str, ...], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "letter.txt").write_text("Dear")
     (tmp_path / "other.json").write_text("{}")
     (tmp_path / "torn.json.gz").write_bytes(gzip.compress(b"{}" * 99)[:-9])
     paths = {"FOREIGN": str(tmp_path), "OTHER": str(tmp_path / "other.json")}
     paths["TORN"] = str(tmp_path / "torn.json.gz")
-    assert told in complaint(capsys, "benchmark", *(paths.get(word, word) for word in words))
+    assert message in complaint(capsys, "benchmark", *(paths.get(word, word) for word in words))
 
 
 @given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))
-def test_the_median_of_rest_is_kaplan_and_meiers(runs: list[tuple[float, bool]]) -> None:
-    rows = [{"settled_at_s": time if rested else None} for time, rested in runs]
-    share, median = ratings.Rating("", "ideal", rows, 0).compute_rest()
-    # all that did not rest are censored at the end, so the curve is the plain share of those still moving
+def test_the_median_time_to_rest_is_that_of_kaplan_and_meier(runs: list[tuple[float, bool]]) -> None:
+    rows = [{"settled_at_s": time if has_settled else None} for time, has_settled in runs]
+    fraction, median = ratings.Rating("", "ideal", rows, 0).compute_rest()
+    # Runs that did not settle are censored at the end, so the curve is the fraction that still moves.
     times = sorted(row["settled_at_s"] for row in rows if row["settled_at_s"] is not None)
-    wanted = next(
-        (t for t in times if sum(s > t for s in times) + len(rows) - len(times) <= len(rows) / 2), None
-    )
-    assert share == len(times) / len(rows)
-    assert median == wanted
+    expected = None
+    for settled_at in times:
+        moving = sum(other > settled_at for other in times) + len(rows) - len(times)
+        if moving <= len(rows) / 2:
+            expected = settled_at
+            break
+    assert fraction == len(times) / len(rows)
+    assert median == expected
 
 
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))
-def test_nobody_beats_the_front(points: list[tuple[int, int]]) -> None:
+def test_no_point_dominates_the_pareto_front(points: list[tuple[int, int]]) -> None:
     front = {points[k] for k in find_pareto_front(points)}
-    beaten = {(x, y) for x, y in points if any(u <= x and v <= y and (u, v) != (x, y) for u, v in points)}
-    assert front == set(points) - beaten
+    dominated = set()
+    for x, y in points:
+        if any(u <= x and v <= y and (u, v) != (x, y) for u, v in points):
+            dominated.add((x, y))
+    assert front == set(points) - dominated
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
-def test_what_is_killed_goes_on(tmp_path: Path) -> None:
+def test_a_killed_benchmark_is_resumed(tmp_path: Path) -> None:
     words = (
         "benchmark",
         "--controller",
@@ -274,19 +281,19 @@ def test_what_is_killed_goes_on(tmp_path: Path) -> None:
     maps = ("blocks-a", "blocks-b", "polygons-7001", "polygons-7002", "plants-7001", "yards-7001")
     command = [*COMMAND, *words, *maps, "--out", str(tmp_path / "killed")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        runs, end = tmp_path / "killed" / TRACKS_FOLDER / "one-robot" / "runs", time.monotonic() + 120.0
-        while not (runs.is_dir() and any(not each.name.startswith(".") for each in runs.iterdir())):
+        runs = tmp_path / "killed" / TRACKS_FOLDER / "one-robot" / "runs"
+        end = time.monotonic() + 120.0
+        while not (runs.is_dir() and any(not path.name.startswith(".") for path in runs.iterdir())):
             assert time.monotonic() < end and process.poll() is None
             time.sleep(0.02)
         process.kill()
     assert not (tmp_path / "killed" / RESULT_FILE).exists()
     assert main([*words, *maps, "--out", str(tmp_path / "killed")]) == 0
     assert main([*words, *maps, "--out", str(tmp_path / "whole")]) == 0
-    killed, whole = (
-        [{**row, "deciding_s": None} for row in read_result(tmp_path / name)["rows"]]
-        for name in ("killed", "whole")
-    )
-    assert killed == whole and len(whole) == len(maps)
+    rows = {}
+    for name in ("killed", "whole"):
+        rows[name] = [{**row, "deciding_s": None} for row in read_result(tmp_path / name)["rows"]]
+    assert rows["killed"] == rows["whole"] and len(rows["whole"]) == len(maps)
 
 
 @pytest.fixture(scope="module")
@@ -309,7 +316,7 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
             {
                 **dict.fromkeys(("stuck_robots", "contacts"), 0),
                 "track": "ideal",
-                "map": each,
+                "map": map_name,
                 "seed": 0,
                 "gap": 0.1 * (k + 1) + 0.01 * j,
                 "gap_to_bound": 0.5 if k == 0 else None,
@@ -322,11 +329,13 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
                 "told_bytes": 4e5 * (k + 1),
                 "deciding_s": 0.1 * 20**k,
             }
-            for j, each in enumerate(("rooms", "polygons-7001"))
+            for j, map_name in enumerate(("rooms", "polygons-7001"))
         ]
         entry = {"controller": name, "label": name.upper(), "information": "own", "gains": {}, "set": {}}
         entry |= {"source_sha256": None}
-        results.append({"entry": entry, "rows": rows, "method": ["As told."], "versions": {"numpy": "2"}})
+        results.append(
+            {"entry": entry, "rows": rows, "method": ["As documented."], "versions": {"numpy": "2"}}
+        )
     page = tmp_path / "page.html"
     page.write_text(build_page(results, "A <test> of names"), encoding="utf-8")
     for width in (1280, 390):
@@ -336,11 +345,11 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
         assert browser.js("return document.documentElement.scrollWidth") <= width
         assert len(browser.all("svg.plot")) == 3
     assert browser.find("h1").text == "A <test> of names"
-    first = [each.text for each in browser.all("#ideal tbody th")][:3]
-    assert first == ["RAPF", "LLOYD", "ATLAS"]
-    assert [each.text for each in browser.all("#overview tbody th")] == first
+    labels = [cell.text for cell in browser.all("#ideal tbody th")][:3]
+    assert labels == ["RAPF", "LLOYD", "ATLAS"]
+    assert [cell.text for cell in browser.all("#overview tbody th")] == labels
     gaps = [
-        float(each.text.split()[0])
-        for each in browser.all("#ideal .scroll:first-of-type tbody td:nth-child(4)")
+        float(cell.text.split()[0])
+        for cell in browser.all("#ideal .scroll:first-of-type tbody td:nth-child(4)")
     ]
     assert gaps == np.sort(gaps).tolist()

@@ -1,7 +1,7 @@
-"""Files that are watched, with a clock of the test's own: what happens while it sleeps is written down."""
+"""Watching files, with a clock that changes files while the watcher sleeps."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,37 +14,33 @@ from robocov_app.terminal.file_watching import (
 )
 
 
-class EndedError(Exception):
-    pass
+class ClockEndedError(Exception):
+    """The clock has no more actions."""
 
 
 class Clock:
-    """Does one thing in each sleep."""
+    """Executes one action in each sleep."""
 
-    def __init__(self, *acts: Callable[[], object] | None) -> None:
-        self.acts = list(acts)
+    def __init__(self, *actions: Callable[[], object] | None) -> None:
+        self.actions = list(actions)
         self.slept: list[float] = []
 
     def __call__(self, seconds: float) -> None:
         self.slept.append(seconds)
-        if not self.acts:
-            raise EndedError
-        act = self.acts.pop(0)
-        if act is not None:
-            act()
+        if not self.actions:
+            raise ClockEndedError
+        action = self.actions.pop(0)
+        if action is not None:
+            action()
 
 
-def found(clock: Clock, *paths: Path) -> list[tuple[Path, ...]]:
-    seen: list[tuple[Path, ...]] = []
-
-    def watched() -> Iterator[None]:
+def watch_until_end(clock: Clock, *paths: Path) -> list[tuple[Path, ...]]:
+    """Watch files until the clock ends, and return all reported changes."""
+    reports: list[tuple[Path, ...]] = []
+    with pytest.raises(ClockEndedError):
         for changed in watch_files(paths, sleep=clock):
-            seen.append(changed)
-            yield
-
-    with pytest.raises(EndedError):
-        list(watched())
-    return seen
+            reports.append(changed)  # noqa: PERF402 - the loop ends with the exception
+    return reports
 
 
 @pytest.fixture
@@ -54,70 +50,70 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def replaced(path: Path, text: str) -> None:
-    """Write as most editors do."""
+def replace(path: Path, text: str) -> None:
+    """Write a file as most editors do."""
     path.with_suffix(".tmp").write_text(text)
     path.with_suffix(".tmp").replace(path)
 
 
-def moved_away_and_written(path: Path) -> None:
-    """Write as vim does with a backup copy."""
+def move_away_and_write(path: Path) -> None:
+    """Write a file as vim does with a backup copy."""
     path.rename(path.with_suffix(".bak"))
     path.write_text("new")
 
 
-def test_at_first_all_files_are_there_and_then_nothing_happens(file: Path, tmp_path: Path) -> None:
+def test_all_files_are_reported_first_and_unchanged_files_not_again(file: Path, tmp_path: Path) -> None:
     clock = Clock(*[None] * 20)
-    assert found(clock, file, tmp_path / "none.json") == [(file, tmp_path / "none.json")]
+    assert watch_until_end(clock, file, tmp_path / "none.json") == [(file, tmp_path / "none.json")]
     assert set(clock.slept) == {POLLING_INTERVAL_S}
 
 
 @pytest.mark.parametrize(
-    "act",
+    "change",
     [
         lambda path: path.write_text("newer"),
-        lambda path: replaced(path, "old"),  # the same text
-        moved_away_and_written,
+        lambda path: replace(path, "old"),  # the same text
+        move_away_and_write,
         lambda path: path.unlink(),
         lambda path: os.utime(path, ns=(1, 1)),
     ],
 )
-def test_a_change_is_told_once(act: Callable[[Path], object], file: Path) -> None:
-    clock = Clock(None, lambda: act(file), *[None] * 5)
-    assert found(clock, file) == [(file,), (file,)]
+def test_a_change_is_reported_once(change: Callable[[Path], object], file: Path) -> None:
+    clock = Clock(None, lambda: change(file), *[None] * 5)
+    assert watch_until_end(clock, file) == [(file,), (file,)]
 
 
-def test_each_save_is_a_change_of_its_file_alone(file: Path, tmp_path: Path) -> None:
+def test_only_the_saved_file_is_reported(file: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.json"
-    clock = Clock(lambda: replaced(file, "1"), None, None, lambda: other.write_text("2"), *[None] * 4)
-    assert found(clock, file, other) == [(file, other), (file,), (other,)]
+    clock = Clock(lambda: replace(file, "1"), None, None, lambda: other.write_text("2"), *[None] * 4)
+    assert watch_until_end(clock, file, other) == [(file, other), (file,), (other,)]
 
 
-def test_what_is_written_in_pieces_or_by_removing_first_is_one_change(file: Path) -> None:
+def test_a_file_that_is_removed_and_written_in_pieces_has_one_change(file: Path) -> None:
     pieces = [lambda: file.unlink(), lambda: file.write_text("a"), lambda: file.write_text("ab"), None]
     clock = Clock(*pieces, None, None)
-    assert found(clock, file) == [(file,), (file,)]
+    assert watch_until_end(clock, file) == [(file,), (file,)]
     assert clock.slept[:4] == [POLLING_INTERVAL_S, SETTLING_TIME_S, SETTLING_TIME_S, SETTLING_TIME_S]
 
 
-def test_a_second_file_that_is_saved_meanwhile_comes_with_it(file: Path, tmp_path: Path) -> None:
+def test_files_that_are_saved_together_are_reported_together(file: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.json"
-    clock = Clock(lambda: replaced(file, "1"), lambda: other.write_text("2"), *[None] * 4)
-    assert found(clock, file, other) == [(file, other), (file, other)]
+    clock = Clock(lambda: replace(file, "1"), lambda: other.write_text("2"), *[None] * 4)
+    assert watch_until_end(clock, file, other) == [(file, other), (file, other)]
 
 
-def test_a_file_that_never_settles_is_told_all_the_same(file: Path) -> None:
-    grown: list[Callable[[], object]] = [lambda k=k: file.write_text("x" * k) for k in range(4, 80)]
-    clock = Clock(*grown)
-    assert len(found(clock, file)) == 1 + int(76 // (1 + MAX_SETTLING_TIME_S / SETTLING_TIME_S))
+def test_a_file_that_keeps_changing_is_reported_in_the_end(file: Path) -> None:
+    writes: list[Callable[[], object]] = [lambda k=k: file.write_text("x" * k) for k in range(4, 80)]
+    clock = Clock(*writes)
+    assert len(watch_until_end(clock, file)) == 1 + int(76 // (1 + MAX_SETTLING_TIME_S / SETTLING_TIME_S))
 
 
 def test_a_link_is_followed(file: Path, tmp_path: Path) -> None:
     link = tmp_path / "link.json"
     link.symlink_to(file)
-    clock = Clock(lambda: replaced(file, "newer"), *[None] * 4)
-    assert found(clock, link) == [(link,), (link,)]
+    clock = Clock(lambda: replace(file, "newer"), *[None] * 4)
+    assert watch_until_end(clock, link) == [(link,), (link,)]
 
 
-def test_a_name_that_no_file_can_have_is_a_file_that_is_not_there() -> None:
-    assert len(found(Clock(None, None), Path("a\0b"), Path("x" * 5000))) == 1
+def test_an_impossible_file_name_counts_as_a_missing_file() -> None:
+    assert len(watch_until_end(Clock(None, None), Path("a\0b"), Path("x" * 5000))) == 1
