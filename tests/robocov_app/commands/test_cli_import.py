@@ -87,7 +87,7 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
         ("plan.yaml", "--invert", "--invert: no option of the format ros"),
         ("grid.map", "--unknown free", "--unknown: no option of the format movingai, whose options are: --"),
         ("plan.pgm", "--trees obstacle", "--trees: no option of the format picture"),
-        ("plan.pgm", "", "expected --cell, the meters per pixel (or import plan.yaml beside it)"),
+        ("plan.pgm", "", "expected --cell, the meters per pixel (or import plan.yaml next to it)"),
         ("plan.pgm", "--cell nan", "--cell: expected a number from 1e-06 to 10000 m"),
         ("plan.pgm", "--cell 1 --threshold 3", "--threshold: expected a number from 0 to 1"),
         ("plan.pgm", "--cell 0.001", "no place is wide enough for a robot of radius 0.1 m"),

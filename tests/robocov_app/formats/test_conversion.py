@@ -134,9 +134,9 @@ def test_hull_and_margin() -> None:
 
 def test_a_boundary_that_is_given() -> None:
     outer = box(-1, -1, 11, 9)
-    named = foreign(ROOM, boundary=outer, has_named_boundary=True, boundary_source="what is called 'hall'")
+    named = foreign(ROOM, boundary=outer, has_named_boundary=True, boundary_source="the shape called 'hall'")
     environment, report = build_environment(named, Shaping(), "plan")
-    assert report.notes == ("the boundary is what is called 'hall'",)
+    assert report.notes == ("the boundary is the shape called 'hall'",)
     assert environment.boundary_polygon.equals(outer)
     assert environment.free_area == pytest.approx(ROOM.area)
     assert [len(shape.holes) for shape in environment.obstacles if hasattr(shape, "holes")] == [1, 0, 0]

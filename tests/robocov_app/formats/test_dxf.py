@@ -205,7 +205,7 @@ def test_layers_are_chosen_and_those_that_are_off_are_not_there(tmp_path: Path) 
     foreign = drawn(tmp_path, draw, only=("0", "walls"))
     assert foreign.free.area == pytest.approx(199.0)
     assert foreign.dropped == (
-        "2 shapes by the names that were asked for",
+        "2 shapes by their names (--only, --skip)",
         "2 shapes hidden, or on layers that are off",
     )
 

@@ -56,8 +56,8 @@ def test_a_name_is_the_boundary_whatever_its_size() -> None:
     chosen = shapes((square(1, 1, 8, 8), "east wing"), (HALL, "frame"), boundary="East Wing", skip=("frame",))
     foreign = taken(chosen)
     assert foreign.free.area == pytest.approx(64.0)
-    assert foreign.dropped == ("1 shape by the names that were asked for",)
-    assert foreign.boundary_source == "what is called 'East Wing'"
+    assert foreign.dropped == ("1 shape by their names (--only, --skip)",)
+    assert foreign.boundary_source == "the shape called 'East Wing'"
     assert foreign.has_named_boundary
 
 

@@ -103,7 +103,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     "10^9 plain cells": ("a.pgm", lambda: b"P2 1 999999999 255\n" + b"1 " * 1000, "cell", TOO_MANY),
     "cut off": ("a.pgm", lambda: b"P5 8000 8000 65535\n" + b"\xff" * 1000, "cell", "cut off after 500"),
     "a grid of 10^9": ("a.map", lambda: GRID % (31623, 31623), "", TOO_MANY),
-    "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 letters"),
+    "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 characters"),
     "noise": ("a.pgm", lambda: pgm(255 * (np.indices((2500, 2500)).sum(axis=0) % 2)), "cell", "vertices"),
     "10^9 of a JPEG": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
     "a JPEG cut off": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 8000), "cell", "complete JPEG"),

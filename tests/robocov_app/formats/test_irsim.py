@@ -228,7 +228,7 @@ def test_parts_of_many_objects_are_counted_together(tmp_path: Path, text: str) -
         read(tmp_path, text)
 
 
-# Maps that IR-SIM brings along
+# Maps that are installed with IR-SIM
 
 
 def install(folder: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
@@ -256,7 +256,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
         MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"
     ):
         read(tmp_path, "  obstacle_map: hall.png\n")
-    # one beside the file counts more
+    # A picture next to the file has priority.
     (tmp_path / "cave.png").write_bytes(pgm(np.full((6, 10), 255, np.uint8)))
     assert solid(read(tmp_path, BUNDLED)).is_empty
 
@@ -268,7 +268,7 @@ def test_without_irsim_a_bundled_map_is_said_to_need_it(
     with pytest.raises(MapError) as caught:
         read(tmp_path, BUNDLED)
     place = f"{tmp_path / 'world.yaml'}: world.obstacle_map: "
-    wanted = "expected a picture beside the file, or one that IR-SIM brings along, got 'cave.png'. "
+    wanted = "expected a picture next to the file, or one of those of IR-SIM, got 'cave.png'. "
     assert str(caught.value) == place + wanted + "IR-SIM is not installed (pip install ir-sim)."
 
 

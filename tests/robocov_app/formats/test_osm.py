@@ -130,9 +130,9 @@ def test_water_and_what_is_no_obstacle(tmp_path: Path) -> None:
     assert solid(tmp_path, extract, water="free").area < 0.05
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     assert foreign.dropped == (
-        "1 thing below the ground",
-        "1 way of which the file does not have all",
+        "1 element below the ground",
         "1 way that does not close",
+        "1 way with nodes that are not in the file",
     )
 
 

@@ -107,5 +107,5 @@ def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) ->
 def test_the_yaml_beside_it_is_pointed_at(tmp_path: Path) -> None:
     path = saved(tmp_path, LEVELS)
     (tmp_path / "plan.yaml").write_text("image: plan.png")
-    with pytest.raises(MapError, match=r"\(or import plan\.yaml beside it\)"):
+    with pytest.raises(MapError, match=r"\(or import plan\.yaml next to it\)"):
         import_map(path)

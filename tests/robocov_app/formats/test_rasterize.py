@@ -157,4 +157,4 @@ def test_rooms_that_cells_lose_are_told(monkeypatch: pytest.MonkeyPatch) -> None
     hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
     grid = build_grid(hair, 0.4)
     (warning,) = describe_lost_passages(hair, grid, find_free_cells(hair, grid))
-    assert warning.endswith("not 1; no cells of which there are at most 1 million keep it")
+    assert warning.endswith("not 1; no grid of at most 1 million cells keeps it")

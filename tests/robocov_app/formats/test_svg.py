@@ -118,7 +118,7 @@ def test_round_things(tmp_path: Path) -> None:
         ('<path d="M0 0L9 9"/>', "1 shape without an area"),
         ('<rect width="0" height="9"/>', "1 shape without an area"),
         ('<line x2="9" stroke="red" stroke-width="0"/>', "1 stroke without a width"),
-        ('<use href="other.svg#a"/>', "1 use of what is not in the file"),
+        ('<use href="other.svg#a"/>', "1 use of an element that is not in the file"),
     ],
 )
 def test_what_is_not_there_is_told(tmp_path: Path, body: str, dropped: str) -> None:

@@ -115,9 +115,9 @@ def _parse_rows(header: _Header, where: str) -> NDArray[np.uint8]:
         width = len(lines[k].rstrip(_BLANKS)) if k < len(lines) else 0
         if width != columns:
             is_end = k >= len(lines) or (width == 0 and k == len(lines) - 1)
-            actual = "end of file" if is_end else f"{width} letters"
+            actual = "end of file" if is_end else f"{width} characters"
             line = header.body_line + k
-            raise MapError(f"{where}: line {line}: expected {columns} letters, got {actual}")
+            raise MapError(f"{where}: line {line}: expected {columns} characters, got {actual}")
     if len(lines) > rows and lines[rows].strip():
         raise MapError(f"{where}: line {header.body_line + rows}: expected {rows} rows, got more")
     joined = b"".join(line.rstrip(_BLANKS) for line in lines[:rows])

@@ -216,7 +216,7 @@ def describe_lost_passages(environment: Environment, grid: CellGrid, free: BoolA
             finer = build_grid(environment, cell, _MAX_TRIED_CELLS)
         except ParameterError:
             maximum = f"at most {_MAX_TRIED_CELLS // 1_000_000} million"
-            return (f"{losses}; no cells of which there are {maximum} keep it",)
+            return (f"{losses}; no grid of {maximum} cells keeps it",)
         if not _describe_losses(environment, finer, find_free_cells(environment, finer)):
             return (f"{losses}; cells of {cell:g} m keep it (--cell {cell:g})",)
     return ()

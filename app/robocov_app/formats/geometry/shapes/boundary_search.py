@@ -114,7 +114,7 @@ def _find_named_boundary(drawing: Drawing) -> Boundary | None:
     areas = [outline.area for outline in drawing.outlines if outline in outlines]
     area = _unite_exactly([*areas, shapely.union_all(rooms)])
     if not area.is_empty:
-        return Boundary(area, f"what is called {quote(name)}", outlines, lines, is_named=True)
+        return Boundary(area, f"the shape called {quote(name)}", outlines, lines, is_named=True)
     if given_name is not None:
         reason = "encloses no area, expected a closed outline"
         raise MapError(f"{drawing.where}: boundary {quote(given_name)}: {reason}")

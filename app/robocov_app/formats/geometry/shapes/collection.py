@@ -85,7 +85,7 @@ class Shapes:
         """Return whether a shape with these labels is read; else it is counted as left out."""
         is_accepted = self.labels.accepts(labels)
         if not is_accepted:
-            self.leave_out("shape", "by the names that were asked for")
+            self.leave_out("shape", "by their names (--only, --skip)")
         return is_accepted
 
     def add_all(self, geometries: Iterable[SourceGeometry]) -> None:

@@ -62,7 +62,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     unknown = options.unknown or "obstacle"
     if options.unknown is None and is_on_transparent_ground(cells):
         unknown = "free"
-        notes.append("nothing but dark paint on a transparent ground, so what is transparent is free")
+        notes.append("only dark paint on a transparent ground, so transparent pixels are free")
     dropped: tuple[str, ...] = ()
     if options.min_stroke is not None:
         dropped = drop_strokes(cells, options, cell, where)
@@ -105,5 +105,5 @@ def _parse_georeference(picture: Brightness) -> tuple[float | None, tuple[float,
 
 def _describe_missing_scale(path: Path) -> str:
     metadata = path.with_suffix(".yaml")
-    hint = f" (or import {to_one_line(metadata.name)} beside it)" if metadata.is_file() else ""
+    hint = f" (or import {to_one_line(metadata.name)} next to it)" if metadata.is_file() else ""
     return f"expected --cell, the meters per pixel{hint}"

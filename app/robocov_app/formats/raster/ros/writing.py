@@ -71,7 +71,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         else:
             pixels = _build_scale_pixels(occupancy, unknown, has_alpha=not is_pgm)
             if is_pgm:
-                notes = ("a PGM of mode scale has no unknown cells: what is outside is occupied",)
+                notes = ("a PGM of mode scale has no unknown cells: cells outside are occupied",)
     _write_picture(image, pixels, grid.cell)
     x, y = grid.origin
     with replace_file(path) as temporary:

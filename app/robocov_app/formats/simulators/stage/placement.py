@@ -162,7 +162,7 @@ class ModelPlacer:
         if "bitmap" in entity.properties:
             self._add_bitmap(entity, box, size, labels)
             if blocks:
-                self._shapes.leave_out("block", "beside a bitmap", len(blocks))
+                self._shapes.leave_out("block", "next to a bitmap", len(blocks))
             return
         rings: list[Array] = []
         if blocks:

@@ -55,5 +55,5 @@ def _choose_scale(document: Any, scale: float | None, where: str) -> tuple[float
     if code in UNITS:
         name, size = UNITS[code]
         return size, f"in {name}"
-    hint = "--scale METERS says what it is, as in --scale 0.001 for millimeters"
+    hint = "--scale METERS gives it, as in --scale 0.001 for millimeters"
     raise MapError(f"{where}: $INSUNITS: expected a unit, got {code}: {hint}")

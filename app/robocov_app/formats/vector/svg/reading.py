@@ -76,7 +76,7 @@ def _require_size(shapes: Shapes) -> None:
         return
     x, y, right, top = shapely.total_bounds(geometries)
     if max(right - x, top - y) < _MIN_SIZE_M:
-        hint = "--scale METERS says what a unit is, as in --scale 0.01"
+        hint = "--scale METERS gives the size of a unit, as in --scale 0.01"
         got = f"{right - x:.3g} x {top - y:.3g} m at its own scale"
         raise MapError(f"{shapes.where}: expected at least {_MIN_SIZE_M:g} m, got {got}: {hint}")
 
@@ -204,7 +204,7 @@ class _DrawingReader:
         if element.tag == "use":
             target = self.find_target(element)
             if target is None:
-                self.shapes.leave_out("use", "of what is not in the file")
+                self.shapes.leave_out("use", "of an element that is not in the file")
                 return
             if target.tag not in ("symbol", "svg"):
                 yield target, state

@@ -38,7 +38,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         area_written=float(MultiPolygon(polygons).area),
         dropped=(
             *describe_unsupported(environment),
-            "the boundary and the obstacles as such: only what is free is there",
+            "the boundary and the obstacles as such: only the free space is written",
         ),
         notes=tuple(notes),
     )
