@@ -129,6 +129,7 @@ class _PiecewiseAffineMap(NamedTuple):
         first = corners[:, 0] - corners[:, 2]
         second = corners[:, 1] - corners[:, 2]
         determinant = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        # The inverse of the matrix with the columns `first` and `second`.
         inverses = np.stack([second[:, ::-1] * [1.0, -1.0], first[:, ::-1] * [-1.0, 1.0]], axis=1)
         inverses /= determinant[:, None, None]
         image_sides = images[:, :2] - images[:, 2:]
