@@ -132,7 +132,7 @@ def test_water_and_what_is_no_obstacle(tmp_path: Path) -> None:
     assert foreign.dropped == (
         "1 element below the ground",
         "1 way that does not close",
-        "1 way with nodes that are not in the file",
+        "1 way that is not complete in the file",
     )
 
 

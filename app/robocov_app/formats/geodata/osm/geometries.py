@@ -19,7 +19,7 @@ def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | 
     """Return a way as a line, or None, counted as left out, if nodes are missing."""
     lines = data.get_lines(way)
     if lines is None:
-        shapes.leave_out("way", "with nodes that are not in the file")
+        shapes.leave_out("way", "that is not complete in the file")
         return None
     return SourceGeometry("line", (lines[0],), way.labels, way.place, width=parse_width(way.tags))
 
@@ -28,7 +28,7 @@ def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeom
     """Return the area of a way or relation, or None, counted as left out, if it has none."""
     lines = data.get_lines(element)
     if lines is None:
-        shapes.leave_out(element.kind, "with members that are not in the file")
+        shapes.leave_out(element.kind, "that is not complete in the file")
         return None
     merged = shapely.line_merge(shapely.MultiLineString([shapely.LineString(line) for line in lines]))
     rings = [shapely.get_coordinates(part) for part in shapely.get_parts(merged)]
