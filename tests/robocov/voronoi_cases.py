@@ -33,7 +33,7 @@ REGIONS = {
     "round": Region(5.0 * np.column_stack([f(np.linspace(0, 2 * np.pi, 65)[:-1]) for f in (np.cos, np.sin)])),
 }
 ROUNDING = 3e-11
-"""Relative to the region's area, and to area times diameter for first moments."""
+"""Allowed error, relative to the area of the region, or for first moments to area times diameter."""
 
 seeds = st.integers(0, 2**32 - 1)
 names = st.sampled_from(sorted(REGIONS))
@@ -43,60 +43,73 @@ def evaluate_performance(f: Performance, r: Array) -> Array:
     """Return f(r) of the locational cost (4)."""
     if isinstance(f, Sensing):
         return 1.0 / (r**2 + f.height**2)
-    return r**2 if isinstance(f, SquaredDistance) else r
+    if isinstance(f, SquaredDistance):
+        return r**2
+    return r
 
 
-def scattered(region: Region, n: int, rng: np.random.Generator) -> Array:
+def scatter_points(region: Region, n: int, rng: np.random.Generator) -> Array:
     """Return n points within the region, by convex combinations of its corners."""
     return rng.dirichlet(np.full(len(region.vertices), 0.6), n) @ region.vertices
 
 
-def lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return points of a square lattice, all cocircular by fours, about the region's centroid."""
+def build_lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return points of a square lattice about the region's centroid. All are cocircular by fours."""
     side = max(2, int(np.sqrt(n)))
     step = 2.0 ** rng.integers(-6, -2)
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     return region.centroid + step * (np.column_stack([x.ravel(), y.ravel()]) - (side - 1) / 2)
 
 
-def circle(region: Region, n: int, rng: np.random.Generator) -> Array:
+def place_on_circle(region: Region, n: int, rng: np.random.Generator) -> Array:
     angle = rng.uniform(0, 1) + np.arange(n) * 2 * np.pi / n
     return region.centroid + 0.3 * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def collinear(region: Region, n: int, rng: np.random.Generator) -> Array:
-    a, b = scattered(region, 2, rng)
+def place_on_line(region: Region, n: int, rng: np.random.Generator) -> Array:
+    a, b = scatter_points(region, 2, rng)
     return a + rng.uniform(0, 1, (n, 1)) * (b - a)
 
 
-def huddled(region: Region, n: int, rng: np.random.Generator) -> Array:
+def cluster_points(region: Region, n: int, rng: np.random.Generator) -> Array:
     return region.centroid + 10.0 ** rng.uniform(-9, -2) * rng.uniform(-1, 1, (n, 2))
 
 
-def huddles(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return some single points, and some in groups of a micrometer."""
-    centers = scattered(region, max(2, n // 3), rng)
+def cluster_in_groups(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return single points and groups with a diameter of about a micrometer."""
+    centers = scatter_points(region, max(2, n // 3), rng)
     return centers[rng.integers(0, len(centers), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
 
 
-def almost_twins(region: Region, n: int, rng: np.random.Generator) -> Array:
-    points = scattered(region, n, rng)
-    points[1::2] = points[: n - 1 : 2] + 10.0 ** rng.uniform(-12, -3, (n // 2, 1)) * rng.normal(
-        size=(n // 2, 2)
-    )
+def pair_points(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return points in pairs that nearly coincide."""
+    points = scatter_points(region, n, rng)
+    distance = 10.0 ** rng.uniform(-12, -3, (n // 2, 1))
+    points[1::2] = points[: n - 1 : 2] + distance * rng.normal(size=(n // 2, 2))
     return points
 
 
-def on_boundary(region: Region, n: int, rng: np.random.Generator) -> Array:
+def place_on_boundary(region: Region, n: int, rng: np.random.Generator) -> Array:
     edge = rng.integers(0, len(region.edges), n)
     return region.vertices[edge] + rng.choice([0.0, 0.25, 0.5, 0.71], (n, 1)) * region.edges[edge]
 
 
-def half_outside(region: Region, n: int, rng: np.random.Generator) -> Array:
-    return region.centroid + 1.3 * (scattered(region, n, rng) - region.centroid)
+def place_half_outside(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return points in an enlarged copy of the region, some of them outside the region."""
+    return region.centroid + 1.3 * (scatter_points(region, n, rng) - region.centroid)
 
 
-FAMILIES = [scattered, lattice, circle, collinear, huddled, huddles, almost_twins, on_boundary, half_outside]
+FAMILIES = [
+    scatter_points,
+    build_lattice,
+    place_on_circle,
+    place_on_line,
+    cluster_points,
+    cluster_in_groups,
+    pair_points,
+    place_on_boundary,
+    place_half_outside,
+]
 families = st.sampled_from(FAMILIES)
 
 
@@ -130,15 +143,14 @@ def compute_exact_cell(
     return area, mx, my, polar
 
 
-def assert_exact(cells: VoronoiPartition, region: Region) -> None:
+def assert_cells_are_exact(cells: VoronoiPartition, region: Region) -> None:
+    size = estimate_size(cells, region)
     for robot, p in enumerate(cells.generators):
         area, mx, my, polar = map(float, compute_exact_cell(robot, cells.generators, region))
         assert cells.mass[robot] == pytest.approx(area, rel=1e-8, abs=ROUNDING * region.area)
         moment = cells.mass[robot] * (cells.centroid[robot] - p)
-        assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * estimate_size(cells, region))
-        assert cells.polar_moment[robot] == pytest.approx(
-            polar, abs=ROUNDING * region.area * estimate_size(cells, region) ** 2
-        )
+        assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * size)
+        assert cells.polar_moment[robot] == pytest.approx(polar, abs=ROUNDING * region.area * size**2)
 
 
 def compute_moment_about_centroid(cells: Cells) -> Array:

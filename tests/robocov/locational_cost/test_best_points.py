@@ -15,7 +15,7 @@ from voronoi_cases import (
     evaluate_performance,
     families,
     names,
-    scattered,
+    scatter_points,
     seeds,
 )
 
@@ -73,7 +73,7 @@ def test_nothing_better_is_found_by_brute_force(f: Performance, name: str) -> No
     def compute_cost(p: np.ndarray) -> float:
         return float(f.sign * evaluate_performance(f, np.hypot(*(points - p).T)) @ areas)
 
-    start = scattered(REGIONS[name], 1, np.random.default_rng(1))[0]
+    start = scatter_points(REGIONS[name], 1, np.random.default_rng(1))[0]
     lowest = minimize(compute_cost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
     np.testing.assert_allclose(find_best_point(ring, f), lowest.x, atol=2e-4)
 
@@ -107,7 +107,7 @@ def test_no_point_of_the_cell_is_better(seed: int, name: str, f: Performance, n:
     """Quasi-concavity at work: what Newton ends at is the optimum of the whole cell."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
-    cells = partition(scattered(region, n, rng), region)
+    cells = partition(scatter_points(region, n, rng), region)
     least = f.sign * compute_locational_costs(cells.edges, find_best_points(cells, f) - cells.generators, f)
     for _ in range(10):
         tried = np.array(
@@ -246,7 +246,7 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
     """Other cells, whatever they look like, do not change a bit, nor how many rounds they take."""
     rng = np.random.default_rng(3)
     region = REGIONS["pentagon"]
-    points = np.vstack([scattered(region, 9, rng), region.centroid + 1e-7 * rng.normal(size=(4, 2))])
+    points = np.vstack([scatter_points(region, 9, rng), region.centroid + 1e-7 * rng.normal(size=(4, 2))])
     cells = partition(points, region, Neighbors(len(points)))
     edges = cells.edges
     for f in FUNCTIONS:
@@ -301,5 +301,5 @@ def test_steps_go_down_by_the_sizes_of_the_eigenvalues(numbers: list[float]) -> 
 
 
 def test_the_squares_are_best_at_the_centroid() -> None:
-    cells = partition(scattered(PENTAGON, 8, np.random.default_rng(5)), PENTAGON)
+    cells = partition(scatter_points(PENTAGON, 8, np.random.default_rng(5)), PENTAGON)
     np.testing.assert_allclose(find_best_points(cells, SquaredDistance()), cells.centroid, atol=1e-12)

@@ -16,7 +16,7 @@ from voronoi_cases import (
     compute_moment_about_centroid,
     evaluate_performance,
     names,
-    scattered,
+    scatter_points,
     seeds,
 )
 
@@ -148,7 +148,7 @@ def test_gradient_and_hessian_are_finite_differences(seed: int, name: str, f: Pe
     region = REGIONS[name]
     ring = region.vertices - region.centroid
     # a sensor low over the edge of a cell sees a step there, which no finite difference resolves
-    p = scattered(region, 1, rng) - region.centroid
+    p = scatter_points(region, 1, rng) - region.centroid
     p = 0.8 * p if isinstance(f, Sensing) and f.height < 1.0 else p + rng.normal(scale=2.0, size=2)
     step = 1e-4 * min(1.0, np.sqrt(region.area))
     if isinstance(f, Sensing) and f.height < 1.0:
@@ -182,7 +182,7 @@ def test_squares_give_mass_centroid_and_the_parallel_axis(seed: int, name: str, 
     """(2), (3) and (13), by integrals that know nothing of mass and centroid."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
-    cells = partition(scattered(region, n, rng), region)
+    cells = partition(scatter_points(region, n, rng), region)
     points = rng.normal(scale=2.0, size=(n, 2))
     lever = points + cells.generators - cells.centroid
     size = region.diameter
@@ -218,7 +218,7 @@ def test_no_other_partition_is_better_than_that_of_voronoi(
     """(5): whatever is moved from one cell to another, the cost gets no better."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
-    points = scattered(region, n, rng)
+    points = scatter_points(region, n, rng)
     others = points + 10.0**far * region.diameter * rng.normal(size=(n, 2))
     own, theirs = compute_total_cost(points, points, region, f), compute_total_cost(points, others, region, f)
     assert f.sign * (theirs - own) >= -1e-11 * abs(own)
@@ -232,7 +232,7 @@ def test_boundary_terms_cancel_and_leave_equation_11(seed: int, name: str, f: Pe
     """(8)-(11): the gradient of the whole cost, cells and all, is that with the cells held still."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
-    points = region.centroid + 0.7 * (scattered(region, n, rng) - region.centroid)
+    points = region.centroid + 0.7 * (scatter_points(region, n, rng) - region.centroid)
     gap = np.hypot(*(points[:, None] - points).T) + np.diag(np.full(n, np.inf))
     step = 1e-3 * float(min(gap.min(), 0.5))
     if isinstance(f, Sensing):

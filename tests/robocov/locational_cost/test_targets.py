@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from voronoi_cases import PENTAGON, scattered
+from voronoi_cases import PENTAGON, scatter_points
 
 from robocov.controllers import Lloyd, Rapf, make_controller
 from robocov.cost import CoverageCost
@@ -20,7 +20,7 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.voronoi import partition
 
-POINTS = scattered(PENTAGON, 9, np.random.default_rng(2))
+POINTS = scatter_points(PENTAGON, 9, np.random.default_rng(2))
 
 
 def test_each_word_is_an_optimum() -> None:
@@ -72,7 +72,7 @@ def test_laws_head_for_their_target(law: str, target: str) -> None:
 
 def test_at_rest_a_team_is_where_its_targets_are(empty: Environment) -> None:
     """In a convex region; and the three partitions are three."""
-    starts = scattered(Region(np.array(empty.boundary)), 5, np.random.default_rng(4))
+    starts = scatter_points(Region(np.array(empty.boundary)), 5, np.random.default_rng(4))
     ends = []
     for target in TARGETS:
         controller = make_controller("lloyd", {"target": target, "height": 0.5})

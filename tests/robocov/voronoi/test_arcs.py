@@ -31,18 +31,20 @@ def test_moments_of_an_arc_agree_with_quadrature(seed: int, log_size: float, sig
     half = sign * np.pi / 2 * 10.0**log_size
     along = end - start
     length = np.hypot(*along)
-    tangent, out = along / length, np.array([along[1], -along[0]]) / length
+    tangent = along / length
+    normal = np.array([along[1], -along[0]]) / length
     nodes, weights = leggauss(40)
-    angle, radius = half * nodes, length / (2.0 * np.sin(half))
+    angle = half * nodes
+    radius = length / (2.0 * np.sin(half))
     rise = 2.0 * np.sin((half - angle) / 2) * np.sin((half + angle) / 2)
-    place = (start + end) / 2 + radius * (np.sin(angle)[:, None] * tangent + rise[:, None] * out)
-    speed = radius * (np.cos(angle)[:, None] * tangent - np.sin(angle)[:, None] * out)
-    cross = weights * half * (place[:, 0] * speed[:, 1] - place[:, 1] * speed[:, 0])
+    points = (start + end) / 2 + radius * (np.sin(angle)[:, None] * tangent + rise[:, None] * normal)
+    speed = radius * (np.cos(angle)[:, None] * tangent - np.sin(angle)[:, None] * normal)
+    cross = weights * half * (points[:, 0] * speed[:, 1] - points[:, 1] * speed[:, 0])
     ((area, *first, polar),) = compute_moments(build_arcs(start[None], end[None], half), 1)
-    size = 1.0 + np.abs(place).max()
+    size = 1.0 + np.abs(points).max()
     assert area == pytest.approx(cross.sum() / 2, abs=1e-13 * size**2)
-    np.testing.assert_allclose(first, cross @ place / 3, atol=1e-13 * size**3)
-    assert polar == pytest.approx((cross * (place**2).sum(axis=1)).sum() / 4, abs=1e-13 * size**4)
+    np.testing.assert_allclose(first, cross @ points / 3, atol=1e-13 * size**3)
+    assert polar == pytest.approx((cross * (points**2).sum(axis=1)).sum() / 4, abs=1e-13 * size**4)
 
 
 @pytest.mark.parametrize("pieces", [2, 3, 7, 40])
@@ -50,12 +52,12 @@ def test_moments_of_a_whole_circle(pieces: int) -> None:
     ((area, *first, polar),) = compute_moments(build_circle(2.0, pieces, center=(5.0, 1.0)), 1)
     assert area == pytest.approx(4 * np.pi, rel=1e-14)
     np.testing.assert_allclose(first, 4 * np.pi * np.array([5.0, 1.0]), rtol=1e-13)
-    # pi r⁴ / 2 about its own center, and the parallel axis theorem
+    # The moment is pi r⁴ / 2 about the center of the circle, plus the term of the parallel axis theorem.
     assert polar == pytest.approx(8 * np.pi + 4 * np.pi * 26.0, rel=1e-13)
 
 
 def test_almost_straight_arcs_keep_all_digits() -> None:
-    """The closed form of the area, r² (x - sin x cos x), has none left there."""
+    """The closed form of the area, r² (x - sin x cos x), loses all digits here."""
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     half = 1e-9
     area = compute_moments(build_arcs(square, np.roll(square, -1, axis=0), half), 1)[0, 0]
@@ -64,27 +66,29 @@ def test_almost_straight_arcs_keep_all_digits() -> None:
 
 @given(st.floats(0.01, 50.0), st.integers(2, 9), st.floats(1e-4, 0.5))
 def test_chords_deviate_by_at_most_the_allowed_distance(radius: float, pieces: int, sagitta: float) -> None:
-    table = build_circle(radius, pieces)
-    for line, row in zip(split_into_chords(table, sagitta), table, strict=True):
-        np.testing.assert_array_equal(line[[0, -1]].ravel(), row[:4])
+    arcs = build_circle(radius, pieces)
+    for line, arc in zip(split_into_chords(arcs, sagitta), arcs, strict=True):
+        np.testing.assert_array_equal(line[[0, -1]].ravel(), arc[:4])
         np.testing.assert_allclose(np.hypot(*line.T), radius, rtol=1e-9)
         middles = (line[1:] + line[:-1]) / 2
         assert (np.hypot(*middles.T) >= radius - sagitta * (1 + 1e-6)).all()
 
 
-def test_segments_stay_segments() -> None:
+def test_segments_are_not_split() -> None:
     line = split_into_chords(build_arcs(np.zeros((1, 2)), np.ones((1, 2)), 0.0), 1e-9)[0]
     np.testing.assert_array_equal(line, [[0.0, 0.0], [1.0, 1.0]])
 
 
 def test_rings_are_linked_from_pieces_in_any_order() -> None:
-    outer, hole = build_circle(3.0, 5), build_circle(1.0, 3, turns=-1, center=(0.5, 0.5))
+    outer = build_circle(3.0, 5)
+    hole = build_circle(1.0, 3, turns=-1, center=(0.5, 0.5))
     order = np.random.default_rng(0).permutation(8)
-    found = link_rings(np.concatenate([outer, hole])[order], 1e-5)
-    areas = [compute_area(ring) for ring in found]
+    rings = link_rings(np.concatenate([outer, hole])[order], 1e-5)
+    areas = [compute_area(ring) for ring in rings]
     assert sorted(areas) == pytest.approx([-np.pi, 9 * np.pi], rel=1e-4)
 
 
 def compute_area(ring: np.ndarray) -> float:
-    (x, y), (u, v) = ring.T, np.roll(ring, -1, axis=0).T
+    x, y = ring.T
+    u, v = np.roll(ring, -1, axis=0).T
     return float((x * v - u * y).sum() / 2)

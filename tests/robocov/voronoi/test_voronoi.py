@@ -15,14 +15,14 @@ from voronoi_cases import (
     REGIONS,
     SQUARE,
     Family,
-    assert_exact,
+    assert_cells_are_exact,
     assert_same_ring,
     compute_exact_cell,
     compute_moment_about_centroid,
     families,
     names,
     partition_by_clipping,
-    scattered,
+    scatter_points,
     seeds,
 )
 
@@ -37,8 +37,8 @@ from robocov.voronoi import partition, partition_by_travel_time
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 6, 7, 12])
 def test_small_teams_are_exact(n: int, name: str) -> None:
     rng = np.random.default_rng(n)
-    cells = partition(scattered(REGIONS[name], n, rng), REGIONS[name])
-    assert_exact(cells, REGIONS[name])
+    cells = partition(scatter_points(REGIONS[name], n, rng), REGIONS[name])
+    assert_cells_are_exact(cells, REGIONS[name])
     assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
 
 
@@ -48,8 +48,8 @@ def test_small_teams_are_exact(n: int, name: str) -> None:
 def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
     points = family(region, n, np.random.default_rng(seed))
-    assert_exact(partition(points, region), region)
-    assert_exact(partition_by_clipping(points, region), region)
+    assert_cells_are_exact(partition(points, region), region)
+    assert_cells_are_exact(partition_by_clipping(points, region), region)
 
 
 def test_one_robot_gets_the_whole_region() -> None:
@@ -101,14 +101,15 @@ def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> 
     assert [shape.area for shape in shapes] == pytest.approx(cells.mass, abs=1e-11 * region.diameter**2)
     samples = rng.dirichlet(np.ones(len(region.vertices)), 200) @ region.vertices
     distance = np.hypot(*(samples[:, None] - points).transpose(2, 0, 1))
-    inside = np.column_stack([shapely.contains_xy(shape, *samples.T) for shape in shapes])
-    best = distance.min(axis=1, keepdims=True)
+    is_inside = np.column_stack([shapely.contains_xy(shape, *samples.T) for shape in shapes])
+    nearest = distance.min(axis=1, keepdims=True)
     blur = 1e-9 * region.diameter
-    # near a bisector rounding may decide: there both or neither may hold the sample
-    far = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))[distance.argmin(axis=1)]
-    doubtful = (distance**2 - best**2 <= 2 * blur * far) & (distance > best)
-    clear = ~doubtful.any(axis=1) & (np.abs(samples @ region.normals.T - region.offsets) > blur).all(axis=1)
-    assert (inside == (distance == best))[clear].all()
+    # Near a bisector rounding may decide: both cells or neither may contain the sample.
+    generator_distance = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))[distance.argmin(axis=1)]
+    is_doubtful = (distance**2 - nearest**2 <= 2 * blur * generator_distance) & (distance > nearest)
+    is_off_boundary = (np.abs(samples @ region.normals.T - region.offsets) > blur).all(axis=1)
+    is_clear = ~is_doubtful.any(axis=1) & is_off_boundary
+    assert (is_inside == (distance == nearest))[is_clear].all()
 
 
 @settings(deadline=None, max_examples=200)
@@ -130,13 +131,14 @@ def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family
 
 @settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 30))
-def test_parallel_axis(seed: int, n: int) -> None:
-    """Equation (3), with the moment about the centroid from triangles that have it for a corner."""
-    points = scattered(PENTAGON, n, np.random.default_rng(seed))
+def test_moments_obey_the_parallel_axis_theorem(seed: int, n: int) -> None:
+    """Check equation (3) with moments from triangles that have the centroid as a corner."""
+    points = scatter_points(PENTAGON, n, np.random.default_rng(seed))
     for cells in (partition(points, PENTAGON), partition_by_clipping(points, PENTAGON)):
         direct = []
         for ring, centroid in zip(cells.polygons, cells.centroid, strict=True):
-            (x, y), (u, v) = (ring - centroid).T, (np.roll(ring, -1, axis=0) - centroid).T
+            x, y = (ring - centroid).T
+            u, v = (np.roll(ring, -1, axis=0) - centroid).T
             edges = (x * v - u * y) * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
             direct.append(edges.sum())
         assert compute_moment_about_centroid(cells) == pytest.approx(np.array(direct), abs=1e-11)
@@ -147,8 +149,8 @@ def test_parallel_axis(seed: int, n: int) -> None:
 
 @settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 40), st.floats(0.0, 6.3), st.booleans())
-def test_cells_turn_and_mirror_with_the_robots(seed: int, n: int, angle: float, mirror: bool) -> None:
-    points = scattered(PENTAGON, n, np.random.default_rng(seed))
+def test_cells_rotate_and_mirror_with_the_robots(seed: int, n: int, angle: float, mirror: bool) -> None:
+    points = scatter_points(PENTAGON, n, np.random.default_rng(seed))
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     if mirror:
         turn = np.diag([-1.0, 1.0]) @ turn
@@ -163,15 +165,16 @@ def test_cells_turn_and_mirror_with_the_robots(seed: int, n: int, angle: float, 
 @given(seeds, st.integers(2, 40))
 def test_order_of_the_robots_does_not_matter(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
-    points = scattered(SQUARE, n, rng)
+    points = scatter_points(SQUARE, n, rng)
     order = rng.permutation(n)
-    plain, mixed = partition(points, SQUARE), partition(points[order], SQUARE)
-    assert mixed.mass == pytest.approx(plain.mass[order], abs=1e-11)
+    cells = partition(points, SQUARE)
+    permuted = partition(points[order], SQUARE)
+    assert permuted.mass == pytest.approx(cells.mass[order], abs=1e-11)
 
 
 def test_coincident_robots_get_the_same_cell() -> None:
     for n in (2, 8, 30):
-        points = scattered(PENTAGON, n, np.random.default_rng(n))
+        points = scatter_points(PENTAGON, n, np.random.default_rng(n))
         twice = partition(np.concatenate([points, points[:2]]), PENTAGON)
         once = partition(points, PENTAGON)
         assert twice.mass[:n] == pytest.approx(once.mass, rel=1e-12)
@@ -199,35 +202,35 @@ def test_the_centroid_of_an_empty_cell_is_its_generator() -> None:
 @given(seeds, st.integers(2, 90), st.floats(0.1, 5.0))
 def test_a_cell_depends_only_on_the_neighbors_to_the_last_bit(seed: int, n: int, range_: float) -> None:
     rng = np.random.default_rng(seed)
-    points = scattered(SQUARE, n, rng)
+    points = scatter_points(SQUARE, n, rng)
     robot = int(rng.integers(n))
     neighbors = Neighbors.from_ranges(points, np.full(n, range_))
     heard = np.union1d(neighbors.list_neighbors(robot), [robot])
     before = partition(points, SQUARE, neighbors)
 
-    # the others move, out of range still, and some leave the team or join it
+    # The other robots move but stay out of range, and some leave the team or join it.
     moved = points.copy()
     for other in np.setdiff1d(np.arange(n), heard):
-        place = scattered(SQUARE, 1, rng)[0]
-        if np.hypot(*(place - points[robot])) > range_:
-            moved[other] = place
-    kept = np.union1d(heard, np.flatnonzero(rng.random(n) < 0.6))
-    joined = scattered(SQUARE, 5, rng)
-    joined = joined[np.hypot(*(joined - points[robot]).T) > range_]
-    moved = np.concatenate([moved[kept], joined])
-    again = int(np.searchsorted(kept, robot))
+        position = scatter_points(SQUARE, 1, rng)[0]
+        if np.hypot(*(position - points[robot])) > range_:
+            moved[other] = position
+    remaining = np.union1d(heard, np.flatnonzero(rng.random(n) < 0.6))
+    newcomers = scatter_points(SQUARE, 5, rng)
+    newcomers = newcomers[np.hypot(*(newcomers - points[robot]).T) > range_]
+    moved = np.concatenate([moved[remaining], newcomers])
+    index = int(np.searchsorted(remaining, robot))
     after = partition(moved, SQUARE, Neighbors.from_ranges(moved, np.full(len(moved), range_)))
 
-    assert after.mass[again] == before.mass[robot]
-    assert after.centroid[again].tolist() == before.centroid[robot].tolist()
-    assert after.polygons[again].tolist() == before.polygons[robot].tolist()
-    assert after.polar_moment[again] == before.polar_moment[robot]
+    assert after.mass[index] == before.mass[robot]
+    assert after.centroid[index].tolist() == before.centroid[robot].tolist()
+    assert after.polygons[index].tolist() == before.polygons[robot].tolist()
+    assert after.polar_moment[index] == before.polar_moment[robot]
 
 
 @settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
 def test_limited_cells_equal_those_of_the_neighbors_alone(seed: int, n: int, range_: float) -> None:
-    points = scattered(PENTAGON, n, np.random.default_rng(seed))
+    points = scatter_points(PENTAGON, n, np.random.default_rng(seed))
     neighbors = Neighbors.from_ranges(points, np.full(n, range_))
     cells = partition(points, PENTAGON, neighbors)
     for robot in range(n):
@@ -239,7 +242,7 @@ def test_limited_cells_equal_those_of_the_neighbors_alone(seed: int, n: int, ran
 
 
 def test_adjacent_cells_share_a_piece_of_boundary() -> None:
-    points = scattered(PENTAGON, 40, np.random.default_rng(3))
+    points = scatter_points(PENTAGON, 40, np.random.default_rng(3))
     cells = partition(points, PENTAGON)
     shapes = [shapely.Polygon(ring) for ring in cells.polygons]
     pairs = {
@@ -253,13 +256,14 @@ def test_adjacent_cells_share_a_piece_of_boundary() -> None:
 
 @pytest.mark.parametrize("n", [2, 6, 50])
 def test_equal_input_gives_equal_bits_and_read_only_cells(n: int) -> None:
-    points = scattered(PENTAGON, n, np.random.default_rng(n))
+    points = scatter_points(PENTAGON, n, np.random.default_rng(n))
     first = partition(points, PENTAGON)
     second = partition(points, Region(PENTAGON.vertices))
     assert first.mass.tobytes() == second.mass.tobytes()
     assert first.centroid.tobytes() == second.centroid.tobytes()
     rings = [ring.tobytes() for ring in second.polygons]
-    points[:] = 0.0  # the caller's array is not the partition's
+    # The partition does not share the array of the caller.
+    points[:] = 0.0
     assert [ring.tobytes() for ring in first.polygons] == rings
     with pytest.raises(ValueError, match="read-only"):
         first.mass[0] = 1.0
@@ -270,7 +274,7 @@ def test_equal_input_gives_equal_bits_and_read_only_cells(n: int) -> None:
 @pytest.mark.parametrize("n", [1, 9])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_generators_that_are_not_finite_are_named(n: int, bad: float) -> None:
-    points = scattered(SQUARE, n, np.random.default_rng(0))
+    points = scatter_points(SQUARE, n, np.random.default_rng(0))
     points[n // 2, 1] = bad
     with pytest.raises(InputError, match=rf"^generators\[{n // 2}\]: .*finite"):
         partition(points, SQUARE)
@@ -282,7 +286,7 @@ def test_generators_of_the_wrong_shape_are_rejected() -> None:
 
 
 def test_neighbors_that_do_not_fit_the_generators_are_rejected() -> None:
-    """Kernels check no bounds: they would read whatever lies behind the arrays."""
+    """Kernels do not check bounds: they would read memory beyond the arrays."""
     points = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]])
     neighbors = Neighbors.from_ranges(points, np.full(3, 1.5))
     with pytest.raises(InputError, match="neighbors: expected a graph of 2 robots, got 3"):

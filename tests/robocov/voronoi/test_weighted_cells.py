@@ -9,26 +9,31 @@ from voronoi_cases import (
     PENTAGON,
     REGIONS,
     SQUARE,
-    almost_twins,
-    circle,
-    collinear,
+    build_lattice,
+    cluster_in_groups,
     compute_moment_about_centroid,
-    huddles,
-    lattice,
     names,
-    scattered,
+    pair_points,
+    place_on_circle,
+    place_on_line,
+    scatter_points,
     seeds,
 )
 
-from robocov.density import Gaussian, Gaussians, Uniform
+from robocov.density import Density, Gaussian, Gaussians, Uniform
 from robocov.errors import InputError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
-FAMILIES = {"scattered": scattered, "lattice": lattice, "circle": circle, "collinear": collinear}
-DEGENERATE = {**FAMILIES, "almost twins": almost_twins, "huddles": huddles}
+FAMILIES = {
+    "scattered": scatter_points,
+    "lattice": build_lattice,
+    "circle": place_on_circle,
+    "collinear": place_on_line,
+}
+DEGENERATE = {**FAMILIES, "almost twins": pair_points, "huddles": cluster_in_groups}
 SPEEDS = {
     "two": lambda n, rng: rng.choice([0.5, 1.0], n),
     "powers of two": lambda n, rng: rng.choice([0.5, 1.0, 2.0, 4.0], n),
@@ -39,15 +44,16 @@ SPEEDS = {
 
 
 def build_cell_of_discs(
-    i: int, points: np.ndarray, speeds: np.ndarray, region: Region, heard: np.ndarray
+    i: int, points: np.ndarray, speeds: np.ndarray, region: Region, neighbors: np.ndarray
 ) -> shapely.Geometry:
-    """Return a cell by shapely's buffers: the region, cut by discs and half planes one after the other."""
+    """Return a cell of shapely: the region, cut by discs and half planes one after the other."""
     cell = region.polygon
-    for j in heard:
+    for j in neighbors:
         offset = points[j] - points[i]
         distance = float(np.hypot(*offset))
         if speeds[j] == speeds[i]:
-            middle, along = (points[i] + points[j]) / 2, offset / distance
+            middle = (points[i] + points[j]) / 2
+            along = offset / distance
             left = np.array([-along[1], along[0]])
             far = 4.0 * region.diameter
             corners = [middle + far * left, middle - far * left]
@@ -68,7 +74,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
     region = REGIONS[name]
     points = np.unique(DEGENERATE[family](region, n, rng), axis=0)
     cells = partition_by_travel_time(points, SPEEDS[speeds](len(points), rng), region)
-    # circles of some micrometers and of a kilometer, that nearly touch, keep fewer digits
+    # Nearly tangent circles of some micrometers and of a kilometer keep fewer digits.
     tolerance = 1e-6 if speeds == "very different" else 1e-9
     assert cells.mass.sum() == pytest.approx(region.area, rel=tolerance)
     first = cells.mass @ (cells.centroid - region.centroid)
@@ -80,7 +86,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
 def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: float) -> None:
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
-    points = scattered(region, int(rng.integers(2, 9)), rng)
+    points = scatter_points(region, int(rng.integers(2, 9)), rng)
     n = len(points)
     speeds = rng.choice([0.4, 1.0, 1.0, 1.7], n)
     neighbors = Neighbors.from_ranges(points, np.full(n, reach))
@@ -96,30 +102,32 @@ def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: floa
 @given(seeds, st.integers(1, 30))
 def test_each_point_is_in_the_cell_of_the_robot_that_arrives_first(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
-    points = scattered(PENTAGON, n, rng)
+    points = scatter_points(PENTAGON, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
     cells = partition_by_travel_time(points, speeds, PENTAGON)
     if isinstance(cells, VoronoiPartition):
         return
-    places = scattered(PENTAGON, 200, rng)
-    time = np.hypot(*(places[:, None] - points).transpose(2, 0, 1)) / speeds
+    samples = scatter_points(PENTAGON, 200, rng)
+    time = np.hypot(*(samples[:, None] - points).transpose(2, 0, 1)) / speeds
     outlines, owners = cells.outlines
-    painted = np.full(len(places), -1)
-    # a slow robot's cell is painted over that of a fast one, in which it is a hole
+    painted_owner = np.full(len(samples), -1)
+    # The cell of a slow robot is painted over the hole that it makes in the cell of a fast one.
     for outline, owner in zip(outlines, owners.tolist(), strict=True):
         ring = shapely.polygons(outline)
         if shapely.is_ccw(ring.exterior):
-            painted[shapely.contains_xy(ring, *places.T)] = owner
-    order = np.sort(time, axis=1)
-    clear = np.ones(len(places), dtype=bool) if n == 1 else order[:, 1] - order[:, 0] > 0.01
-    np.testing.assert_array_equal(painted[clear], time.argmin(axis=1)[clear])
+            painted_owner[shapely.contains_xy(ring, *samples.T)] = owner
+    sorted_time = np.sort(time, axis=1)
+    is_clear = np.ones(len(samples), dtype=bool)
+    if n > 1:
+        is_clear = sorted_time[:, 1] - sorted_time[:, 0] > 0.01
+    np.testing.assert_array_equal(painted_owner[is_clear], time.argmin(axis=1)[is_clear])
 
 
 @settings(max_examples=40)
 @given(seeds, names, st.integers(1, 60))
 def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: str, n: int) -> None:
     rng = np.random.default_rng(seed)
-    points = scattered(REGIONS[name], n, rng)
+    points = scatter_points(REGIONS[name], n, rng)
     cells = partition_by_travel_time(points, np.full(n, rng.uniform(0.1, 3.0)), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
     assert cells.mass.tobytes() == ordinary.mass.tobytes()
@@ -129,9 +137,9 @@ def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: s
 @settings(max_examples=40)
 @given(seeds, st.sampled_from(["square", "pentagon", "triangle"]), st.integers(2, 30))
 def test_nearly_equal_speeds_give_nearly_equal_cells(seed: int, name: str, n: int) -> None:
-    """The circles have radii of 10^13 m here, and the ordinary cells come out of them to 1e-12."""
+    """The circles have radii of 10^13 m here and still give the ordinary cells up to 1e-12."""
     rng = np.random.default_rng(seed)
-    points = scattered(REGIONS[name], n, rng)
+    points = scatter_points(REGIONS[name], n, rng)
     if len(find_close_pairs(points, 0.05)[0]):
         return
     cells = partition_by_travel_time(points, 1.0 + 1e-14 * rng.integers(1, 9, n), REGIONS[name])
@@ -160,19 +168,19 @@ def test_a_cell_may_have_two_components_and_a_centroid_outside() -> None:
     cells = partition_by_travel_time(np.array([[20.0, 0.5], [19.0, 0.5]]), np.array([1.0, 4.0]), corridor)
     assert isinstance(cells, WeightedCells)
     outlines, owners = cells.outlines
-    # the slow robot's disc is narrower than the corridor
+    # The disc of the slow robot is narrower than the corridor.
     assert owners.tolist() == [1, 1, 0]
     cells = partition_by_travel_time(np.array([[20.0, 0.5], [10.0, 0.5]]), np.array([1.0, 4.0]), corridor)
     assert isinstance(cells, WeightedCells)
     outlines, owners = cells.outlines
     assert owners.tolist() == [1, 1, 0]
     assert sum(shapely.Polygon(outline).area for outline in outlines) == pytest.approx(40.0, rel=1e-3)
-    # behind the slow robot the fast one comes first again: its centroid is pulled past it
+    # Behind the slow robot the fast one arrives first again, so its centroid lies beyond the slow robot.
     assert cells.centroid[1, 0] > 19.0
 
 
-def test_speeds_that_differ_by_rounding() -> None:
-    """Whether and where they meet, 10^20 m away, is rounding; which is the nearer one is not."""
+def test_speeds_that_differ_by_rounding_give_the_ordinary_cells() -> None:
+    """Rounding decides whether bisectors meet 10^20 m away, but not which robot is nearer."""
     points = PENTAGON.centroid + np.array([[0.0, 0.0], [2.0**-6, 0.0], [2.0**-5, 0.0]])
     speeds = 1.0 + 4.0 * np.finfo(float).eps * np.arange(3)
     ordinary = partition(points, PENTAGON)
@@ -181,7 +189,7 @@ def test_speeds_that_differ_by_rounding() -> None:
     )
 
 
-def test_robots_at_one_position() -> None:
+def test_robots_at_one_position_share_a_cell_if_they_are_equally_fast() -> None:
     points = np.array([[2.0, 3.0], [2.0, 3.0], [4.0, 3.0], [2.0, 3.0]])
     cells = partition_by_travel_time(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
     assert cells.mass[0] == 0.0
@@ -195,19 +203,21 @@ def test_robots_at_one_position() -> None:
 def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -> None:
     """H = sum of the integrals of (|q - p| / v)² over the cells: dH/dp = 2 M (p - C) / v²."""
     rng = np.random.default_rng(seed)
-    points = scattered(SQUARE, n, rng)
+    points = scatter_points(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
     cells = partition_by_travel_time(points, speeds, SQUARE)
     slope = 2.0 * (cells.mass / speeds**2)[:, None] * (points - cells.centroid)
 
-    def cost(where: np.ndarray) -> float:
-        return float((partition_by_travel_time(where, speeds, SQUARE).polar_moment / speeds**2).sum())
+    def compute_cost(positions: np.ndarray) -> float:
+        moments = partition_by_travel_time(positions, speeds, SQUARE).polar_moment
+        return float((moments / speeds**2).sum())
 
-    i, step = int(rng.integers(n)), 1e-5
+    i = int(rng.integers(n))
+    step = 1e-5
     for axis in (0, 1):
         shift = np.zeros((n, 2))
         shift[i, axis] = step
-        numeric = (cost(points + shift) - cost(points - shift)) / (2.0 * step)
+        numeric = (compute_cost(points + shift) - compute_cost(points - shift)) / (2.0 * step)
         assert numeric == pytest.approx(slope[i, axis], abs=1e-5 * (1.0 + abs(slope[i, axis])))
 
 
@@ -215,21 +225,23 @@ def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -
 @given(seeds, st.integers(2, 25), st.floats(0.5, 6.0))
 def test_a_cell_depends_only_on_the_neighbors_of_its_robot(seed: int, n: int, reach: float) -> None:
     rng = np.random.default_rng(seed)
-    points = scattered(SQUARE, n, rng)
+    points = scatter_points(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0], n)
     neighbors = Neighbors.from_ranges(points, np.full(n, reach))
     i = int(rng.integers(n))
-    strangers = np.ones(n, dtype=bool)
-    strangers[i] = False
-    strangers[neighbors.list_neighbors(i)] = False
-    other, slower = points.copy(), speeds.copy()
-    for k in np.flatnonzero(strangers):
-        place = scattered(SQUARE, 1, rng)[0]
-        if np.hypot(*(place - points[i])) > reach:
-            other[k] = place
-        slower[k] = rng.choice([0.5, 1.0, 2.0])
+    is_unknown = np.ones(n, dtype=bool)
+    is_unknown[i] = False
+    is_unknown[neighbors.list_neighbors(i)] = False
+    new_points = points.copy()
+    new_speeds = speeds.copy()
+    for k in np.flatnonzero(is_unknown):
+        position = scatter_points(SQUARE, 1, rng)[0]
+        if np.hypot(*(position - points[i])) > reach:
+            new_points[k] = position
+        new_speeds[k] = rng.choice([0.5, 1.0, 2.0])
     before = partition_by_travel_time(points, speeds, SQUARE, neighbors)
-    after = partition_by_travel_time(other, slower, SQUARE, Neighbors.from_ranges(other, np.full(n, reach)))
+    new_neighbors = Neighbors.from_ranges(new_points, np.full(n, reach))
+    after = partition_by_travel_time(new_points, new_speeds, SQUARE, new_neighbors)
     assert before.mass[i].tobytes() == after.mass[i].tobytes()
     assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
 
@@ -238,11 +250,11 @@ def test_reported_positions_replace_the_true_ones() -> None:
     points = np.array([[1.0, 1.0], [5.0, 1.0], [3.0, 5.0]])
     speeds = np.array([1.0, 2.0, 1.0])
     neighbors = Neighbors.from_ranges(points, np.full(3, 100.0))
-    heard = points[neighbors.indices] + [[0.3, 0.1]] * 6
-    cells = partition_by_travel_time(points, speeds, SQUARE, neighbors, reported_positions=heard)
+    reports = points[neighbors.indices] + [[0.3, 0.1]] * 6
+    cells = partition_by_travel_time(points, speeds, SQUARE, neighbors, reported_positions=reports)
     for i in range(3):
         known = points.copy()
-        known[neighbors.list_neighbors(i)] = heard[neighbors.indptr[i] : neighbors.indptr[i + 1]]
+        known[neighbors.list_neighbors(i)] = reports[neighbors.indptr[i] : neighbors.indptr[i + 1]]
         alone = partition_by_travel_time(known, speeds, SQUARE)
         assert cells.mass[i] == pytest.approx(alone.mass[i], rel=1e-12)
 
@@ -266,25 +278,25 @@ def test_unusable_generators_and_speeds_are_rejected(
 
 
 @pytest.mark.parametrize("name", ["gaussians", "uniform"])
-def test_mass_and_centroid_by_a_density(name: str) -> None:
-    density = (
-        Gaussians((Gaussian((2.0, 3.0), weight=4.0, sigma=0.8),), floor=0.5)
-        if name == "gaussians"
-        else Uniform(3.0)
-    )
-    rng = np.random.default_rng(7)
-    points, speeds = scattered(SQUARE, 5, rng), np.array([1.0, 0.3, 1.0, 0.5, 0.3])
+def test_mass_and_moments_are_weighted_by_a_density(name: str) -> None:
+    density: Density = Uniform(3.0)
+    if name == "gaussians":
+        density = Gaussians((Gaussian((2.0, 3.0), weight=4.0, sigma=0.8),), floor=0.5)
+    points = scatter_points(SQUARE, 5, np.random.default_rng(7))
+    speeds = np.array([1.0, 0.3, 1.0, 0.5, 0.3])
     cells = partition_by_travel_time(points, speeds, SQUARE, density=density)
     middles = (np.arange(600) + 0.5) / 100
-    x, y = (part.ravel() for part in np.meshgrid(middles, middles))
-    places = np.column_stack([x, y])
-    owner = (np.hypot(*(places[:, None] - points).transpose(2, 0, 1)) / speeds).argmin(axis=1)
-    weight = density.evaluate(places) * 1e-4
+    x, y = np.meshgrid(middles, middles)
+    samples = np.column_stack([x.ravel(), y.ravel()])
+    owner = (np.hypot(*(samples[:, None] - points).transpose(2, 0, 1)) / speeds).argmin(axis=1)
+    weight = density.evaluate(samples) * 1e-4
     for i in range(5):
-        own = owner == i
-        mass = weight[own].sum()
+        is_owned = owner == i
+        mass = weight[is_owned].sum()
         assert cells.mass[i] == pytest.approx(mass, rel=1e-2, abs=1e-3)
         if mass > 0.1:
-            np.testing.assert_allclose(cells.centroid[i], weight[own] @ places[own] / mass, atol=0.02)
-        polar = weight[own] @ ((places[own] - points[i]) ** 2).sum(axis=1)
+            np.testing.assert_allclose(
+                cells.centroid[i], weight[is_owned] @ samples[is_owned] / mass, atol=0.02
+            )
+        polar = weight[is_owned] @ ((samples[is_owned] - points[i]) ** 2).sum(axis=1)
         assert cells.polar_moment[i] == pytest.approx(polar, rel=2e-2, abs=1e-3)
