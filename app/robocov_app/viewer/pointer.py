@@ -13,63 +13,10 @@ from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.tools.snapping import SNAP_REACH_FRACTION, snap_point
+from robocov_app.viewer.tools.snapping import MapSnapper
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
 
 _NO_ROBOT = (-1, -1)
-
-
-def build_pointer_event(
-    viewer: Presenter, canvas: ViewerCanvas, pixel: Pixel, pane: int, *, is_right: bool = False
-) -> ViewerPointerEvent:
-    """Return the pointer at a pixel of a pane, snapped to the map if the tool wants that.
-
-    Parameters
-    ----------
-    viewer : Presenter
-        The viewer.
-    canvas : ViewerCanvas
-        The panes.
-    pixel : tuple of int
-        Position, px.
-    pane : int
-        Index of the pane.
-    is_right : bool
-        Whether the right button is pressed.
-    """
-    raw = canvas.to_world(pixel, pane)
-    reach = canvas.get_reach(pane)
-    point = raw
-    if viewer.tool.snaps:
-        point = snap_point(viewer.session.displayed.environment, raw, SNAP_REACH_FRACTION * reach)
-    robot = canvas.find_robot(pixel, pane) if viewer.tool.takes_robots else None
-    return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
-
-
-class ViewerToolGesture(Gesture):
-    """Passes the drag on to the tool, in the pane in which the button was pressed."""
-
-    def __init__(self, viewer: Presenter, canvas: ViewerCanvas, pane: int) -> None:
-        self._viewer = viewer
-        self._canvas = canvas
-        self._pane = pane
-
-    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Move the tool."""
-        viewer = self._viewer
-        pointer = self._build_event(event)
-        viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
-
-    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Release the tool."""
-        viewer = self._viewer
-        pointer = self._build_event(event)
-        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
-
-    def _build_event(self, event: pygame.event.Event) -> ViewerPointerEvent:
-        # Panes may have been removed since the press.
-        pane = min(self._pane, len(self._canvas.layout.panes) - 1)
-        return build_pointer_event(self._viewer, self._canvas, event.pos, pane)
 
 
 class TimeGesture(Gesture):
@@ -115,6 +62,7 @@ class ViewerPointer(Pointer):
         self._chart = chart
         self._viewer_panel = panel
         self._leave_lesson = leave_lesson
+        self._snapper = MapSnapper()
 
     def get_scale(self) -> float:
         """Return the scale of the window."""
@@ -205,17 +153,52 @@ class ViewerPointer(Pointer):
             viewer.inspection.active_pane = pane
             viewer.revision += 1
         is_right = event.button == RIGHT_BUTTON
-        pointer = build_pointer_event(viewer, canvas, event.pos, pane, is_right=is_right)
+        pointer = self.build_event(event.pos, pane, is_right=is_right)
         is_double = self.count_clicks(event, now) > 1
         handle = viewer.tool.double_click if is_double else viewer.tool.press
         viewer.attempt(lambda: handle(viewer.session, pointer))
         if viewer.tool is not hand:
-            return ViewerToolGesture(viewer, canvas, pane)
+            return ViewerToolGesture(self, pane)
         if pointer.robot is not None:
             self._viewer_panel.show_tab("robot")
         if hand.is_holding:
-            return ViewerToolGesture(viewer, canvas, pane)
+            return ViewerToolGesture(self, pane)
         return PanGesture(canvas.pan, self._click_without_tool)
+
+    def build_event(self, pixel: Pixel, pane: int, *, is_right: bool = False) -> ViewerPointerEvent:
+        """Return the pointer at a pixel of a pane, snapped to the map if the tool wants that.
+
+        Parameters
+        ----------
+        pixel : tuple of int
+            Position, px.
+        pane : int
+            Index of the pane; panes may have been removed since the button was pressed.
+        is_right : bool
+            Whether the right button is pressed.
+        """
+        canvas = self._canvas
+        viewer = self._viewer
+        pane = min(pane, len(canvas.layout.panes) - 1)
+        raw = canvas.to_world(pixel, pane)
+        reach = canvas.get_reach(pane)
+        point = raw
+        if viewer.tool.snaps:
+            point = self._snapper.snap(viewer.session.displayed.environment, raw, reach)
+        robot = canvas.find_robot(pixel, pane) if viewer.tool.takes_robots else None
+        return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
+
+    def move_tool(self, event: pygame.event.Event, pane: int) -> None:
+        """Drag the tool to the mouse, in a pane."""
+        viewer = self._viewer
+        pointer = self.build_event(event.pos, pane)
+        viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
+
+    def release_tool(self, event: pygame.event.Event, pane: int, *, is_click: bool) -> None:
+        """Release the tool at the mouse, in a pane."""
+        viewer = self._viewer
+        pointer = self.build_event(event.pos, pane)
+        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
         """Handle a click that did not pan: complete a drawing (right), or clear the selection (left)."""
@@ -237,5 +220,29 @@ class ViewerPointer(Pointer):
             inspection.cursor_pane = pane
         self._chart.hover = None if self.is_busy else event.pos
         if inspection.cursor is not None and not self.is_busy:
-            pointer = build_pointer_event(viewer, self._canvas, event.pos, inspection.cursor_pane)
+            pointer = self.build_event(event.pos, inspection.cursor_pane)
             viewer.tool.move(viewer.session, pointer)
+
+
+class ViewerToolGesture(Gesture):
+    """Passes a drag on to the tool, in the pane in which the button was pressed.
+
+    Parameters
+    ----------
+    pointer : ViewerPointer
+        The mouse over the panes.
+    pane : int
+        Index of the pane.
+    """
+
+    def __init__(self, pointer: ViewerPointer, pane: int) -> None:
+        self._pointer = pointer
+        self._pane = pane
+
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Move the tool."""
+        self._pointer.move_tool(event, self._pane)
+
+    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Release the tool."""
+        self._pointer.release_tool(event, self._pane, is_click=is_click)

@@ -23,11 +23,12 @@ from robocov.errors import MapError
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.geometry import compute_cos_sin, round_length, round_point, round_ring
+from robocov_app.editor.model.geometry import round_length, round_point, round_ring
 from robocov_app.editor.model.hit_test import find_in_box, find_owners
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch, dump_sketch
+from robocov_app.toolkit.geometry import compute_cos_sin
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5, "pillar")

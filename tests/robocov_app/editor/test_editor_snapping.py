@@ -11,14 +11,9 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Vertex, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
-from robocov_app.editor.tools.snapping import (
-    KINDS,
-    SnapSettings,
-    SnapTargets,
-    snap_angle,
-    snap_move,
-    snap_point,
-)
+from robocov_app.editor.tools.snap_targets import collect_snap_targets
+from robocov_app.toolkit.snap_targets import SnapTargets
+from robocov_app.toolkit.snapping import KINDS, SnapSettings, snap_angle, snap_move, snap_point
 
 BOX = PolygonObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0), (1.0, 3.0)))
 PILLAR = CircleObstacle((7.03, 5.04), 0.51)
@@ -34,7 +29,7 @@ def to(*kinds: str, reach: float = 0.15) -> SnapSettings:
 
 @pytest.fixture
 def targets() -> SnapTargets:
-    return SnapTargets(Sketch(boundary=HALL).with_obstacles([BOX, PILLAR])[0])
+    return collect_snap_targets(Sketch(boundary=HALL).with_obstacles([BOX, PILLAR])[0])
 
 
 @settings(max_examples=200)
@@ -47,7 +42,7 @@ def targets() -> SnapTargets:
     st.one_of(st.none(), cursor),
 )
 def test_a_snap_never_moves_farther_than_its_reach_and_tells_why(sketch, point, reach, grid, kinds, origin):
-    targets = SnapTargets(sketch)
+    targets = collect_snap_targets(sketch)
     snapping = SnapSettings(reach, grid, kinds=kinds)
     snap = snap_point(point, targets, snapping, origin)
     assert math.dist(snap.point, point) <= reach
@@ -80,7 +75,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
             marks += [tuple(at) for at in shapely.get_coordinates(item.shape.polygon).tolist()]
     places = [at for at in marks if at not in centers]
     nearest = min(math.dist(point, at) for at in places)
-    snap = snap_point(point, SnapTargets(sketch), to("vertex", reach=reach))
+    snap = snap_point(point, collect_snap_targets(sketch), to("vertex", reach=reach))
     if nearest > reach:
         assert snap.guides == ()
     else:
@@ -125,7 +120,7 @@ def test_two_lines_come_before_one(targets):
 
 def test_crossings_of_edges():
     plank = PolygonObstacle(((0.0, 1.9), (8.0, 1.9), (8.0, 2.1), (0.0, 2.1)))
-    targets = SnapTargets(Sketch().with_obstacles([BOX, plank])[0])
+    targets = collect_snap_targets(Sketch().with_obstacles([BOX, plank])[0])
     snap = snap_point((4.05, 2.06), targets, to("crossing", "edge"))
     assert snap.point == pytest.approx((4.0, 2.1))
     assert snap.guides[0].kind == "crossing"
@@ -162,33 +157,31 @@ def test_what_is_dragged_is_no_target():
     sketch, (key,) = Sketch(starts=(("two", PointsStart(((6.0, 1.0), (8.0, 1.0)))),)).with_obstacles([BOX])
     near = (1.02, 1.02)
     assert (
-        snap_point(near, SnapTargets(sketch, without=[key]), to("vertex", "edge", "grid")).guides[0].kind
+        snap_point(near, collect_snap_targets(sketch, without=[key]), to("vertex", "edge", "grid"))
+        .guides[0]
+        .kind
         == "grid"
     )
-    one = SnapTargets(sketch, without=[Vertex(key, 0, 0)])
+    one = collect_snap_targets(sketch, without=[Vertex(key, 0, 0)])
     assert snap_point(near, one, to("vertex", "edge", "middle")).guides == ()
     assert snap_point((4.02, 2.97), one, to("vertex")).point == (4.0, 3.0)
     # its edges go with it, the others stay
     assert snap_point((2.2, 1.02), one, to("edge", "middle")).guides == ()
     assert snap_point((2.2, 2.98), one, to("edge")).point == pytest.approx((2.2, 3.0))
-    # of a start's places, too
-    assert (
-        snap_point((6.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("center")).guides == ()
-    )
-    assert snap_point(
-        (8.02, 1.0), SnapTargets(sketch, without=[Vertex("two", 0, 0)]), to("center")
-    ).point == (
-        8.0,
-        1.0,
-    )
-    assert snap_point((6.02, 1.0), SnapTargets(sketch, without=["two"]), to("center")).guides == ()
-    # what has been drawn so far is one
-    assert snap_point((9.02, 5.0), SnapTargets(sketch, more=[(9.0, 5.0)]), to("vertex")).point == (9.0, 5.0)
+    # The same holds for the positions of a start.
+    without_first = collect_snap_targets(sketch, without=[Vertex("two", 0, 0)])
+    assert snap_point((6.02, 1.0), without_first, to("center")).guides == ()
+    assert snap_point((8.02, 1.0), without_first, to("center")).point == (8.0, 1.0)
+    without_start = collect_snap_targets(sketch, without=["two"])
+    assert snap_point((6.02, 1.0), without_start, to("center")).guides == ()
+    # Points that were drawn so far are targets, too.
+    with_drawn_point = collect_snap_targets(sketch, more=[(9.0, 5.0)])
+    assert snap_point((9.02, 5.0), with_drawn_point, to("vertex")).point == (9.0, 5.0)
 
 
 def test_walls_have_faces_and_circles_rims():
     wall = WallObstacle(((1.0, 1.0), (5.0, 1.0)), 0.2)
-    targets = SnapTargets(Sketch().with_obstacles([wall, PILLAR])[0])
+    targets = collect_snap_targets(Sketch().with_obstacles([wall, PILLAR])[0])
     assert snap_point((5.03, 1.12), targets, to("vertex", reach=0.05)).point == pytest.approx((5.0, 1.1))
     assert snap_point((3.3, 1.12), targets, to("edge", reach=0.05)).point == pytest.approx((3.3, 1.1))
     assert snap_point((3.3, 1.02), targets, to("edge", reach=0.05)).point == pytest.approx((3.3, 1.0))
@@ -222,7 +215,7 @@ def test_angles_of_turning():
 
 
 def test_nothing_is_no_target():
-    targets = SnapTargets(Sketch())
+    targets = collect_snap_targets(Sketch())
     assert snap_point((1.04, 2.03), targets, EVERYTHING).point == (1.0, 2.0)
     assert snap_point((1.04, 2.03), targets, to("vertex", "edge", "aligned")).guides == ()
     assert np.isfinite(snap_point((0.0, 0.0), targets, SnapSettings(1.0, grid=0.0)).point).all()

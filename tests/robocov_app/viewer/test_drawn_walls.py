@@ -10,7 +10,7 @@ from sample_sessions import HALL, RAPF
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.passages import describe_passage_changes
-from robocov_app.viewer.tools.snapping import snap_point
+from robocov_app.viewer.tools.snapping import MapSnapper
 
 RADIUS = 0.1
 
@@ -64,9 +64,12 @@ def test_a_very_short_drag_counts_as_a_click(tmp_path: Path) -> None:
 
 
 def test_corners_come_before_walls() -> None:
-    assert snap_point(HALL, (0.03, 0.04), 0.1) == (0.0, 0.0)
-    assert snap_point(HALL, (1.3, 0.04), 0.1) == (1.3, 0.0)
-    assert snap_point(HALL, (1.3, 0.2), 0.1) == (1.3, 0.2)
+    snapper = MapSnapper()
+    assert snapper.snap(HALL, (0.03, 0.04), 0.1) == (0.0, 0.0)
+    assert snapper.snap(HALL, (1.3, 0.04), 0.1) == pytest.approx((1.3, 0.0))
+    assert snapper.snap(HALL, (1.3, 0.2), 0.1) == (1.3, 0.2)
+    # Another map has other walls.
+    assert snapper.snap(build_room(), (9.98, 3.0), 0.1) == pytest.approx((10.0, 3.0))
 
 
 def test_the_area_without_robots_is_cut_off() -> None:

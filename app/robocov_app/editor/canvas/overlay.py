@@ -19,13 +19,13 @@ from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.handles import KNOB_HEIGHT_PX, Handle
-from robocov_app.editor.tools.snapping import Guide
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
 from robocov_app.render.camera import MAX_PIXEL
 from robocov_app.render.canvas import Canvas, TextAnchor
 from robocov_app.toolkit.overlay import draw_tag
+from robocov_app.toolkit.snapping import Guide
 
 # Lengths in pixels at scale 1.
 HANDLE_HALF_PX = 3.5  # half the side of a handle

@@ -11,14 +11,10 @@ from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import MAX_SPEED_M_S, MIN_SIZE_M, MIN_SPEED_M_S
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import (
-    check_point,
-    compute_center,
-    find_nearest_on_edges,
-    to_array,
-)
+from robocov_app.editor.model.geometry import check_point, compute_center, to_array
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
+from robocov_app.toolkit.geometry import find_nearest_on_edges
 
 PathEdit: TypeAlias = Callable[[ObstaclePath], ObstaclePath | None]
 DEFAULT_SPEED_M_S = 0.5

@@ -20,6 +20,7 @@ from robocov_app.editor.model.background import rotate_background
 from robocov_app.editor.model.geometry import Box, compute_center, enclose_boxes, round_length
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov_app.toolkit.geometry import compute_cos_sin
 
 Side: TypeAlias = Literal["left", "center", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]
@@ -57,7 +58,7 @@ class Affine:
     @classmethod
     def turn(cls, degrees: float, about: Point) -> Self:
         """Return the counter-clockwise rotation about a point, exact at quarters of a turn."""
-        cos, sin = geometry.compute_cos_sin(degrees)
+        cos, sin = compute_cos_sin(degrees)
         return cls(cos, -sin, sin, cos)._fix(about)
 
     @classmethod

@@ -13,6 +13,7 @@ from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
+from robocov_app.toolkit.geometry import compute_bearing, compute_cos_sin
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
 SHIFT_ANGLE_DEG = 15.0  # degrees: with Shift, lines are drawn at multiples of this
@@ -57,43 +58,6 @@ def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
     if closed and len(kept) > 1 and kept[0] == kept[-1]:
         kept.pop()
     return tuple(kept)
-
-
-def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
-    """Find the points of edges that are nearest to a point.
-
-    Parameters
-    ----------
-    starts, ends : (k, 2) array, m
-        Ends of the edges.
-    point : Point
-        The point, m.
-
-    Returns
-    -------
-    nearest : (k, 2) array, m
-        The nearest point of each edge.
-    distances : (k,) array, m
-        Its distance from the point.
-    """
-    along = ends - starts
-    squared = np.einsum("kd,kd->k", along, along)
-    part = np.einsum("kd,kd->k", np.array(point) - starts, along) / np.where(squared > 0.0, squared, 1.0)
-    feet = starts + np.clip(part, 0.0, 1.0)[:, None] * along
-    return feet, np.hypot(*(feet - point).T)
-
-
-def compute_cos_sin(degrees: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle, exact at quarters of a turn."""
-    quarters, rest = divmod(degrees, 90.0)
-    if rest == 0.0:
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
-    return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-
-
-def compute_bearing(a: Point, b: Point) -> float:
-    """Return the direction from a point to another, degrees counter-clockwise from the x axis."""
-    return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
 
 
 def compute_levelling_angle(a: Point, b: Point) -> float:

@@ -8,9 +8,10 @@ import shapely
 
 from robocov.arrays import Array, BoolArray
 from robocov.environment import DiscStart, Point, PointsStart, StartSpec
-from robocov_app.editor.model.geometry import find_nearest_on_edges, to_array
+from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.selection import Edge, Selection, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
+from robocov_app.toolkit.geometry import find_nearest_on_edges
 
 MANY_OBJECTS = 8  # of more objects, only those near the point are searched
 

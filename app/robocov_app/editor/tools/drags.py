@@ -13,8 +13,10 @@ from robocov_app.editor.model.selection import Change, Selection, Vertex, find_p
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import CarriedItems, EditorDrawState
 from robocov_app.editor.tools.handles import Handle, compute_side_position
-from robocov_app.editor.tools.snapping import Guide, Snap, SnapTargets, snap_angle, snap_move
 from robocov_app.editor.tools.tool import EditorPointerEvent
+from robocov_app.toolkit.geometry import compute_bearing
+from robocov_app.toolkit.snap_targets import SnapTargets
+from robocov_app.toolkit.snapping import Guide, Snap, snap_angle, snap_move
 from robocov_app.toolkit.tool import CursorShape
 
 MANY_POINTS = 1000  # of more vertices, a picture is moved instead of the obstacles
@@ -222,11 +224,11 @@ class TurnDrag(Drag):
         super().__init__(context, selection, start)
         bounds = compute_bounds(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
         self._center = geometry.compute_center(bounds)
-        self._start_angle = geometry.compute_bearing(self._center, start)
+        self._start_angle = compute_bearing(self._center, start)
 
     def follow(self, event: EditorPointerEvent) -> None:
         """Follow the pointer."""
-        bearing = geometry.compute_bearing(self._center, event.raw)
+        bearing = compute_bearing(self._center, event.raw)
         degrees = (bearing - self._start_angle + 180.0) % 360.0 - 180.0
         if event.shift:
             degrees = geometry.SHIFT_ANGLE_DEG * round(degrees / geometry.SHIFT_ANGLE_DEG)

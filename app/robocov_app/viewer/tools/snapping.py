@@ -4,36 +4,44 @@ import numpy as np
 import shapely
 
 from robocov.environment import Environment, Point
+from robocov_app.toolkit.snap_targets import SnapTargets, list_outline_edges
+from robocov_app.toolkit.snapping import SnapKind, SnapSettings, snap_point
 
 SNAP_REACH_FRACTION = 0.6  # of the width of a finger
+_KINDS: frozenset[SnapKind] = frozenset({"vertex", "edge"})
 
 
-def snap_point(environment: Environment, point: Point, reach: float) -> Point:
-    """Snap a point to the map.
+class MapSnapper:
+    """Snaps points to corners of the map, or to its walls; keeps the targets of the latest map."""
 
-    Parameters
-    ----------
-    environment : Environment
-        The map.
-    point : Point
-        Position, m.
-    reach : float
-        Distance within which it snaps, m.
+    def __init__(self) -> None:
+        self._environment: Environment | None = None
+        self._targets: SnapTargets | None = None
 
-    Returns
-    -------
-    Point
-        The nearest corner within reach; if there is none, the nearest point on a wall within reach; otherwise
-        the point itself.
-    """
-    walls = environment.free.boundary
-    corners = shapely.get_coordinates(walls)
-    distances = np.hypot(*(corners - point).T)
-    if len(distances) and distances.min() <= reach:
-        x, y = corners[distances.argmin()].tolist()
-        return x, y
-    shortest = shapely.shortest_line(walls, shapely.Point(point))
-    if shortest is None or shortest.length > reach:
-        return point
-    x, y = shapely.get_coordinates(shortest)[0].tolist()
-    return x, y
+    def snap(self, environment: Environment, point: Point, reach: float) -> Point:
+        """Snap a point to the map.
+
+        Parameters
+        ----------
+        environment : Environment
+            The map.
+        point : Point
+            Position, m.
+        reach : float
+            Width of a finger on the map, m; points snap within a fraction of it.
+
+        Returns
+        -------
+        Point
+            The nearest corner within reach; without one the nearest point on a wall; otherwise the point itself.
+        """
+        if self._targets is None or environment is not self._environment:
+            self._environment = environment
+            self._targets = _list_targets(environment)
+        settings = SnapSettings(SNAP_REACH_FRACTION * reach, kinds=_KINDS)
+        return snap_point(point, self._targets, settings).point
+
+
+def _list_targets(environment: Environment) -> SnapTargets:
+    edges = list_outline_edges(shapely.get_parts(environment.free).tolist())
+    return SnapTargets(vertices=edges.starts, centers=np.empty((0, 2)), edges=edges)

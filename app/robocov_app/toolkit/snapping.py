@@ -9,53 +9,12 @@ from typing import Literal, NamedTuple, Self, TypeAlias, get_args
 import numpy as np
 import shapely
 
-from robocov.environment import Point
-from robocov_app.editor.model.geometry import compute_bearing, compute_cos_sin
-from robocov_app.editor.tools.snap_targets import Dragged, PointKind, Snapper, SnapTargets, count_vertices
-
-__all__ = [
-    "KINDS",
-    "SNAPS",
-    "Dragged",
-    "Guide",
-    "Snap",
-    "SnapMode",
-    "SnapSettings",
-    "SnapTargets",
-    "Snapper",
-    "count_vertices",
-    "snap_angle",
-    "snap_move",
-    "snap_point",
-]
+from robocov_app.toolkit.geometry import Point, compute_bearing, compute_cos_sin
+from robocov_app.toolkit.snap_targets import PointKind, SnapTargets
 
 SnapKind: TypeAlias = Literal["vertex", "middle", "center", "crossing", "edge", "angle", "aligned", "grid"]
 KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
-
-class SnapMode(NamedTuple):
-    """A snap mode that can be switched on and off.
-
-    Attributes
-    ----------
-    title : str
-        Its label.
-    kinds : frozenset of str
-        Kinds of `SnapSettings.kinds` that it switches.
-    """
-
-    title: str
-    kinds: frozenset[SnapKind]
-
-
-SNAPS: dict[str, SnapMode] = {
-    "grid": SnapMode("Grid", frozenset({"grid"})),
-    "vertices": SnapMode("Vertices", frozenset({"vertex", "middle", "center", "crossing"})),
-    "edges": SnapMode("Edges", frozenset({"edge"})),
-    "angles": SnapMode("Angles", frozenset({"angle"})),
-    "alignment": SnapMode("Alignment", frozenset({"aligned"})),
-}
-"""The snap modes by their names."""
 
 MAX_ALIGNMENT_REACHES = 60.0  # reaches within which marks align: about the width of a window
 MAX_MOVED_POINTS = 16  # points of dragged objects that may snap

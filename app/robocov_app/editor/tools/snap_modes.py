@@ -1,0 +1,30 @@
+"""The snap modes that can be switched on and off."""
+
+from typing import NamedTuple
+
+from robocov_app.toolkit.snapping import SnapKind
+
+
+class SnapMode(NamedTuple):
+    """A snap mode that can be switched on and off.
+
+    Attributes
+    ----------
+    title : str
+        Its label.
+    kinds : frozenset of str
+        Kinds of `SnapSettings.kinds` that it switches.
+    """
+
+    title: str
+    kinds: frozenset[SnapKind]
+
+
+SNAPS: dict[str, SnapMode] = {
+    "grid": SnapMode("Grid", frozenset({"grid"})),
+    "vertices": SnapMode("Vertices", frozenset({"vertex", "middle", "center", "crossing"})),
+    "edges": SnapMode("Edges", frozenset({"edge"})),
+    "angles": SnapMode("Angles", frozenset({"angle"})),
+    "alignment": SnapMode("Alignment", frozenset({"aligned"})),
+}
+"""The snap modes by their names."""

@@ -1,0 +1,47 @@
+"""Directions, and distances from edges, in the plane."""
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from robocov.arrays import Array
+
+Point: TypeAlias = tuple[float, float]
+
+
+def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
+    """Find the points of edges that are nearest to a point.
+
+    Parameters
+    ----------
+    starts, ends : (k, 2) array, m
+        Ends of the edges.
+    point : Point
+        The point, m.
+
+    Returns
+    -------
+    nearest : (k, 2) array, m
+        The nearest point of each edge.
+    distances : (k,) array, m
+        Its distance from the point.
+    """
+    along = ends - starts
+    squared = np.einsum("kd,kd->k", along, along)
+    part = np.einsum("kd,kd->k", np.array(point) - starts, along) / np.where(squared > 0.0, squared, 1.0)
+    feet = starts + np.clip(part, 0.0, 1.0)[:, None] * along
+    return feet, np.hypot(*(feet - point).T)
+
+
+def compute_cos_sin(degrees: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle, exact at quarters of a turn."""
+    quarters, rest = divmod(degrees, 90.0)
+    if rest == 0.0:
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
+    return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+
+
+def compute_bearing(a: Point, b: Point) -> float:
+    """Return the direction from a point to another, degrees counter-clockwise from the x axis."""
+    return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
