@@ -12,7 +12,7 @@ SETTINGS_FILE = "editor.json"
 MAX_RECENT = 10  # recent maps
 
 
-class Layer(NamedTuple):
+class LayerSwitch(NamedTuple):
     """A layer of the sheet that can be shown or hidden.
 
     Attributes
@@ -28,14 +28,14 @@ class Layer(NamedTuple):
 
 
 LAYERS = {
-    "grid": Layer("Grid", "alt+3"),
-    "names": Layer("Names", "alt+2"),
-    "impassable": Layer("Too narrow", "alt+1"),
-    "problems": Layer("Problems", "alt+5"),
-    "robots": Layer("Robots at start", "a"),
-    "picture": Layer("Picture", "alt+6"),
-    "legend": Layer("Legend", "alt+7"),
-    "handles": Layer("Handles", "alt+4"),
+    "grid": LayerSwitch("Grid", "alt+3"),
+    "names": LayerSwitch("Names", "alt+2"),
+    "impassable": LayerSwitch("Too narrow", "alt+1"),
+    "problems": LayerSwitch("Problems", "alt+5"),
+    "robots": LayerSwitch("Robots at start", "a"),
+    "picture": LayerSwitch("Picture", "alt+6"),
+    "legend": LayerSwitch("Legend", "alt+7"),
+    "handles": LayerSwitch("Handles", "alt+4"),
 }
 
 SETTING_ATTRIBUTES = {

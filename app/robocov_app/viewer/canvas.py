@@ -20,6 +20,7 @@ from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.layout import Layout, is_inside
+from robocov_app.toolkit.viewport import REACH_PX, zoom_about
 from robocov_app.viewer.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.pane import Pane
@@ -39,11 +40,8 @@ MAX_RAYS_PER_PANE = 720
 MIN_RAYS_PER_SCAN = 24  # with fewer, scans are not drawn
 UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimited
 MAX_COST_LAG_S = 0.25  # an older cost is shown with its time
-MAX_ZOOM_PX_PER_M = 2e4
-MIN_MAP_SIZE_PX = 20.0  # size of the map at the smallest zoom
 
 # Lengths in pixels at scale 1.
-REACH_PX = 12.0  # width of a finger
 _HIT_MARGIN_PX = 3.0  # around a robot
 _COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while it is filled to a fraction between these
 _NO_ROBOT = (-1, -1)
@@ -108,9 +106,8 @@ class ViewerCanvas:
         pane = self.find_pane(pixel) or 0
         left, top, _, _ = self.layout.panes[pane]
         camera = self._painters[pane].camera
-        map_size = np.ptp(self._get_bounds(), axis=0).max()
-        zoom = float(np.clip(camera.zoom * factor, MIN_MAP_SIZE_PX / map_size, MAX_ZOOM_PX_PER_M))
-        self._set_camera(camera.zoom_at(zoom / camera.zoom, (pixel[0] - left, pixel[1] - top)))
+        map_size = float(np.ptp(self._get_bounds(), axis=0).max())
+        self._set_camera(zoom_about(camera, factor, (pixel[0] - left, pixel[1] - top), map_size))
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the map by a number of pixels; the center of the panes stays within its bounds."""

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from robocov.errors import ParameterError
-from robocov_app.toolkit.command import Argument, Command
+from robocov_app.toolkit.command import Argument, Command, CommandGroup
 from robocov_app.viewer.parameters import Parameter
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, format_speed
@@ -104,29 +104,25 @@ def _list_run_commands(viewer: Presenter) -> list[Command]:
     def set_start(name: str) -> None:
         playback.restart(start=name)
 
-    return [
-        Command("pause", "Play or pause", "Run", playback.toggle_pause, ("space",)),
-        Command("step", "Single step", "Run", playback.step, (".",), repeats=True),
-        Command("restart", "Restart", "Run", playback.restart, ("r",)),
-        Command("settle", "Play until settled, then stop", "Run", playback.toggle_settling, ("s",)),
-        Command("slower", "Slower", "Run", slower, ("-",), repeats=True),
-        Command("faster", "Faster", "Run", faster, ("=", "+"), repeats=True),
-        Command(
-            "seed:next", "New starting positions (next seed)", "Run", playback.restart_with_next_seed, ("n",)
-        ),
-        Command("start:next", "Next start of the map", "Run", playback.restart_at_next_start, ("shift+n",)),
-        Command(
-            "more", "Restart with one more robot", "Run", add_robot, ("shift+=", "shift++"), repeats=True
-        ),
-        Command("fewer", "Restart with one fewer robot", "Run", remove_robot, ("shift+-",), repeats=True),
-        Command("map:next", "Next map", "Run", next_map, ("page down",)),
-        Command("map:previous", "Previous map", "Run", previous_map, ("page up",)),
-        Command("robots", "Number of robots", "Run", set_robots, argument=robots_argument),
-        Command("seed", "Seed", "Run", set_seed, argument=_build_whole_number_argument("seed")),
-        Command("start", "Start of the map", "Run", set_start, argument=start_argument),
-        Command("map", "Open a map", "Run", files.open_map, argument=map_argument),
-        Command("speed", "Speed", "Run", playback.set_speed, argument=speed_argument),
-    ]
+    group = CommandGroup("Run")
+    group.add("pause", "Play or pause", playback.toggle_pause, "space")
+    group.add("step", "Single step", playback.step, ".", repeats=True)
+    group.add("restart", "Restart", playback.restart, "r")
+    group.add("settle", "Play until settled, then stop", playback.toggle_settling, "s")
+    group.add("slower", "Slower", slower, "-", repeats=True)
+    group.add("faster", "Faster", faster, "=", "+", repeats=True)
+    group.add("seed:next", "New starting positions (next seed)", playback.restart_with_next_seed, "n")
+    group.add("start:next", "Next start of the map", playback.restart_at_next_start, "shift+n")
+    group.add("more", "Restart with one more robot", add_robot, "shift+=", "shift++", repeats=True)
+    group.add("fewer", "Restart with one fewer robot", remove_robot, "shift+-", repeats=True)
+    group.add("map:next", "Next map", next_map, "page down")
+    group.add("map:previous", "Previous map", previous_map, "page up")
+    group.add("robots", "Number of robots", set_robots, argument=robots_argument)
+    group.add("seed", "Seed", set_seed, argument=_build_whole_number_argument("seed"))
+    group.add("start", "Start of the map", set_start, argument=start_argument)
+    group.add("map", "Open a map", files.open_map, argument=map_argument)
+    group.add("speed", "Speed", playback.set_speed, argument=speed_argument)
+    return group.commands
 
 
 def _list_time_commands(viewer: Presenter) -> list[Command]:
@@ -140,41 +136,31 @@ def _list_time_commands(viewer: Presenter) -> list[Command]:
     next_branch = partial(playback.enter_next_branch, 1)
     time_argument = Argument("seconds", partial(_read_positive_number, "time"))
     branch_argument = Argument("branch", list_values=playback.list_branch_names)
-    return [
-        Command("back", "Step back", "Time", step_back, ("left",), repeats=True),
-        Command("forward", "Step forward", "Time", step_forward, ("right",), repeats=True),
-        Command("back:second", "Back by a second", "Time", second_back, ("shift+left",), repeats=True),
-        Command(
-            "forward:second", "Forward by a second", "Time", second_forward, ("shift+right",), repeats=True
-        ),
-        Command("first", "Go to the start", "Time", go_to_start, ("home",)),
-        Command("live", "Go to the present", "Time", playback.look_at_present, ("end",)),
-        Command("branch:here", "Continue from here", "Time", playback.branch, ("b",)),
-        Command("branch:previous", "Previous branch", "Time", previous_branch, ("alt+left",)),
-        Command("branch:next", "Next branch", "Time", next_branch, ("alt+right",)),
-        Command("time", "Go to a time", "Time", playback.look_at, argument=time_argument),
-        Command("branch", "Enter a branch", "Time", playback.enter_branch, argument=branch_argument),
-    ]
+    group = CommandGroup("Time")
+    group.add("back", "Step back", step_back, "left", repeats=True)
+    group.add("forward", "Step forward", step_forward, "right", repeats=True)
+    group.add("back:second", "Back by a second", second_back, "shift+left", repeats=True)
+    group.add("forward:second", "Forward by a second", second_forward, "shift+right", repeats=True)
+    group.add("first", "Go to the start", go_to_start, "home")
+    group.add("live", "Go to the present", playback.look_at_present, "end")
+    group.add("branch:here", "Continue from here", playback.branch, "b")
+    group.add("branch:previous", "Previous branch", previous_branch, "alt+left")
+    group.add("branch:next", "Next branch", next_branch, "alt+right")
+    group.add("time", "Go to a time", playback.look_at, argument=time_argument)
+    group.add("branch", "Enter a branch", playback.enter_branch, argument=branch_argument)
+    return group.commands
 
 
 def _list_compare_commands(viewer: Presenter) -> list[Command]:
     comparison = viewer.comparison
     controller_argument = Argument("controller", list_values=lambda: viewer.controllers)
-    return [
-        Command(
-            "controller:next",
-            "Next controller in this pane",
-            "Compare",
-            comparison.choose_next_controller,
-            ("o",),
-        ),
-        Command("pane:add", "Compare with one more controller", "Compare", comparison.add_pane, ("k",)),
-        Command("pane:remove", "Remove this pane", "Compare", comparison.remove_pane, ("shift+k",)),
-        Command("pane:next", "Next pane", "Compare", comparison.activate_next_pane, ("`",)),
-        Command(
-            "controller", "Controller", "Compare", comparison.use_controller, argument=controller_argument
-        ),
-    ]
+    group = CommandGroup("Compare")
+    group.add("controller:next", "Next controller in this pane", comparison.choose_next_controller, "o")
+    group.add("pane:add", "Compare with one more controller", comparison.add_pane, "k")
+    group.add("pane:remove", "Remove this pane", comparison.remove_pane, "shift+k")
+    group.add("pane:next", "Next pane", comparison.activate_next_pane, "`")
+    group.add("controller", "Controller", comparison.use_controller, argument=controller_argument)
+    return group.commands
 
 
 def _list_edit_commands(viewer: Presenter) -> list[Command]:
@@ -185,70 +171,61 @@ def _list_edit_commands(viewer: Presenter) -> list[Command]:
     enlarge = partial(viewer.resize_tool, RESIZE_STEP)
     shrink = partial(viewer.resize_tool, 1 / RESIZE_STEP)
     robot_argument = _build_whole_number_argument("robot", lambda: map(str, viewer.robot_numbers))
-    return [
-        Command("undo", "Undo", "Edit", playback.undo, ("ctrl+z",), repeats=True),
-        Command("redo", "Redo", "Edit", playback.redo, ("ctrl+y", "ctrl+shift+z"), repeats=True),
-        Command("robot:next", "Inspect the next robot", "Edit", select_next, ("tab",), repeats=True),
-        Command(
-            "robot:previous",
-            "Inspect the previous robot",
-            "Edit",
-            select_previous,
-            ("shift+tab",),
-            repeats=True,
-        ),
-        Command("robot:fail", "Fail or revive selected robot", "Edit", robots.fail_or_revive, ("shift+d",)),
-        Command("robot:remove", "Remove selected robot", "Edit", robots.remove, ("delete",)),
-        Command("finish", "Finish drawing", "Edit", viewer.finish_drawing, ("return", "enter")),
-        Command("cancel", "Cancel", "Edit", viewer.cancel, ("escape",)),
-        Command("wider", "Wider walls; a larger brush", "Edit", enlarge, ("]",), repeats=True),
-        Command("narrower", "Narrower walls; a smaller brush", "Edit", shrink, ("[",), repeats=True),
-        Command("robot", "Inspect a robot", "Edit", robots.select, argument=robot_argument),
-    ]
+    group = CommandGroup("Edit")
+    group.add("undo", "Undo", playback.undo, "ctrl+z", repeats=True)
+    group.add("redo", "Redo", playback.redo, "ctrl+y", "ctrl+shift+z", repeats=True)
+    group.add("robot:next", "Inspect the next robot", select_next, "tab", repeats=True)
+    group.add("robot:previous", "Inspect the previous robot", select_previous, "shift+tab", repeats=True)
+    group.add("robot:fail", "Fail or revive selected robot", robots.fail_or_revive, "shift+d")
+    group.add("robot:remove", "Remove selected robot", robots.remove, "delete")
+    group.add("finish", "Finish drawing", viewer.finish_drawing, "return", "enter")
+    group.add("cancel", "Cancel", viewer.cancel, "escape")
+    group.add("wider", "Wider walls; a larger brush", enlarge, "]", repeats=True)
+    group.add("narrower", "Narrower walls; a smaller brush", shrink, "[", repeats=True)
+    group.add("robot", "Inspect a robot", robots.select, argument=robot_argument)
+    return group.commands
 
 
 def _list_view_commands(viewer: Presenter) -> list[Command]:
     view = viewer.view
-    return [
-        Command("theme", "Light or dark", "View", view.toggle_theme, ("t",)),
-        Command("fade", "Fading trajectories", "View", view.toggle_fading, ("shift+t",)),
-        Command("suggestions", "Suggestions when settled", "View", view.toggle_suggestions, ("shift+h",)),
-        Command("panel", "Hide or show the panel", "View", view.toggle_panel, ("h",)),
-    ]
+    group = CommandGroup("View")
+    group.add("theme", "Light or dark", view.toggle_theme, "t")
+    group.add("fade", "Fading trajectories", view.toggle_fading, "shift+t")
+    group.add("suggestions", "Suggestions when settled", view.toggle_suggestions, "shift+h")
+    group.add("panel", "Hide or show the panel", view.toggle_panel, "h")
+    return group.commands
 
 
 def _list_file_commands(viewer: Presenter) -> list[Command]:
     files = viewer.files
     session_argument = Argument("file", Path, files.list_sessions)
     target_argument = Argument("file", _read_path)
-    return [
-        Command("save:session", "Save session", "File", files.save_session, ("ctrl+s",)),
-        Command("recover", "Recover a session", "File", files.recover, ("ctrl+shift+o",)),
-        Command("save:map", "Save map", "File", files.save_map, ("ctrl+shift+s",)),
-        Command("open", "Open a session", "File", files.open_session, argument=session_argument),
-        Command("save", "Save session as", "File", files.save_session, argument=target_argument),
-    ]
+    group = CommandGroup("File")
+    group.add("save:session", "Save session", files.save_session, "ctrl+s")
+    group.add("recover", "Recover a session", files.recover, "ctrl+shift+o")
+    group.add("save:map", "Save map", files.save_map, "ctrl+shift+s")
+    group.add("open", "Open a session", files.open_session, argument=session_argument)
+    group.add("save", "Save session as", files.save_session, argument=target_argument)
+    return group.commands
 
 
 def _list_tool_commands(viewer: Presenter) -> list[Command]:
-    commands: list[Command] = []
+    group = CommandGroup("Tools")
     for tool in viewer.toolbox.by_name.values():
-        title = f"{tool.title}: {tool.hint}"
         choose = partial(viewer.choose_tool, tool.name)
-        commands.append(Command(f"tool:{tool.name}", title, "Tools", choose, (tool.key,)))
-    return commands
+        group.add(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", choose, tool.key)
+    return group.commands
 
 
 def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     """Return the commands that show or hide layers: those with keys first, in the order of the keys."""
     names = [name for name in _LAYER_KEYS if name in titles]
     names += [name for name in titles if name not in _LAYER_KEYS]
-    commands: list[Command] = []
+    group = CommandGroup("Show")
     for name in names:
-        keys = (_LAYER_KEYS[name],) if name in _LAYER_KEYS else ()
-        toggle = partial(viewer.view.toggle_layer, name)
-        commands.append(Command(f"layer:{name}", titles[name], "Show", toggle, keys))
-    return commands
+        keys = [_LAYER_KEYS[name]] if name in _LAYER_KEYS else []
+        group.add(f"layer:{name}", titles[name], partial(viewer.view.toggle_layer, name), *keys)
+    return group.commands
 
 
 def list_parameter_commands(viewer: Presenter) -> Iterator[Command]:

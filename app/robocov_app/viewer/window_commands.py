@@ -4,13 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from robocov_app.toolkit.command import Command
+from robocov_app.toolkit.command import Command, CommandGroup
 from robocov_app.toolkit.command_window import Action, WindowActions
+from robocov_app.toolkit.viewport import PAN_STEP_PX, ZOOM_STEP
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
-
-ZOOM_STEP = 1.25
-PAN_STEP_PX = 60
 
 
 @dataclass(frozen=True)
@@ -62,34 +60,35 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
     pan_right = partial(canvas.pan, -PAN_STEP_PX, 0)
     pan_up = partial(canvas.pan, 0, PAN_STEP_PX)
     pan_down = partial(canvas.pan, 0, -PAN_STEP_PX)
-    return [
-        Command("fit", "Show the whole map", "View", canvas.fit, ("f",)),
-        Command("zoom:in", "Zoom in", "View", zoom_in, ("ctrl+=", "ctrl++"), repeats=True),
-        Command("zoom:out", "Zoom out", "View", zoom_out, ("ctrl+-",), repeats=True),
-        Command("pan:left", "Pan left", "View", pan_left, ("ctrl+left",), repeats=True),
-        Command("pan:right", "Pan right", "View", pan_right, ("ctrl+right",), repeats=True),
-        Command("pan:up", "Pan up", "View", pan_up, ("ctrl+up",), repeats=True),
-        Command("pan:down", "Pan down", "View", pan_down, ("ctrl+down",), repeats=True),
-        Command("plot", "Plot mean distance or mean time", "View", chart.switch_quantity, ("y",)),
-        Command("tab", "Next page of the panel", "View", actions.show_next_tab, ("ctrl+tab",)),
-        Command("fullscreen", "Full screen", "View", actions.toggle_fullscreen, ("f11",)),
-    ]
+    group = CommandGroup("View")
+    group.add("fit", "Show the whole map", canvas.fit, "f")
+    group.add("zoom:in", "Zoom in", zoom_in, "ctrl+=", "ctrl++", repeats=True)
+    group.add("zoom:out", "Zoom out", zoom_out, "ctrl+-", repeats=True)
+    group.add("pan:left", "Pan left", pan_left, "ctrl+left", repeats=True)
+    group.add("pan:right", "Pan right", pan_right, "ctrl+right", repeats=True)
+    group.add("pan:up", "Pan up", pan_up, "ctrl+up", repeats=True)
+    group.add("pan:down", "Pan down", pan_down, "ctrl+down", repeats=True)
+    group.add("plot", "Plot mean distance or mean time", chart.switch_quantity, "y")
+    group.add("tab", "Next page of the panel", actions.show_next_tab, "ctrl+tab")
+    group.add("fullscreen", "Full screen", actions.toggle_fullscreen, "f11")
+    return group.commands
 
 
 def _list_file_commands(actions: ViewerWindowActions) -> list[Command]:
-    return [
-        Command("screenshot", "Screenshot", "File", actions.save_screenshot, ("f12",)),
-        Command("video", "Start or stop a video", "File", actions.toggle_recording, ("f9",)),
-        Command("save:run", "Save run", "File", actions.save_run, ("ctrl+e",)),
-        Command("open:file", "Open a session or a map", "File", actions.open_file, ("ctrl+o",)),
-    ]
+    group = CommandGroup("File")
+    group.add("screenshot", "Screenshot", actions.save_screenshot, "f12")
+    group.add("video", "Start or stop a video", actions.toggle_recording, "f9")
+    group.add("save:run", "Save run", actions.save_run, "ctrl+e")
+    group.add("open:file", "Open a session or a map", actions.open_file, "ctrl+o")
+    return group.commands
 
 
 def _list_help_commands(actions: ViewerWindowActions) -> list[Command]:
-    return [
-        Command("help", "Keys", "Help", actions.toggle_help, ("f1", "shift+/")),
-        Command("palette", "Commands by name", "Help", actions.open_palette, ("ctrl+k", "/")),
-        Command("tour", "The lesson, or just play", "Help", actions.toggle_lesson, ("f2",)),
-        Command("quit", "Quit", "Help", actions.quit, ("ctrl+q",)),
-        Command("branches", "List of branches", "Time", actions.list_branches, ("ctrl+b",)),
-    ]
+    help_group = CommandGroup("Help")
+    help_group.add("help", "Keys", actions.toggle_help, "f1", "shift+/")
+    help_group.add("palette", "Commands by name", actions.open_palette, "ctrl+k", "/")
+    help_group.add("tour", "The lesson, or just play", actions.toggle_lesson, "f2")
+    help_group.add("quit", "Quit", actions.quit, "ctrl+q")
+    time_group = CommandGroup("Time")
+    time_group.add("branches", "List of branches", actions.list_branches, "ctrl+b")
+    return [*help_group.commands, *time_group.commands]

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.geometry import DECIMALS
-from robocov_app.editor.model.history import History
+from robocov_app.editor.model.history import UndoHistory
 from robocov_app.editor.model.parser import build_sketch
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, to_document
@@ -15,7 +15,7 @@ HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 @settings(max_examples=120)
 @given(st.data())
 def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
-    history = History(data.draw(st.one_of(sound_sketches(least=2), drafts())))
+    history = UndoHistory(data.draw(st.one_of(sound_sketches(least=2), drafts())))
     was = [(history.sketch, history.selection)]
     for _ in range(data.draw(st.integers(1, 6))):
         change = data.draw(changes(history.sketch))
@@ -61,8 +61,8 @@ def test_coordinates_come_out_to_the_tenth_of_a_millimeter(data):
     walk([document.get("boundary", []), document.get("obstacles", []), document.get("starts", {})])
 
 
-def drawn(count: int) -> History:
-    history = History(Sketch(boundary=HALL))
+def drawn(count: int) -> UndoHistory:
+    history = UndoHistory(Sketch(boundary=HALL))
     for k in range(count):
         history.apply(create.add_circle(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
     return history
@@ -133,8 +133,8 @@ def test_saved_is_what_the_file_holds_wherever_one_goes():
     assert not history.has_unsaved_changes
     history.saved = None
     assert history.has_unsaved_changes
-    assert History(Sketch(), saved=False).has_unsaved_changes
-    assert not History(Sketch()).has_unsaved_changes
+    assert UndoHistory(Sketch(), saved=False).has_unsaved_changes
+    assert not UndoHistory(Sketch()).has_unsaved_changes
 
 
 def test_undoing_selects_what_was_selected():

@@ -14,7 +14,7 @@ from random_events import RandomEvents
 
 from robocov.environment import Environment
 from robocov_app.editor.edits.create import add_circle
-from robocov_app.editor.model.history import History
+from robocov_app.editor.model.history import UndoHistory
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.costs import Costs
@@ -52,7 +52,7 @@ def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
 
         fuzz.play(events, stay_open)
         leave_everything(hands)
-        history: History = hands.editor.document.history
+        history: UndoHistory = hands.editor.document.history
         before = history.sketch
         hands.editor.apply(add_circle(history.sketch, (1.0, 1.0), 0.25))
         hands.key("ctrl+z")

@@ -11,7 +11,7 @@ from robocov.errors import format_count
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.layers import build_layers
 from robocov_app.editor.canvas.legend import build_legend_entries
-from robocov_app.editor.canvas.scene import Scene
+from robocov_app.editor.canvas.scene import EditorScene
 from robocov_app.editor.canvas.sheet import Sheet, compute_hull_excess
 from robocov_app.editor.canvas.view import View
 from robocov_app.editor.editor import Editor
@@ -32,9 +32,9 @@ from robocov_app.render.fonts import shorten_to_width
 from robocov_app.render.layers.density import build_density_entry
 from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.layout import Layout, is_inside
+from robocov_app.toolkit.viewport import zoom_about
 
 # Lengths in pixels at scale 1.
-REACH_PX = 12.0  # within which the pointer takes hold of something
 MARGIN_PX = 26.0  # around the map when all of it is shown
 SCROLL_MARGIN_PX = 80  # a problem nearer to the edge is moved into the middle
 BADGE_REACH_PX = 10
@@ -43,8 +43,6 @@ SCALE_BAR_LABEL_PX = 90
 MAX_PAN_FRACTION = 0.45  # of the view, by which the map can be moved out of its middle
 EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # shown of an empty sheet
 MIN_VIEW_M = 0.2  # width and height that are shown at least
-MIN_MAP_PX = 20.0  # at the smallest magnification
-MAX_ZOOM = 2e4  # px/m
 MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
 
 
@@ -178,8 +176,7 @@ class EditorCanvas:
         assert at is not None
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         extent = max(high_x - low_x, high_y - low_y, 1.0)
-        zoom = float(np.clip(self.camera.zoom * factor, MIN_MAP_PX / extent, MAX_ZOOM))
-        self._set_camera(self.camera.zoom_at(zoom / self.camera.zoom, at))
+        self._set_camera(zoom_about(self.camera, factor, at, extent))
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the view by pixels; the map stays in it."""
@@ -251,12 +248,12 @@ class EditorCanvas:
         self._draw_legend(scene)
         self._draw_foot(scene)
 
-    def _build_scene(self, screen: Surface) -> Scene:
+    def _build_scene(self, screen: Surface) -> EditorScene:
         editor = self.editor
         view = self._build_view()
         state = editor.tool.build_draw_state(editor)
         sketch, selection = editor.displayed
-        return Scene(
+        return EditorScene(
             screen=screen,
             canvas=view.build_canvas(screen.subsurface(Rect(self.layout.arena))),
             view=view,
@@ -271,7 +268,7 @@ class EditorCanvas:
             cursor=self.at,
         )
 
-    def _draw_sheet(self, scene: Scene) -> None:
+    def _draw_sheet(self, scene: EditorScene) -> None:
         is_boundary_changed = scene.sketch.boundary is not scene.saved.boundary
         sketch = scene.sketch if is_boundary_changed else scene.saved
         if scene.state.background is not None:
@@ -285,7 +282,7 @@ class EditorCanvas:
             self.editor.show_message(image.error, is_error=True)
             image.error = ""
 
-    def _draw_legend(self, scene: Scene) -> None:
+    def _draw_legend(self, scene: EditorScene) -> None:
         if not self.entries:
             return
         box = Rect(self.layout.arena)
@@ -296,7 +293,7 @@ class EditorCanvas:
         legend = self._legend.get(None, key, lambda: legend_strip.render_legend_strip(self.entries, strip))
         scene.screen.blit(legend, box)
 
-    def _draw_foot(self, scene: Scene) -> None:
+    def _draw_foot(self, scene: EditorScene) -> None:
         """Draw the strip at the foot: scale bar, and facts about the map."""
         box = Rect(self.layout.arena)
         scale = scene.canvas.scale

@@ -10,7 +10,7 @@ from pygame import Rect, Surface
 
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.hatching import draw_hatching
-from robocov_app.editor.canvas.scene import Scene
+from robocov_app.editor.canvas.scene import EditorScene
 from robocov_app.editor.canvas.sheet import Sheet
 from robocov_app.editor.edits import paths
 from robocov_app.editor.model.selection import Selection
@@ -31,10 +31,10 @@ MIN_NUMBER_PX = 7.5  # at scale 1: smaller numbers are not written on robots
 _PREMULTIPLIED = pygame.BLEND_PREMULTIPLIED
 
 
-class Layer(Protocol):
+class OverlayLayer(Protocol):
     """A layer over the sheet."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the layer."""
 
 
@@ -45,7 +45,7 @@ class DraggedObstacles:
         self._sheet = sheet
         self._picture: LatestValue[Surface] = LatestValue()
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the obstacles."""
         if scene.state.carried is not None:
             self._draw_carried(scene, scene.state.carried)
@@ -55,7 +55,7 @@ class DraggedObstacles:
             items = [item for item in scene.sketch.obstacles if item.key not in keys]
             self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.final, DRAGGED_TINT))
 
-    def _draw_carried(self, scene: Scene, carried: CarriedItems) -> None:
+    def _draw_carried(self, scene: EditorScene, carried: CarriedItems) -> None:
         camera = scene.view.camera
         picture = self._picture.get(
             scene.saved,
@@ -66,7 +66,7 @@ class DraggedObstacles:
         dy = round(-(camera.zoom * carried.offset[1]))
         scene.screen.blit(picture, (dx, dy), special_flags=_PREMULTIPLIED)
 
-    def _draw_picture(self, scene: Scene, selection: Selection) -> Surface:
+    def _draw_picture(self, scene: EditorScene, selection: Selection) -> Surface:
         theme = scene.view.theme
         page = scene.view.build_page()
         items = [item for item in scene.saved.obstacles if item.key in selection.items]
@@ -83,7 +83,7 @@ class Passages:
     def __init__(self) -> None:
         self._hatching: LatestValue[tuple[Surface, Rect] | None] = LatestValue()
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw hatching and gap."""
         measurement = scene.measurement
         if measurement is None:
@@ -101,7 +101,7 @@ class Passages:
 class Paths:
     """Paths of moving obstacles, and where the obstacles are while they are shown moving."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the paths."""
         sketch = scene.sketch if scene.state.pending is None else scene.state.pending
         theme = scene.canvas.theme
@@ -118,10 +118,10 @@ class Paths:
                 overlay.draw_ghost(scene.canvas, moved)
 
 
-class Starts:
+class StartMarkers:
     """The starts of the map."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the starts with their names."""
         for number, (name, start) in enumerate(scene.sketch.starts):
             label = f"{name}, default" if number == 0 else name
@@ -132,7 +132,7 @@ class Starts:
 class TeamAtStart:
     """The robots of the team at a start."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the robots."""
         team = scene.team
         if team is None or not team.positions or "robots" not in scene.view.shown:
@@ -168,7 +168,7 @@ class SelectedObjects:
         self._sheet = sheet
         self._outlines: LatestValue[Surface] = LatestValue()
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw outlines and handles."""
         if scene.state.carried is not None:
             return
@@ -179,7 +179,7 @@ class SelectedObjects:
         if "handles" in scene.view.shown and scene.state.shows_handles and selection:
             self._draw_handles(scene, selection)
 
-    def _draw_hovered(self, scene: Scene, selected: set[Owner]) -> None:
+    def _draw_hovered(self, scene: EditorScene, selected: set[Owner]) -> None:
         hovered = scene.state.hovered
         if hovered is None or hovered in selected or not scene.cursor:
             return
@@ -188,7 +188,7 @@ class SelectedObjects:
             color = mix(theme.background, theme.final, 0.7)
             draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, color, 1.5)
 
-    def _draw_outlines(self, scene: Scene, selection: Selection, owners: set[Owner]) -> None:
+    def _draw_outlines(self, scene: EditorScene, selection: Selection, owners: set[Owner]) -> None:
         if len(owners) <= MANY_OBJECTS:
             self._draw_all(scene.canvas, scene.sketch, owners)
             return
@@ -206,7 +206,7 @@ class SelectedObjects:
         for owner in owners:
             draw_object_outline(canvas, self._sheet, sketch, owner, canvas.theme.final, 2.0)
 
-    def _draw_handles(self, scene: Scene, selection: Selection) -> None:
+    def _draw_handles(self, scene: EditorScene, selection: Selection) -> None:
         canvas = scene.canvas
         editor = scene.editor
         frame = compute_frame(scene.sketch, selection, editor.pixel)
@@ -223,7 +223,7 @@ class SelectedObjects:
 class GapLabel:
     """The width of the narrowest gap, next to it."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Write the width."""
         measurement = scene.measurement
         if measurement is not None and measurement.gap is not None:
@@ -234,7 +234,7 @@ class GapLabel:
 class Problems:
     """Badges of the problems, with the message of the chosen one."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the problems."""
         if "problems" in scene.view.shown:
             editor = scene.editor
@@ -244,7 +244,7 @@ class Problems:
 class Guides:
     """Guides of the latest snap."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the guides."""
         overlay.draw_guides(scene.canvas, scene.editor.tool.guides)
 
@@ -252,7 +252,7 @@ class Guides:
 class ToolPreview:
     """Preview of the active tool's next edit."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Draw the preview."""
         overlay.draw_preview(scene.canvas, scene.state, scene.cursor)
 
@@ -260,20 +260,20 @@ class ToolPreview:
 class TypedText:
     """The value that is being typed, next to the cursor."""
 
-    def draw(self, scene: Scene) -> None:
+    def draw(self, scene: EditorScene) -> None:
         """Write the text."""
         if scene.editor.typed:
             position = scene.cursor or Rect(scene.view.camera.view).center
             overlay.draw_typed_text(scene.canvas, scene.editor.typed, position)
 
 
-def build_layers(sheet: Sheet) -> tuple[Layer, ...]:
+def build_layers(sheet: Sheet) -> tuple[OverlayLayer, ...]:
     """Return the layers over a sheet, from the bottom to the top."""
     return (
         DraggedObstacles(sheet),
         Passages(),
         Paths(),
-        Starts(),
+        StartMarkers(),
         TeamAtStart(),
         SelectedObjects(sheet),
         GapLabel(),

@@ -17,7 +17,7 @@ from robocov_app.render.canvas import Canvas
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class EditorScene:
     """Everything that the layers draw in one frame.
 
     Attributes

@@ -10,7 +10,7 @@ from typing import Self
 
 from robocov.errors import MapError
 from robocov.mapfile import load_map
-from robocov_app.editor.model.history import History
+from robocov_app.editor.model.history import UndoHistory
 from robocov_app.editor.model.map_draft import KIND, MapDraft, build_draft_content
 from robocov_app.editor.model.map_file import (
     SUFFIX,
@@ -54,7 +54,7 @@ class Document:
 
     Attributes
     ----------
-    history : History
+    history : UndoHistory
     path : Path or None
     version : FileVersion or None
     stem : str
@@ -74,7 +74,7 @@ class Document:
         saved: bool = True,
         stem: str = "",
     ) -> None:
-        self.history = History(sketch, saved=saved)
+        self.history = UndoHistory(sketch, saved=saved)
         self.path = path
         self.version = version
         self.stem = stem

@@ -18,7 +18,7 @@ class _Step:
     drag: Hashable | None
 
 
-class History:
+class UndoHistory:
     """A sketch, and all its earlier states.
 
     Parameters

@@ -109,7 +109,7 @@ class Snapper:
     def find_targets(
         self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()
     ) -> SnapTargets | None:
-        """Return the snap targets of a map, None while they are being computed; see `collect_snap_targets`."""
+        """Return the targets of `collect_snap_targets`; None while they are being computed."""
         dragged = frozenset(without)
         points = tuple(more)
         future = self._latest.get(

@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 from robocov.environment import CircleObstacle, DiscStart, Point, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.canvas.canvas import REACH_PX
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.edits import clipboard, density, fixes, paths, properties, transform, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
+from robocov_app.toolkit.viewport import REACH_PX
 
 Edit = Callable[..., Change]
 FAR_STEPS = 10  # grid steps by which arrows nudge with Shift

@@ -15,6 +15,7 @@ from robocov_app.editor.ui.actions import FAR_STEPS, Edit
 from robocov_app.editor.ui.file_commands import OPEN_SUFFIXES, PICTURE_SUFFIXES, FileCommands
 from robocov_app.toolkit.command import Command, CommandGroup
 from robocov_app.toolkit.command_window import Action, WindowActions
+from robocov_app.toolkit.viewport import PAN_STEP_PX, ZOOM_STEP
 
 ArrowAction = Callable[[int, int], object]
 
@@ -22,8 +23,6 @@ GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "Vi
 """Headings of the help, in their order."""
 
 PALETTE_HINT = "Type a command, or  rotate 30 · grid 0.25 · width 0.2 · size 3 x 2 · robots 8"
-PAN_STEP_PX = 60
-ZOOM_STEP = 1.25
 WALL_WIDTH_STEP = 1.25
 SIMPLIFY_TOLERANCE_M = 0.02
 _ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}

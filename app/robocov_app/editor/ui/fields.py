@@ -19,7 +19,7 @@ DECIMALS = 4  # of numbers in fields: a tenth of a millimeter
 
 
 @dataclass(frozen=True)
-class Field:
+class PanelField:
     """A field of the panel.
 
     Attributes
@@ -181,42 +181,42 @@ def set_picture_opacity(editor: Editor, opacity: float) -> None:
     editor.apply(properties.set_background(editor.sketch, picture), drag="opacity")
 
 
-def _build_setting_field(word: str, tip: str) -> Field:
+def _build_setting_field(word: str, tip: str) -> PanelField:
     """Return a field for a setting that has a typed command."""
 
     def read(editor: Editor) -> str:
         return format_number(getattr(editor, SETTING_ATTRIBUTES[word]))
 
-    return Field(read, partial(run_typed_command, word=word), tip)
+    return PanelField(read, partial(run_typed_command, word=word), tip)
 
 
-def _build_length_field(attribute: str, word: str, tip: str) -> Field:
+def _build_length_field(attribute: str, word: str, tip: str) -> PanelField:
     """Return a field for a length that the selected objects have in common."""
 
     def read(editor: Editor) -> str:
         return format_number(actions.find_common_length(editor, attribute))
 
-    return Field(read, TYPED_COMMANDS[word].action, tip)
+    return PanelField(read, TYPED_COMMANDS[word].action, tip)
 
 
-FIELDS: dict[str, Field] = {
-    "title": Field(_read_title, _write_title, "The map's name"),
-    "description": Field(_read_description, _write_description, "A sentence about the map"),
+FIELDS: dict[str, PanelField] = {
+    "title": PanelField(_read_title, _write_title, "The map's name"),
+    "description": PanelField(_read_description, _write_description, "A sentence about the map"),
     "radius": _build_setting_field("radius", "Radius of a robot: passages too narrow for it are hatched"),
     "robots": _build_setting_field(
         "robots", "Robots of the team that is shown at a start, and tried with F5"
     ),
     "grid": _build_setting_field("grid", "Distance of the grid's lines; arrows move by it"),
     "angle": _build_setting_field("angle", "Lines snap to multiples of this"),
-    "name": Field(_read_name, actions.rename, "Its name"),
-    "note": Field(_read_note, TYPED_COMMANDS["note"].action, "A note on it"),
-    "x": Field(_read_x, _write_x, "From the left; +0.5 moves by half a meter"),
-    "y": Field(_read_y, _write_y, "From below; +0.5 moves by half a meter"),
-    "wide": Field(_read_width, _write_width, "Also *2, 50% or +0.3"),
-    "high": Field(_read_height, _write_height, "Also *2, 50% or +0.3"),
+    "name": PanelField(_read_name, actions.rename, "Its name"),
+    "note": PanelField(_read_note, TYPED_COMMANDS["note"].action, "A note on it"),
+    "x": PanelField(_read_x, _write_x, "From the left; +0.5 moves by half a meter"),
+    "y": PanelField(_read_y, _write_y, "From below; +0.5 moves by half a meter"),
+    "wide": PanelField(_read_width, _write_width, "Also *2, 50% or +0.3"),
+    "high": PanelField(_read_height, _write_height, "Also *2, 50% or +0.3"),
     "width": _build_length_field("width", "width", "How thick the wall is"),
     "size:radius": _build_length_field("radius", "circle", "Its radius"),
-    "picture:scale": Field(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
-    "picture:turn": Field(_read_picture_turn, _write_picture_turn, "Counter-clockwise"),
+    "picture:scale": PanelField(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
+    "picture:turn": PanelField(_read_picture_turn, _write_picture_turn, "Counter-clockwise"),
 }
 """The fields of the panel by their names."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pygame
 
-from robocov_app.editor.canvas.canvas import REACH_PX, EditorCanvas
+from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.tool import EditorPointerEvent
@@ -12,6 +12,7 @@ from robocov_app.toolkit.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.panel import SidePanel
 from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
 from robocov_app.toolkit.snapping import Snap
+from robocov_app.toolkit.viewport import REACH_PX
 
 
 class EditorPointer(Pointer):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pygame
 
-from robocov_app.editor.canvas.canvas import REACH_PX, EditorCanvas
+from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.hit_test import find_owners
 from robocov_app.editor.model.selection import Selection
@@ -29,6 +29,7 @@ from robocov_app.toolkit.layout import build_layout
 from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.tool import CursorShape
+from robocov_app.toolkit.viewport import REACH_PX
 
 STATUS_HINT = "F5 try it · F1 keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"

@@ -33,7 +33,7 @@ class MapSnapper:
         Returns
         -------
         Point
-            The nearest corner within reach; without one the nearest point on a wall; otherwise the point itself.
+            The nearest corner within reach, or the nearest point on a wall, or the point itself.
         """
         if self._targets is None or environment is not self._environment:
             self._environment = environment
