@@ -27,7 +27,7 @@ from robocov.scenario import Comparison, Scenario
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.text import escape_controls
-from robocov_app.figures.files import figure_png
+from robocov_app.figures.files import render_png
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme
@@ -465,4 +465,4 @@ def _get_axes(figure: Figure, axes: Axes | None) -> Axes:
 
 
 def _export_png(axes: Any) -> bytes:
-    return figure_png(axes.figure)
+    return render_png(axes.figure)

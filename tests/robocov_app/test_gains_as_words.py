@@ -14,7 +14,7 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.figures.results import Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.gains import Dependence, GainGrid, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.report.analysis.groups import find_varying_gains, format_gains
 from robocov_app.report.plots.dependences import build_dependence_plots
@@ -163,7 +163,8 @@ def test_words_have_even_places_and_no_line_between_them() -> None:
     assert medians.get_linestyle() == "None"
     assert medians.get_ydata().tolist() == [1.5, 5.5, 9.5]
     values = np.arange(4.0).reshape(2, 2)
-    grid = plot_gain_grid((420, 290), ["centroid", "median"], [0.3, None], values, ("target", "k"))
+    gain_grid = GainGrid("target", "k", ["centroid", "median"], [0.3, None], values)
+    grid = plot_gain_grid(gain_grid, (420, 290))
     assert [tick.get_text() for tick in grid.axes[0].get_xticklabels()] == ["centroid", "median"]
     assert [tick.get_text() for tick in grid.axes[0].get_yticklabels()] == ["0.3", "none"]
 

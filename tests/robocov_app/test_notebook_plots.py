@@ -21,7 +21,7 @@ from robocov.drawing import Drawable
 from robocov.errors import ParameterError
 from robocov.metrics import compute_cost_history
 from robocov_app import notebook as drawing_backend
-from robocov_app.figures.page import tone
+from robocov_app.figures.page import to_plot_color
 from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
 from robocov_app.look.colors import format_hex_color
 from robocov_app.look.theme import DARK, LIGHT
@@ -55,7 +55,7 @@ class TestAxes:
 
     def test_themes(self, thing):
         axes = thing.plot(theme="dark", size=(500, 400))
-        assert to_rgb(axes.figure.get_facecolor()) == tone(DARK.background)
+        assert to_rgb(axes.figure.get_facecolor()) == to_plot_color(DARK.background)
         with pytest.raises(ParameterError, match="unknown theme 'drak': did you mean 'dark'"):
             thing.plot(theme="drak")
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
-from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
+from robocov_app.figures.page import HEADING, SMALL, TEXT, FigurePage, style_axes, to_plot_color
 from robocov_app.look.theme import LIGHT, Theme
 
 NOTE = "medians of calls in turn on one thread; below 1 robocov is faster; a bar marks the goal"
@@ -53,9 +53,9 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     parts = [(part, list(group)) for part, group in groupby(with_ratio, key=lambda row: row.part)]
     height = _TITLE_HEIGHT_PX + sum(_compute_part_height(group) for _, group in parts)
     with plain_style():
-        page = Page((_WIDTH_PX, height), theme, scale=1.0)
-        page.text("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
-        page.text(NOTE, 24, 58, color=theme.faint)
+        page = FigurePage((_WIDTH_PX, height), theme, scale=1.0)
+        page.write("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
+        page.write(NOTE, 24, 58, color=theme.faint)
         top = float(_TITLE_HEIGHT_PX)
         for part, group in parts:
             _draw_part(page, HEADINGS[part], group, top)
@@ -67,15 +67,15 @@ def _compute_part_height(rows: Sequence[Row]) -> int:
     return _HEADING_HEIGHT_PX + _ROW_HEIGHT_PX * len(rows) + _PART_BOTTOM_PX
 
 
-def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> None:
+def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) -> None:
     """Draw the heading and the rows of a part, below a vertical position, px."""
-    page.text(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
+    page.write(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
     axes_top = top + _HEADING_HEIGHT_PX - _AXES_OFFSET_PX
     width = _WIDTH_PX - _LEFT_PX - _RIGHT_PX
-    axes = page.axes((_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
-    quiet_axes(axes, page.theme, grid="x")
+    axes = page.add_axes((_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
+    style_axes(axes, page.theme, grid="x")
     axes.set_xscale("log")
-    axes.axvline(1.0, color=tone(page.theme.faint), linewidth=1)
+    axes.axvline(1.0, color=to_plot_color(page.theme.faint), linewidth=1)
     for number, row in enumerate(rows):
         _draw_row(axes, row, len(rows) - 1 - number, page.theme)
         _draw_row_texts(page, row, axes_top + _ROW_HEIGHT_PX * (number + 0.5))
@@ -90,20 +90,20 @@ def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> Non
 
 def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
     ratio = cast("float", row.ratio)
-    color = tone(theme.get_controller_color("rpf" if row.met is False else "rapf"))
+    color = to_plot_color(theme.get_controller_color("rpf" if row.met is False else "rapf"))
     axes.plot([1.0, ratio], [y, y], color=color, linewidth=1.6, alpha=0.5)
     axes.plot(ratio, y, "o", color=color, markersize=6.5)
     if row.goal is not None:
-        axes.plot([row.goal] * 2, [y - 0.36, y + 0.36], color=tone(theme.ink), linewidth=2)
+        axes.plot([row.goal] * 2, [y - 0.36, y + 0.36], color=to_plot_color(theme.ink), linewidth=2)
 
 
-def _draw_row_texts(page: Page, row: Row, y: float) -> None:
+def _draw_row_texts(page: FigurePage, row: Row, y: float) -> None:
     """Draw the label of a row to the left of the axes, and its ratio to the right."""
     label = ", ".join(text for text in (row.name, row.case) if text)
-    page.text(
-        f"{label}  /  {row.yardstick}", _LEFT_PX - 14, y, points=SMALL, room=_LEFT_PX - 38, align="right"
+    page.write(
+        f"{label}  /  {row.yardstick}", _LEFT_PX - 14, y, points=SMALL, max_width=_LEFT_PX - 38, align="right"
     )
-    page.text(f"{row.ratio:.2f}", _WIDTH_PX - _RIGHT_PX + 14, y, points=SMALL, bold=row.met is False)
+    page.write(f"{row.ratio:.2f}", _WIDTH_PX - _RIGHT_PX + 14, y, points=SMALL, bold=row.met is False)
 
 
 def _find_limits(rows: Sequence[Row]) -> tuple[float, float]:

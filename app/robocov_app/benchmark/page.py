@@ -15,7 +15,7 @@ from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.ratings import Rating, format_number
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import quiet_axes, tone
+from robocov_app.figures.page import style_axes, to_plot_color
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report import replay
@@ -233,14 +233,14 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     axes = figure.add_axes((0.08, 0.14, 0.9, 0.75))
     rivals = [(point.x, point.gap) for point in points if point.is_rival]
     front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
-    axes.plot(*front.T, color=tone(LIGHT.faint), linewidth=1.0, zorder=1)
+    axes.plot(*front.T, color=to_plot_color(LIGHT.faint), linewidth=1.0, zorder=1)
     for point in points:
-        color = tone(point.style.get_color(LIGHT))
+        color = to_plot_color(point.style.get_color(LIGHT))
         axes.plot(
             [point.x],
             [point.gap],
             marker=point.style.mark,
-            markerfacecolor=color if point.is_rival else tone(LIGHT.background),
+            markerfacecolor=color if point.is_rival else to_plot_color(LIGHT.background),
             zorder=3,
             markersize=9,
             markeredgewidth=1.6,
@@ -256,7 +256,7 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
         axis.set_major_formatter("{x:g}")
         axis.set_minor_locator(NullLocator())
     axes.margins(x=0.12, y=0.1)
-    quiet_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
+    style_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
     marks = axes.transData.transform([(point.x, point.gap) for point in points])
     label_centers = place_labels(marks, [point.label for point in points])
     for point, mark, center in zip(points, marks, label_centers, strict=True):
@@ -266,7 +266,7 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
             center - mark,
             textcoords="offset points",
             fontsize=11,
-            color=tone(LIGHT.ink),
+            color=to_plot_color(LIGHT.ink),
             ha="center",
             va="center",
         )

@@ -17,7 +17,7 @@ from matplotlib.transforms import ScaledTranslation
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.record import Record
-from robocov_app.figures.page import figure_of, tone
+from robocov_app.figures.page import POINTS_PER_INCH, get_figure, to_plot_color
 from robocov_app.look import legend
 from robocov_app.look.axes import TICK_FACTORS
 from robocov_app.look.colors import Color, choose_text_color, mix
@@ -29,7 +29,6 @@ from robocov_app.render.density_text import describe_density
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.render.scene import are_centroids
 
-POINTS_PER_INCH = 72.0
 _DISC_PT = 6.4
 """Radius of a robot if there is space."""
 _MIN_DISC_PT = 1.7
@@ -54,21 +53,21 @@ def set_meter_axes(axes: Axes, environment: Environment, theme: Theme) -> None:
     axes.set(aspect="equal", xlim=(low_x, high_x), ylim=(low_y, high_y), xlabel="x (m)", ylabel="y (m)")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator("auto", steps=list(TICK_FACTORS)))
-    axes.set_facecolor(tone(theme.background))
+    axes.set_facecolor(to_plot_color(theme.background))
 
 
 def _build_obstacle_style(theme: Theme) -> dict[str, Any]:
     """Return the look of obstacles."""
     return {
-        "facecolor": tone(theme.obstacle),
-        "edgecolor": tone(theme.obstacle_edge),
+        "facecolor": to_plot_color(theme.obstacle),
+        "edgecolor": to_plot_color(theme.obstacle_edge),
         "linewidth": 0.8,
     }
 
 
 def _build_path_style(theme: Theme) -> dict[str, Any]:
     """Return the look of the paths of moving obstacles."""
-    return {"color": tone(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
+    return {"color": to_plot_color(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
 
 
 def draw_map(
@@ -101,7 +100,7 @@ def draw_map(
         environment.region.vertices,
         closed=True,
         fill=False,
-        edgecolor=tone(theme.boundary),
+        edgecolor=to_plot_color(theme.boundary),
         linewidth=1.6,
         joinstyle="miter",
         clip_on=False,
@@ -132,8 +131,8 @@ def _draw_moving_obstacle(
     is_hollow = bool(obstacle.polygon.interiors)
     shape = Polygon(
         np.asarray(obstacle.polygon.exterior.coords),
-        facecolor="none" if is_hollow else tone(theme.moving_obstacle),
-        edgecolor=tone(theme.obstacle_edge),
+        facecolor="none" if is_hollow else to_plot_color(theme.moving_obstacle),
+        edgecolor=to_plot_color(theme.obstacle_edge),
         linewidth=1.4,
         zorder=2.1,
     )
@@ -148,7 +147,7 @@ def _draw_moving_obstacle(
         "linewidth": 1.4,
         "shrinkA": 0.0,
         "shrinkB": 0.0,
-        "color": tone(theme.ink),
+        "color": to_plot_color(theme.ink),
     }
     axes.annotate(
         "",
@@ -199,9 +198,9 @@ def _draw_cells(
     for outline, owner in zip(*outlines, strict=True):
         if len(outline) > 2:
             polygons.append(outline)
-            faces.append(tone(get_color(int(hues[int(owner)]))))
+            faces.append(to_plot_color(get_color(int(hues[int(owner)]))))
     collection = PolyCollection(
-        polygons, facecolors=faces, edgecolors=tone(theme.cell_edge), linewidths=0.8, zorder=1
+        polygons, facecolors=faces, edgecolors=to_plot_color(theme.cell_edge), linewidths=0.8, zorder=1
     )
     axes.add_collection(collection, autolim=False)
 
@@ -212,7 +211,7 @@ def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> N
     trajectories = [record.positions[record.present[:, robot], robot] for robot in range(robots)]
     collection = LineCollection(
         trajectories,
-        colors=[tone(color) for color in colors],
+        colors=[to_plot_color(color) for color in colors],
         linewidths=1.6 * choose_width_factor(robots),
         capstyle="round",
         joinstyle="round",
@@ -254,7 +253,7 @@ def _draw_headings(
     axes: Axes, record: Record, steering: Array, radii: Mapping[int, float], theme: Theme
 ) -> None:
     """Draw a triangle at the disc of each unicycle in the direction it faces."""
-    dots_per_inch = figure_of(axes).dpi_scale_trans
+    dots_per_inch = get_figure(axes).dpi_scale_trans
     is_turning = record.working[-1] & record.team.is_unicycle
     for robot in np.flatnonzero(is_turning).tolist():
         heading = steering[robot, 0]
@@ -268,7 +267,7 @@ def _draw_headings(
             marker=(3, 0, float(np.degrees(heading)) - 90.0),
             ms=0.9 * radii[robot],
             mec="none",
-            c=tone(theme.ink),
+            c=to_plot_color(theme.ink),
             ls="",
             zorder=6,
             clip_on=False,
@@ -326,8 +325,8 @@ def draw_robots(
         positions[:, 0],
         positions[:, 1],
         s=[(2 * disc) ** 2 for disc in radii],
-        c=[tone(fill) for fill in fills],
-        edgecolors=tone(theme.robot_ring),
+        c=[to_plot_color(fill) for fill in fills],
+        edgecolors=to_plot_color(theme.robot_ring),
         linewidths=[min(1.1, 0.25 * disc) for disc in radii],
         zorder=7,
         clip_on=False,
@@ -344,7 +343,7 @@ def draw_robots(
                 str(number),
                 fontsize=size,
                 fontweight="bold",
-                color=tone(choose_text_color(fill)),
+                color=to_plot_color(choose_text_color(fill)),
                 ha="center",
                 va="center_baseline",
                 zorder=8,
@@ -370,7 +369,7 @@ def _build_start_style(theme: Theme, size: float) -> dict[str, Any]:
         "marker": "o",
         "markersize": size,
         "markerfacecolor": "none",
-        "markeredgecolor": tone(theme.start),
+        "markeredgecolor": to_plot_color(theme.start),
         "markeredgewidth": min(1.5, 0.25 * size),
     }
 
@@ -383,7 +382,7 @@ def _build_goal_style(is_centroid: bool, theme: Theme, size: float) -> dict[str,
             "linestyle": "none",
             "marker": "+",
             "markersize": size,
-            "markeredgecolor": tone(theme.ink),
+            "markeredgecolor": to_plot_color(theme.ink),
             "markeredgewidth": min(1.2, 0.2 * size),
         }
     return {
@@ -391,7 +390,7 @@ def _build_goal_style(is_centroid: bool, theme: Theme, size: float) -> dict[str,
         "linestyle": "none",
         "marker": "x",
         "markersize": 0.8 * size,
-        "markeredgecolor": tone(theme.final),
+        "markeredgecolor": to_plot_color(theme.final),
         "markeredgewidth": min(1.6, 0.2 * size),
     }
 
@@ -404,7 +403,7 @@ def get_label(handle: Artist) -> str:
 def build_map_handles(environment: Environment, theme: Theme, *, has_density: bool = True) -> list[Artist]:
     """Build the entries of the legend of a map, see `draw_map`."""
     handles: list[Artist] = [
-        Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label=legend.KNOWN_REGION)
+        Line2D([], [], color=to_plot_color(theme.boundary), linewidth=1.6, label=legend.KNOWN_REGION)
     ]
     if not environment.blocked.is_empty:
         handles.append(Patch(label=legend.UNKNOWN_OBSTACLE, **_build_obstacle_style(theme)))
@@ -415,15 +414,15 @@ def build_map_handles(environment: Environment, theme: Theme, *, has_density: bo
             label=legend.MOVING_OBSTACLE,
             marker="s",
             markersize=7.0,
-            markerfacecolor=tone(theme.moving_obstacle),
-            markeredgecolor=tone(theme.obstacle_edge),
+            markerfacecolor=to_plot_color(theme.moving_obstacle),
+            markeredgecolor=to_plot_color(theme.obstacle_edge),
             **_build_path_style(theme),
         )
         handles.append(square)
     density = describe_density(environment) if has_density else ""
     if density:
         color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
-        handles.append(Patch(facecolor=tone(color), linewidth=0.0, label=density))
+        handles.append(Patch(facecolor=to_plot_color(color), linewidth=0.0, label=density))
     return handles
 
 
@@ -436,8 +435,8 @@ def build_robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
         linestyle="none",
         marker="o",
         markersize=8.0,
-        markerfacecolor=tone(fill),
-        markeredgecolor=tone(theme.robot_ring),
+        markerfacecolor=to_plot_color(fill),
+        markeredgecolor=to_plot_color(theme.robot_ring),
     )
 
 
@@ -448,7 +447,7 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
     final_color = theme.final if colors == "paper" else theme.robots[0]
     handles: list[Artist] = [
         Line2D([], [], label=legend.START, **_build_start_style(theme, _START_PT)),
-        Line2D([], [], color=tone(trail_color), linewidth=1.6, label=legend.TRAJECTORY),
+        Line2D([], [], color=to_plot_color(trail_color), linewidth=1.6, label=legend.TRAJECTORY),
         build_robot_handle(legend.FINAL_POSITION, final_color, theme),
     ]
     if (record.present[-1] & ~record.working[-1]).any():
@@ -456,6 +455,6 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
     if has_goals(record):
         is_centroid = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
         handles.append(Line2D([], [], **_build_goal_style(is_centroid, theme, _GOAL_PT)))
-    cell_edge = tone(theme.cell_edge)
+    cell_edge = to_plot_color(theme.cell_edge)
     handles.append(Line2D([], [], color=cell_edge, linewidth=0.9, label=legend.FINAL_VORONOI_CELL))
     return [*handles, *build_map_handles(record.environment, theme)[1:]]

@@ -16,9 +16,9 @@ from robocov.environment import Environment
 from robocov.record import Record
 from robocov.team import Team
 from robocov_app.figures import arena
-from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, end_label
+from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, format_end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, Box, Page, check_some, tone
+from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, check_not_empty, to_plot_color
 from robocov_app.figures.runs import plot_cost
 from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -144,15 +144,15 @@ class _Arrangement:
 
     Attributes
     ----------
-    curves, maps : Box
+    curves, maps : PageBox
     bar_row : float
         Middle of the scale of colors.
     bar_min_left : float
         Nothing of the scale of colors is to the left of this.
     """
 
-    curves: Box
-    maps: Box
+    curves: PageBox
+    maps: PageBox
     bar_row: float
     bar_min_left: float
 
@@ -189,7 +189,7 @@ def plot_coverage(
     ParameterError
         If there are no moments.
     """
-    check_some("moments", moments)
+    check_not_empty("moments", moments)
     if curves and size is not None and (size[0] < MIN_SIZE_PX[0] or size[1] < MIN_SIZE_PX[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
     theme = get_theme(theme)
@@ -198,26 +198,26 @@ def plot_coverage(
     handles = _build_handles(moments, theme)
     is_beside = bool(curves) and len(moments) == 1 and extent.aspect < MAX_ASPECT_BESIDE
     is_below = bool(curves) and not is_beside
-    page = Page(size or (DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE if size is None else None)
+    page = FigurePage(size or (DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE if size is None else None)
     maps_fraction = 0.5 if is_beside else 1.0
     footer_start = (1.0 - maps_fraction) * page.size[0] + page.margin
-    footer_height = page.footer_height(handles, footer_start)
+    footer_height = page.measure_footer(handles, footer_start)
     maps_width = maps_fraction * page.size[0] - 2 * page.margin
     if size is None:
         height = _choose_height(page, extent, len(moments), maps_width, footer_height, is_below=is_below)
-        page = Page((page.size[0], height), theme, _DEFAULT_SCALE)
+        page = FigurePage((page.size[0], height), theme, _DEFAULT_SCALE)
     if is_below:
         arrangement = _arrange_below(page, maps_width, footer_height, has_fixed_size=size is not None)
     else:
         arrangement = _arrange_beside(page, maps_fraction, footer_height, has_curves=bool(curves))
     bar_left = _draw_bar(page, limit, arrangement.maps, arrangement.bar_row, arrangement.bar_min_left)
     title_end = page.size[0] if is_below else bar_left
-    page.title(title, 26, title_end - 2 * page.margin)
+    page.write_title(title, 26, title_end - 2 * page.margin)
     if curves:
         has_density = any(describe_density(moment.environment) for moment in moments)
         _draw_curves(page, curves, times, arrangement.curves, WEIGHED if has_density else DISTANCE)
     boxes = _draw_maps(page, moments, extent, limit, arrangement.maps)
-    page.footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
+    page.draw_footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
     return page.figure
 
 
@@ -230,7 +230,7 @@ def _enclose(moments: Sequence[Moment]) -> _Extent:
 
 
 def _choose_height(
-    page: Page, extent: _Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
+    page: FigurePage, extent: _Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
 ) -> int:
     """Return the height of a page of the default width, px."""
     scale = page.scale
@@ -247,7 +247,7 @@ def _choose_height(
 
 
 def _arrange_below(
-    page: Page, maps_width: float, footer_height: float, *, has_fixed_size: bool
+    page: FigurePage, maps_width: float, footer_height: float, *, has_fixed_size: bool
 ) -> _Arrangement:
     """Arrange maps below curves, which are as wide as the page."""
     width, height = page.size
@@ -266,7 +266,7 @@ def _arrange_below(
 
 
 def _arrange_beside(
-    page: Page, maps_fraction: float, footer_height: float, *, has_curves: bool
+    page: FigurePage, maps_fraction: float, footer_height: float, *, has_curves: bool
 ) -> _Arrangement:
     """Arrange a map to the right of the curves, or maps alone."""
     width, height = page.size
@@ -319,7 +319,9 @@ def _choose_limit(moments: Sequence[Moment]) -> float:
 
 def _build_handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
     """Build the entries of the legend."""
-    border = Line2D([], [], color=tone(theme.geodesic_border), linewidth=1.6, label=legend.GEODESIC_BORDER)
+    border = Line2D(
+        [], [], color=to_plot_color(theme.geodesic_border), linewidth=1.6, label=legend.GEODESIC_BORDER
+    )
     handles: list[Artist] = [arena.build_robot_handle(legend.ROBOT, theme.final, theme), border]
     legends = [
         arena.build_map_handles(moment.environment, theme, has_density=False)[1:] for moment in moments
@@ -330,8 +332,8 @@ def _build_handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
         unreached = Patch(
-            facecolor=tone(theme.unreached),
-            edgecolor=tone(theme.obstacle_edge),
+            facecolor=to_plot_color(theme.unreached),
+            edgecolor=to_plot_color(theme.obstacle_edge),
             hatch="////",
             linewidth=0.0,
             label=legend.UNREACHED,
@@ -341,7 +343,7 @@ def _build_handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
 
 
 def _draw_curves(
-    page: Page, curves: Sequence[Curve], times: Sequence[Curve], box: Box, distance_label: str
+    page: FigurePage, curves: Sequence[Curve], times: Sequence[Curve], box: PageBox, distance_label: str
 ) -> None:
     """Draw the mean distances, and mean times if there are any: below, or to the right in a wide box."""
     left, top, width, height = box
@@ -355,11 +357,11 @@ def _draw_curves(
         _draw_curve_panel(page, times, (left, top + height / 2, width, height / 2), TIME, "s")
 
 
-def _draw_curve_panel(page: Page, curves: Sequence[Curve], box: Box, label: str, unit: str) -> None:
+def _draw_curve_panel(page: FigurePage, curves: Sequence[Curve], box: PageBox, label: str, unit: str) -> None:
     """Draw curves in a box with space for their labels."""
     scale = page.scale
     left, top, width, height = box
-    label_width = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
     right = min(26 * scale + label_width, 0.45 * width)
     axes_box = (
         left + 34 * scale,
@@ -367,27 +369,29 @@ def _draw_curve_panel(page: Page, curves: Sequence[Curve], box: Box, label: str,
         width - 34 * scale - right,
         height - 34 * scale - 50 * scale,
     )
-    draw_curves(page.axes(axes_box), curves, page.theme, label=label, unit=unit)
+    draw_curves(page.add_axes(axes_box), curves, page.theme, label=label, unit=unit)
 
 
-def _draw_maps(page: Page, moments: Sequence[Moment], extent: _Extent, limit: float, room: Box) -> list[Box]:
+def _draw_maps(
+    page: FigurePage, moments: Sequence[Moment], extent: _Extent, limit: float, room: PageBox
+) -> list[PageBox]:
     """Draw the map of each moment below its title, and return their boxes, px."""
     scale = page.scale
     panels = _arrange_panels(room, len(moments), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
     for moment, (box, caption_width) in zip(moments, panels, strict=True):
-        axes = page.map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
+        axes = page.add_map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         _draw_moment(axes, moment, limit, page.theme, box, scale)
         left, top, _, _ = box
         title_row = top - 35 * scale
         facts_row = top - 14 * scale
-        page.text(moment.title, left, title_row, points=TEXT + 1.5, bold=True, room=caption_width)
-        page.text(moment.facts, left, facts_row, color=page.theme.faint, room=caption_width)
+        page.write(moment.title, left, title_row, points=TEXT + 1.5, bold=True, max_width=caption_width)
+        page.write(moment.facts, left, facts_row, color=page.theme.faint, max_width=caption_width)
     return [box for box, _ in panels]
 
 
 def _arrange_panels(
-    room: Box, count: int, aspect: float, caption_height: float, gap: float
-) -> list[tuple[Box, float]]:
+    room: PageBox, count: int, aspect: float, caption_height: float, gap: float
+) -> list[tuple[PageBox, float]]:
     """Return the largest equal boxes in a room, with the width of the captions above them, px."""
     left, top, width, height = room
     panel_width = 0.0
@@ -412,7 +416,7 @@ def _arrange_panels(
     return panels
 
 
-def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
+def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: PageBox, scale: float) -> None:
     """Draw distances, the borders of geodesic cells, the map and the robots in axes of a box, px."""
     low_x, high_x = axes.get_xlim()
     low_y, high_y = axes.get_ylim()
@@ -450,15 +454,15 @@ def _paint_distances(
     return pixels
 
 
-def _draw_bar(page: Page, limit: float, maps: Box, middle: float, min_left: float) -> float:
+def _draw_bar(page: FigurePage, limit: float, maps: PageBox, middle: float, min_left: float) -> float:
     """Draw the scale of colors above the right edge of the maps.
 
     Parameters
     ----------
-    page : Page
+    page : FigurePage
     limit : float, m
         End of the scale.
-    maps : Box
+    maps : PageBox
     middle : float, px
         Its row.
     min_left : float, px
@@ -473,19 +477,21 @@ def _draw_bar(page: Page, limit: float, maps: Box, middle: float, min_left: floa
     scale = page.scale
     right = maps[0] + maps[2] - 14 * scale
     width = 190 * scale
-    axes = page.axes((right - width, middle - 9 * scale, width, 10 * scale))
+    axes = page.add_axes((right - width, middle - 9 * scale, width, 10 * scale))
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for spine in axes.spines.values():
-        spine.set(edgecolor=tone(theme.faint), linewidth=0.6)
+        spine.set(edgecolor=to_plot_color(theme.faint), linewidth=0.6)
     marks = list_color_ticks(limit)
     labels = [f"{mark:g}" for mark in marks]
     labels[-1] += " m"
     axes.set_xticks(marks, labels, fontsize=SMALL)
     axes.set_yticks([])
-    axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), length=2.5, pad=1.5)
+    axes.tick_params(
+        colors=to_plot_color(theme.faint), labelcolor=to_plot_color(theme.ink), length=2.5, pad=1.5
+    )
     left = right - width - 12 * scale
-    label_width = page.text_width(_BAR_LABEL)
+    label_width = page.measure_text(_BAR_LABEL)
     if left - label_width <= min_left:
         return left
-    page.text(_BAR_LABEL, left, middle - 4 * scale, align="right")
+    page.write(_BAR_LABEL, left, middle - 4 * scale, align="right")
     return left - label_width

@@ -1,36 +1,99 @@
-"""Cost curves: mean distance against time, each named at its end."""
+"""Curves over time, each with its name and its final value at its end."""
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import TEXT, Tone, figure_of, quiet_axes, set_even_ticks, set_value_axis, tone
+from robocov_app.figures.page import (
+    POINTS_PER_INCH,
+    TEXT,
+    PlotColor,
+    get_figure,
+    set_even_ticks,
+    set_value_axis,
+    style_axes,
+    to_plot_color,
+)
 from robocov_app.look.axes import MAX_TIME_INTERVALS
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
 from robocov_app.look.labels import spread_labels
 from robocov_app.look.theme import Theme
 
-# label, controller's name, times (T,) s and mean distances (T,) m
 Curve: TypeAlias = tuple[str, str, Array, Array]
+"""Label, name of the controller, times, (T,) s, and values, (T,)."""
 
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"
 WEIGHED = "mean distance to the nearest robot, weighed by φ (m)"
 
+_MIN_EXPONENT_VALUE = 1e7
+_MIN_THOUSANDS_VALUE = 1e4
+_MIN_SHORT_VALUE = 10.0
+"""Values from here on have four digits instead of three decimals."""
+_MAX_WIDENED_LINES = 3
+"""Number of lines on top of others from which on a line gets no wider."""
+_LINE_WIDTH_PT = 2.2
+_EXTRA_LINE_WIDTH_PT = 0.9
+"""Additional width of a line for each one on top of it, so that equal curves can be seen."""
+_MARK_PT = 6.5
+_EXTRA_MARK_PT = 2.0
+_LABEL_LINE_HEIGHT = 1.45
+"""Height of a line of labels, in text sizes."""
+_MIN_MOVED_FRACTION = 0.3
+"""Fraction of the height of a line from which on a moved label is connected with its curve."""
+# Horizontal distances from the axes.
+_CONNECTION_START_PT = 4
+_CONNECTION_END_PT = 10
+_LABEL_START_PT = 12
 
-def end_label(curve: Curve, unit: str = "m") -> str:
-    """Return a curve's name with its last finite value: millimeters, or four digits of what is large."""
+
+class _CurveEnd(NamedTuple):
+    """The last known value of a curve.
+
+    Attributes
+    ----------
+    time : float, s
+    value : float
+    color : PlotColor
+    text : str
+    """
+
+    time: float
+    value: float
+    color: PlotColor
+    text: str
+
+
+def format_end_label(curve: Curve, unit: str = "m") -> str:
+    """Return the label of a curve with its last finite value.
+
+    Parameters
+    ----------
+    curve : Curve
+    unit : str
+        Meters have three decimals, other units four digits if the value is large.
+
+    Returns
+    -------
+    str
+    """
     label, _, _, values = curve
     last = float(values[np.isfinite(values)][-1])
-    number = f"{last:.3f}"
-    if abs(last) >= 1e7:
-        number = f"{last:.4g}"
-    elif unit != "m" and abs(last) >= 10.0:
-        number = f"{last:.4g}" if abs(last) < 1e4 else f"{last:,.0f}"
-    return f"{label}  {number} {unit}".rstrip()
+    return f"{label}  {_format_end_value(last, unit)} {unit}".rstrip()
+
+
+def _format_end_value(value: float, unit: str) -> str:
+    """Return the last value of a curve as text."""
+    if abs(value) >= _MIN_EXPONENT_VALUE:
+        return f"{value:.4g}"
+    if unit == "m" or abs(value) < _MIN_SHORT_VALUE:
+        return f"{value:.3f}"
+    if abs(value) < _MIN_THOUSANDS_VALUE:
+        return f"{value:.4g}"
+    return f"{value:,.0f}"
 
 
 def draw_curves(
@@ -44,44 +107,110 @@ def draw_curves(
     unit: str = "m",
     weight: float = 1.0,
 ) -> None:
-    """Draw curves, the first lowest and widest, and quartile `bands`; labels at the ends are pushed apart."""
-    chosen = choose_curve_styles([controller for _, controller, _, _ in curves]) if styles is None else styles
-    around = list(bands or [None] * len(curves))
-    lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
-    times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
-    set_even_ticks(axes.xaxis, MAX_TIME_INTERVALS)
-    set_value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
-    quiet_axes(axes, theme, "time (s)", label, grid="y")
-    for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
+    """Draw curves, the first one at the bottom and widest, with labels at their ends.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    curves : sequence of Curve
+    theme : Theme
+    styles : sequence of CurveStyle, optional
+        By default those of the controllers.
+    bands : sequence of ((T,) array, (T,) array) or None, optional
+        Lower and upper edge of a band around each curve.
+    label : str
+        Of the axis of values.
+    unit : str
+        Of the values at the ends.
+    weight : float
+        Factor of the widths of lines.
+    """
+    if styles is None:
+        styles = choose_curve_styles([controller for _, controller, _, _ in curves])
+    if bands is None:
+        bands = [None] * len(curves)
+    _set_axes(axes, curves, bands)
+    style_axes(axes, theme, "time (s)", label, grid="y")
+    for (_, _, times, _), style, band in zip(curves, styles, bands, strict=True):
         if band is not None:
-            axes.fill_between(time, *band, color=tone(style.get_color(theme)), alpha=0.16, linewidth=0.0)
+            low, high = band
+            color = to_plot_color(style.get_color(theme))
+            axes.fill_between(times, low, high, color=color, alpha=0.16, linewidth=0.0)
     ends = []
-    for below, (curve, style) in enumerate(zip(curves, chosen, strict=True)):
-        _, _, time, values = curve
-        color, dashes, above = tone(style.get_color(theme)), style.dashes, min(len(curves) - 1 - below, 3)
-        width = weight * (2.2 + 0.9 * above)
-        if not isinstance(dashes, str):
-            dashes = 0, tuple(2.2 * weight / width * part for part in dashes[1])
-        axes.plot(time, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
-        last = int(np.nonzero(np.isfinite(values))[0][-1])
-        end: Any = {"markersize": weight * (6.5 + 2.0 * above), "clip_on": False, "zorder": 5}
-        axes.plot(time[last], values[last], style.mark, color=color, **end)
-        ends.append((float(time[last]), float(values[last]), color, end_label(curve, unit)))
+    for number, (curve, style) in enumerate(zip(curves, styles, strict=True)):
+        lines_above = len(curves) - 1 - number
+        color = to_plot_color(style.get_color(theme))
+        time, value = _draw_line(axes, curve, style, color, weight=weight, lines_above=lines_above)
+        ends.append(_CurveEnd(time, value, color, format_end_label(curve, unit)))
     _draw_end_labels(axes, ends)
 
 
-def _draw_end_labels(axes: Axes, ends: Sequence[tuple[float, float, Tone, str]]) -> None:
-    """Write the words of each end (x, y, color, words) beside the axes, a line to what was moved."""
-    dpi, box = figure_of(axes).dpi, axes.get_window_extent()
-    point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72
-    places = axes.transData.transform([(x, y) for x, y, _, _ in ends])[:, 1]
-    heights = spread_labels(places.tolist(), line_height, float(box.y0), float(box.y1))
-    words: Any = {"textcoords": axes.transAxes, "annotation_clip": False, "va": "center", "ha": "left"}
-    words |= {"fontsize": TEXT, "fontweight": "bold"}
-    for (x, y, color, text), place, height in zip(ends, places, heights, strict=True):
-        fraction = (height - box.y0) / box.height
-        axes.annotate(text, (x, y), (1.0 + 12 * point, fraction), color=color, **words)
-        if abs(height - place) > 0.3 * line_height:
-            line = [1.0 + 4 * point, 1.0 + 10 * point], [(place - box.y0) / box.height, fraction]
-            axes.plot(*line, transform=axes.transAxes, color=color, linewidth=0.8, clip_on=False)
+def _set_axes(axes: Axes, curves: Sequence[Curve], bands: Sequence[tuple[Array, Array] | None]) -> None:
+    """Set the limits and ticks of axes for curves and bands."""
+    times = np.concatenate([np.asarray(curve[2]) for curve in curves])
+    lines = [np.asarray(curve[3]) for curve in curves]
+    for band in bands:
+        if band is not None:
+            lines += band
+    start = float(times.min())
+    axes.set_xlim(start, max(float(times.max()), start + 1e-9))
+    set_even_ticks(axes.xaxis, MAX_TIME_INTERVALS)
+    set_value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
+
+
+def _draw_line(
+    axes: Axes, curve: Curve, style: CurveStyle, color: PlotColor, *, weight: float, lines_above: int
+) -> tuple[float, float]:
+    """Draw a curve with a mark at its end, and return the time and the value there."""
+    _, _, times, values = curve
+    extra = min(lines_above, _MAX_WIDENED_LINES)
+    width = weight * (_LINE_WIDTH_PT + _EXTRA_LINE_WIDTH_PT * extra)
+    dashes = style.dashes
+    if not isinstance(dashes, str):
+        # Dashes are given in line widths. Those of wide lines are as long as those of others.
+        dashes = 0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dashes[1])
+    axes.plot(times, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
+    last = int(np.nonzero(np.isfinite(values))[0][-1])
+    axes.plot(
+        times[last],
+        values[last],
+        style.mark,
+        color=color,
+        markersize=weight * (_MARK_PT + _EXTRA_MARK_PT * extra),
+        clip_on=False,
+        zorder=5,
+    )
+    return float(times[last]), float(values[last])
+
+
+def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd]) -> None:
+    """Write the label of each curve next to the axes, with a line to it if it had to be moved."""
+    dpi = get_figure(axes).dpi
+    box = axes.get_window_extent()
+    point = dpi / POINTS_PER_INCH / box.width
+    line_height = _LABEL_LINE_HEIGHT * TEXT * dpi / POINTS_PER_INCH
+    rows: list[float] = axes.transData.transform([(end.time, end.value) for end in ends])[:, 1].tolist()
+    label_rows = spread_labels(rows, line_height, float(box.y0), float(box.y1))
+    for end, row, label_row in zip(ends, rows, label_rows, strict=True):
+        fraction = (label_row - box.y0) / box.height
+        axes.annotate(
+            end.text,
+            (end.time, end.value),
+            (1.0 + _LABEL_START_PT * point, fraction),
+            color=end.color,
+            textcoords=axes.transAxes,
+            annotation_clip=False,
+            va="center",
+            ha="left",
+            fontsize=TEXT,
+            fontweight="bold",
+        )
+        if abs(label_row - row) > _MIN_MOVED_FRACTION * line_height:
+            axes.plot(
+                [1.0 + _CONNECTION_START_PT * point, 1.0 + _CONNECTION_END_PT * point],
+                [(row - box.y0) / box.height, fraction],
+                transform=axes.transAxes,
+                color=end.color,
+                linewidth=0.8,
+                clip_on=False,
+            )

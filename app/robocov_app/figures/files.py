@@ -1,4 +1,4 @@
-"""Figures as files, PNG, SVG and PDF: the same plot gives the same bytes."""
+"""Figures as PNG, SVG and PDF files. The same plot gives the same bytes."""
 
 from __future__ import annotations
 
@@ -16,77 +16,116 @@ from robocov.text import escape_controls
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# what would differ from one time, or one version of matplotlib, to the next is left out
+# Dates and versions would make equal figures different.
 _METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "svg": {"Date": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-
-_STYLE: Any = {
+_FILE_STYLE: Any = {
     "savefig.bbox": None,
     "svg.hashsalt": "robocov",
-    # outlines: an SVG cannot hold a font, and others than ours would not fit their places
+    # Outlines: an SVG does not contain its font, and the glyphs of others have different widths.
     "svg.fonttype": "path",
-    # the whole letters as TrueType: publishers refuse Type 3, and the words can be searched and copied
+    # TrueType: publishers reject Type 3 fonts, and texts can be searched and copied.
     "pdf.fonttype": 42,
+}
+_PLAIN_STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "text.usetex": False,
+    "text.parse_math": False,
+    "axes.unicode_minus": True,
 }
 
 
 @contextmanager
 def plain_style() -> Iterator[None]:
-    """Let matplotlib draw alike whatever style is set; dollars are no formula, missing letters no warning."""
+    """Let matplotlib draw the same whatever style the user has set.
+
+    A dollar sign does not start a formula, and glyphs that the font does not have cause no warning. It is
+    also a decorator: ``@plain_style()``.
+    """
     import matplotlib.style
 
-    style: Any = {"font.family": "DejaVu Sans", "text.usetex": False, "text.parse_math": False}
-    style["axes.unicode_minus"] = True
-    with matplotlib.style.context(["default", style]), warnings.catch_warnings():
+    with matplotlib.style.context(["default", _PLAIN_STYLE]), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
 
-def figure_png(figure: Figure) -> bytes:
+def render_png(figure: Figure) -> bytes:
+    """Render a figure as PNG."""
     file = io.BytesIO()
-    _write(figure, file, "png")
+    _write_figure(figure, file, "png")
     return file.getvalue()
 
 
 def save_figure(figure: Figure, path: Path | str) -> None:
-    """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all; without a date.
+    """Save a figure. An existing file is replaced only when the new one is complete.
 
-    Raises OutputError when the file cannot be written; ParameterError when the suffix is another.
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : Path or str
+        Its suffix decides the format: ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    ParameterError
+        If the suffix is a different one.
     """
-    kind = figure_kind(Path(path))
-    with replace_file(Path(path)) as part:
-        _write(figure, part, kind)
+    kind = get_figure_kind(Path(path))
+    with replace_file(Path(path)) as temporary_path:
+        _write_figure(figure, temporary_path, kind)
 
 
-def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
+def _write_figure(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
+    """Write a figure as ``png``, ``svg`` or ``pdf``."""
     import matplotlib
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
         text.set_text(escape_controls(text.get_text()))
     page: Any = {"dpi": figure.dpi, "facecolor": figure.get_facecolor()}
-    with plain_style(), matplotlib.rc_context(_STYLE):
+    with plain_style(), matplotlib.rc_context(_FILE_STYLE):
         figure.savefig(file, format=kind, metadata=_METADATA[kind], **page)
     if kind == "svg" and isinstance(file, Path):
-        # labels of ticks, which are only known now, may hold characters that XML does not allow
+        # Only now are the labels of ticks known, which may contain characters that XML does not allow.
         content = file.read_text("utf-8")
-        safe = escape_controls(content)
-        if safe != content:
-            file.write_text(safe, "utf-8", newline="\n")
+        escaped = escape_controls(content)
+        if escaped != content:
+            file.write_text(escaped, "utf-8", newline="\n")
 
 
 def check_figure_path(path: Path) -> None:
-    """Raise OutputError or ParameterError, before any work is done, where no figure can be written."""
-    figure_kind(path)
+    """Check, before any work is done, that a figure can be saved.
+
+    Raises
+    ------
+    OutputError
+        If the folder does not exist.
+    ParameterError
+        If the suffix is not that of a figure.
+    """
+    get_figure_kind(path)
     if not resolve_target(path).parent.is_dir():
         raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 
-def figure_kind(path: Path) -> str:
-    """Return ``png``, ``svg`` or ``pdf``, by a path's suffix; raises ParameterError when that is another."""
+def get_figure_kind(path: Path) -> str:
+    """Return the format for the suffix of a path.
+
+    Raises
+    ------
+    ParameterError
+        If it is not the suffix of a figure.
+
+    Examples
+    --------
+    >>> get_figure_kind(Path("cost.SVG"))
+    'svg'
+    """
     kind = path.suffix.lower().lstrip(".")
     if kind not in _METADATA:
         raise ParameterError(f"{path}: expected .png, .svg or .pdf, got suffix {quote(path.suffix)}")

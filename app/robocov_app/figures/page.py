@@ -1,10 +1,11 @@
-"""The page of a plot: a matplotlib figure of an exact size, laid out in pixels from its top left."""
+"""The page of a plot: a matplotlib figure of an exact size, with positions in pixels from the top left."""
 
 from collections.abc import Sequence
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -13,38 +14,72 @@ from matplotlib.ticker import MaxNLocator
 
 from robocov.arrays import Array
 from robocov.errors import ParameterError
-from robocov_app.figures.files import figure_png
+from robocov_app.figures.files import render_png
 from robocov_app.look.axes import MAX_VALUE_INTERVALS, TICK_FACTORS, VALUE_MARGIN, choose_value_limits
 from robocov_app.look.colors import Color
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.theme import Theme
 
-HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
-Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
-Tone: TypeAlias = tuple[float, float, float]  # a color as matplotlib has it
+# Text sizes, points.
+HEADING = 14.0
+TITLE = 12.5
+TEXT = 9.5
+SMALL = 8.5
+POINTS_PER_INCH = 72
+PageBox: TypeAlias = tuple[float, float, float, float]
+"""Left, top, width and height, px."""
+PlotColor: TypeAlias = tuple[float, float, float]
+"""A color of matplotlib: red, green and blue from 0 to 1."""
+
+_Anchor: TypeAlias = Literal["upper left", "upper center", "center right"]
+_FULL_SCALE_SIZE_PX = (960, 640)
+"""Size of a page whose texts have their size at 100 dots per inch."""
+_MIN_SCALE = 0.8
+_MAX_SCALE = 6.0
+# Lengths at scale 1, px.
+_MARGIN = 18.0
+_MAX_SCALE_BAR = 120
+_SCALE_BAR_LABEL = 80
+_PANEL_GAP = 14
+_LEGEND_GAP = 24
+_ONE_LINE_FOOTER = 46
 
 
-def tone(color: Color) -> Tone:
+def to_plot_color(color: Color) -> PlotColor:
+    """Convert a color of a theme to one of matplotlib."""
     red, green, blue = color
     return red / 255, green / 255, blue / 255
 
 
-def figure_of(axes: Axes) -> Figure:
+def get_figure(axes: Axes) -> Figure:
+    """Return the figure of axes, even if they are in a subfigure."""
     return cast("Figure", axes.get_figure(root=True))
 
 
-def check_some(what: str, items: Sequence[object]) -> None:
+def check_not_empty(name: str, items: Sequence[object]) -> None:
+    """Raise a ParameterError if there are no items."""
     if not items:
-        raise ParameterError(f"{what}: expected at least one, got none")
+        raise ParameterError(f"{name}: expected at least one, got none")
 
 
-def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:
-    """Give axes the theme's colors, labels, a quiet grid, and no frame but the bottom below a grid."""
-    ink, faint = tone(theme.ink), tone(theme.faint)
-    axes.set_facecolor(tone(theme.background))
+def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:
+    """Give axes the colors of a theme, and labels. Only the line below a grid has a frame.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    theme : Theme
+    x, y : str
+        Labels. That of the vertical axis is horizontal, above the axis.
+    grid : {"x", "y", ""}
+        Axis at whose ticks there are lines.
+    """
+    ink = to_plot_color(theme.ink)
+    faint = to_plot_color(theme.faint)
+    axes.set_facecolor(to_plot_color(theme.background))
     axes.tick_params(colors=faint, labelcolor=ink, labelsize=SMALL, left=False)
     axes.set_xlabel(x, fontsize=TEXT, color=ink)
-    if y:  # level words are read more easily than words on their side
+    if y:
         axes.set_ylabel(y, fontsize=TEXT, color=ink)
         axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
         axes.yaxis.set_label_coords(0.0, 1.03)
@@ -52,18 +87,18 @@ def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal
         spine.set_visible(bool(grid) and side == "bottom")
         spine.set_color(faint)
     if grid:
-        axes.grid(axis=grid, color=tone(theme.grid), linewidth=0.8, alpha=0.7)
+        axes.grid(axis=grid, color=to_plot_color(theme.grid), linewidth=0.8, alpha=0.7)
         axes.set_axisbelow(True)
 
 
-def set_even_ticks(axis: Any, max_intervals: int) -> None:
-    """Give an axis round ticks in at most so many intervals; they follow when a notebook zooms."""
+def set_even_ticks(axis: Axis, max_intervals: int) -> None:
+    """Give an axis round ticks in at most some intervals, which follow when a notebook zooms."""
     axis.set_major_locator(MaxNLocator(nbins=max_intervals, steps=list(TICK_FACTORS)))
     axis.set_major_formatter("{x:g}")
 
 
 def set_value_axis(axis: Any, values: Array, *, margin: float = VALUE_MARGIN, origin: float = 0.0) -> None:
-    """Give an axis the limits and ticks that suit finite values, see `choose_value_limits`."""
+    """Give an axis limits and ticks for finite values, see `choose_value_limits`."""
     low = float(values.min())
     high = float(values.max())
     limits = choose_value_limits(low, high, margin=margin, origin=origin)
@@ -72,72 +107,122 @@ def set_value_axis(axis: Any, values: Array, *, margin: float = VALUE_MARGIN, or
 
 
 class PageAxes(Axes):
-    """Axes of a page, for which a notebook shows the page: without pyplot it would show no figure."""
+    """Axes of a page, as which notebooks display the page.
+
+    A figure without pyplot would not be displayed.
+    """
 
     def _repr_png_(self) -> tuple[bytes, dict[str, Any]]:
-        """Return the page as PNG, how wide it is to be shown, and its words for who cannot see it."""
-        page = figure_of(self)
-        words = [text.get_text() for text in page.texts if text.get_text()]
-        # a dot of the page at 100 dots an inch is a pixel of the screen
-        return figure_png(page), {"width": round(page.bbox.width * 100 / page.dpi), "alt": "; ".join(words)}
+        """Return the page as PNG, with its width in a notebook, and its texts for screen readers."""
+        figure = get_figure(self)
+        texts = [text.get_text() for text in figure.texts if text.get_text()]
+        # At 100 dots per inch, a dot of the page is a pixel of the screen.
+        width = round(figure.bbox.width * 100 / figure.dpi)
+        return render_png(figure), {"width": width, "alt": "; ".join(texts)}
 
 
-class Page:
-    """A figure laid out in pixels; texts and lines are `scale` times those at 100 dots an inch."""
+class PagePanel(NamedTuple):
+    """One of several equal panels of a page.
+
+    Attributes
+    ----------
+    box : PageBox
+    caption_width : float, px
+        Maximum width of the lines above the panel.
+    """
+
+    box: PageBox
+    caption_width: float
+
+
+class _LegendExtent(NamedTuple):
+    """Size of a legend.
+
+    Attributes
+    ----------
+    columns : int
+    width, height : float, px
+    """
+
+    columns: int
+    width: float
+    height: float
+
+
+class FigurePage:
+    """A figure on which positions are in pixels.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    theme : Theme
+    scale : float, optional
+        Size of texts and lines; 1 is that at 100 dots per inch. By default it suits the size of the page.
+
+    Attributes
+    ----------
+    size : (width, height), px
+    theme : Theme
+    scale : float
+    margin : float, px
+        Space at the edges.
+    content_width : float, px
+        Width between the margins.
+    figure : matplotlib.figure.Figure
+    """
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
-        self.size, self.theme = size, theme
-        self.scale = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0) if scale is None else scale
-        self.margin = 18.0 * self.scale  # pixels that stay free at the edges
-        self.room = size[0] - 2 * self.margin  # between the margins
-        self._longest_bar = max(min(120 * self.scale, size[0] / 7), 20.0)
-        dpi = 100.0 * self.scale
-        # the pixels are counted by truncation: a hair more keeps 899.9999 at 900
-        inches = ((size[0] + 1e-3) / dpi, (size[1] + 1e-3) / dpi)
-        self.figure = Figure(figsize=inches, dpi=dpi, facecolor=tone(theme.background))
+        width, height = size
+        if scale is None:
+            full_width, full_height = _FULL_SCALE_SIZE_PX
+            scale = min(max(min(width / full_width, height / full_height), _MIN_SCALE), _MAX_SCALE)
+        self.size = size
+        self.theme = theme
+        self.scale = scale
+        self.margin = _MARGIN * scale
+        self.content_width = width - 2 * self.margin
+        self._max_bar_length = max(min(_MAX_SCALE_BAR * scale, width / 7), 20.0)
+        dpi = 100.0 * scale
+        # matplotlib truncates the number of pixels, and might get 899 from 899.9999.
+        inches = ((width + 1e-3) / dpi, (height + 1e-3) / dpi)
+        self.figure = Figure(figsize=inches, dpi=dpi, facecolor=to_plot_color(theme.background))
         FigureCanvasAgg(self.figure)
 
-    def at(self, x: float, y: float) -> tuple[float, float]:
-        return x / self.size[0], 1.0 - y / self.size[1]
+    def to_figure(self, x: float, y: float) -> tuple[float, float]:
+        """Convert a position, px, to fractions of the figure from the bottom left."""
+        width, height = self.size
+        return x / width, 1.0 - y / height
 
-    def axes(self, box: Box) -> Axes:
-        """Return axes that fill `box`; a notebook shows the page for them."""
+    def add_axes(self, box: PageBox) -> Axes:
+        """Add axes that fill a box. Notebooks display the page for them."""
         left, top, width, height = box
-        x, y = self.at(left, top + height)
-        return self.figure.add_axes((x, y, width / self.size[0], height / self.size[1]), axes_class=PageAxes)
+        x, y = self.to_figure(left, top + height)
+        page_width, page_height = self.size
+        rectangle = (x, y, width / page_width, height / page_height)
+        return self.figure.add_axes(rectangle, axes_class=PageAxes)
 
-    def map_axes(self, box: Box, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
-        """Return axes without ticks that show a part of the world, m, in a box of its shape."""
-        axes = self.axes(box)
+    def add_map_axes(self, box: PageBox, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
+        """Add axes without ticks that show a part of the world, m, in a box of the same aspect."""
+        axes = self.add_axes(box)
         axes.set(xlim=(low_x, high_x), ylim=(low_y, high_y))
         axes.set_axis_off()
         return axes
 
-    def title(self, text: str, y: float, room: float | None = None) -> None:
-        """Write the title at the left margin, at so many pixels at scale 1 from the top."""
-        room = self.room if room is None else room
-        self.text(text, self.margin, y * self.scale, points=TITLE, bold=True, room=room)
+    def write_title(self, text: str, y: float, max_width: float | None = None) -> None:
+        """Write the title at the left margin.
 
-    def panels(
-        self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
-    ) -> list[tuple[Box, float]]:
-        """Return equal boxes, px, and how wide lines above each may be: `words` where there is room."""
-        rows, gap = -(-count // columns), 14 * self.scale
-        widest = (self.size[0] - self.margin) / columns - self.margin
-        highest = (self.size[1] - top - below + gap) / rows - above - gap
-        width = min(widest, highest * aspect)
-        height = width / aspect
-        slot, block = min(max(width, words), widest), above + height + gap
-        left = (self.size[0] - columns * slot - (columns - 1) * self.margin) / 2
-        top += max((self.size[1] - top - below + gap - rows * block) / 2, 0.0)
-        boxes = []
-        for number in range(count):
-            row, column = divmod(number, columns)
-            x, y = left + column * (slot + self.margin), top + row * block + above
-            boxes.append(((x, y, width, height), slot))
-        return boxes
+        Parameters
+        ----------
+        text : str
+        y : float
+            Middle of the line, px at scale 1.
+        max_width : float, px, optional
+            By default that between the margins.
+        """
+        max_width = self.content_width if max_width is None else max_width
+        self.write(text, self.margin, y * self.scale, points=TITLE, bold=True, max_width=max_width)
 
-    def text(
+    def write(
         self,
         text: str,
         x: float,
@@ -146,79 +231,198 @@ class Page:
         points: float = TEXT,
         bold: bool = False,
         color: Color | None = None,
-        room: float | None = None,
+        max_width: float | None = None,
         align: str = "left",
     ) -> None:
-        """Write one line, its middle at height `y`; with `room` it is cut to so many pixels."""
-        style: Any = {"fontsize": points, "fontweight": "bold" if bold else "normal", "ha": align}
-        style |= {"va": "center", "color": tone(color or self.theme.ink)}
-        written = self.figure.text(*self.at(x, y), text, **style)
-        # the same words are up to a pixel wider in one place than in another
-        while room is not None and len(text) > 1 and self.width_of(written) > room + 1:
-            text = text[:-1]
-            written.set_text(text.rstrip(" ·") + "…")
+        """Write one line.
 
-    def text_width(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
-        written = self.figure.text(0, 0, text, fontsize=points, fontweight="bold" if bold else "normal")
-        width = self.width_of(written)
-        written.remove()
+        Parameters
+        ----------
+        text : str
+        x, y : float, px
+            Position of the middle of the line at the edge that `align` names.
+        points : float
+            Text size.
+        bold : bool
+        color : Color, optional
+        max_width : float, px, optional
+            A longer text is shortened.
+        align : {"left", "right", "center"}
+        """
+        style: Any = {"fontsize": points, "fontweight": "bold" if bold else "normal", "ha": align}
+        text_x, text_y = self.to_figure(x, y)
+        artist = self.figure.text(
+            text_x, text_y, text, va="center", color=to_plot_color(color or self.theme.ink), **style
+        )
+        if max_width is None:
+            return
+        # The same text is up to a pixel wider at one position than at another.
+        while len(text) > 1 and self._measure_width(artist) > max_width + 1:
+            text = text[:-1]
+            artist.set_text(text.rstrip(" ·") + "…")
+
+    def measure_text(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
+        """Return the width of a text, px."""
+        artist = self.figure.text(0, 0, text, fontsize=points, fontweight="bold" if bold else "normal")
+        width = self._measure_width(artist)
+        artist.remove()
         return width
 
-    def width_of(self, artist: Any) -> float:
-        return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
+    def _measure_width(self, artist: Artist) -> float:
+        """Return the width of an artist, px."""
+        return float(artist.get_window_extent(self._get_renderer()).width)
 
-    def footer_height(self, handles: Sequence[Artist], begin: float = 0) -> float:
-        begin = max(begin, self.margin)
-        columns, width, height = self._legend_extent(handles, begin)
-        if columns == len(handles) and width <= self._beside_bar(begin):
-            return 46 * self.scale
-        return 36 * self.scale + height + 14 * self.scale
+    def _get_renderer(self) -> Any:
+        """Return the renderer that measures texts."""
+        canvas: Any = self.figure.canvas
+        return canvas.get_renderer()
 
-    def footer(self, handles: Sequence[Artist], boxes: Sequence[Box], zoom: float, begin: float = 0) -> None:
-        """Draw the scale bar, at `zoom` px/m, and the legend below `boxes`; nothing left of `begin` px."""
-        begin = max(begin, self.margin)
-        left, right = boxes[0][0], max(x + width for x, _, width, _ in boxes)
-        bottom = max(y + height for _, y, _, height in boxes)
-        columns, width, _ = self._legend_extent(handles, begin)
-        middle, end = bottom + 24 * self.scale, self.size[0] - self.margin
-        if columns == len(handles) and width <= self._beside_bar(begin):
-            start = min(left, end - width - (end - begin - self._beside_bar(begin)))
-            taken = self._scale_bar(max(start, begin), middle, zoom)
-            x = min(max(right, taken + 24 * self.scale + width), end)
-            self._legend(handles, columns, "center right", (x, middle))
+    def arrange_panels(
+        self,
+        count: int,
+        columns: int,
+        *,
+        aspect: float,
+        caption_width: float,
+        caption_height: float,
+        top: float,
+        bottom: float,
+    ) -> list[PagePanel]:
+        """Arrange equal panels, each with lines above it.
+
+        Parameters
+        ----------
+        count : int
+        columns : int
+        aspect : float
+            Width by height of a panel.
+        caption_width : float, px
+            Width of the widest lines. They have this if there is enough space.
+        caption_height : float, px
+        top, bottom : float, px
+            Space above and below all panels.
+
+        Returns
+        -------
+        list of PagePanel
+        """
+        page_width, page_height = self.size
+        gap = _PANEL_GAP * self.scale
+        rows = -(-count // columns)
+        max_width = (page_width - self.margin) / columns - self.margin
+        max_height = (page_height - top - bottom + gap) / rows - caption_height - gap
+        width = min(max_width, max_height * aspect)
+        height = width / aspect
+        slot_width = min(max(width, caption_width), max_width)
+        slot_height = caption_height + height + gap
+        left = (page_width - columns * slot_width - (columns - 1) * self.margin) / 2
+        top += max((page_height - top - bottom + gap - rows * slot_height) / 2, 0.0)
+        panels = []
+        for number in range(count):
+            row, column = divmod(number, columns)
+            x = left + column * (slot_width + self.margin)
+            y = top + row * slot_height + caption_height
+            panels.append(PagePanel((x, y, width, height), slot_width))
+        return panels
+
+    def measure_footer(self, handles: Sequence[Artist], start: float = 0) -> float:
+        """Return the height of a footer, px, see `draw_footer`."""
+        start = max(start, self.margin)
+        legend = self._measure_legend(handles, start)
+        if self._fits_next_to_bar(legend, len(handles), start):
+            return _ONE_LINE_FOOTER * self.scale
+        return 36 * self.scale + legend.height + 14 * self.scale
+
+    def draw_footer(
+        self, handles: Sequence[Artist], boxes: Sequence[PageBox], zoom: float, start: float = 0
+    ) -> None:
+        """Draw the scale bar and the legend below maps, in one line if there is enough space.
+
+        Parameters
+        ----------
+        handles : sequence of matplotlib.artist.Artist
+            Entries of the legend.
+        boxes : sequence of PageBox
+            Boxes of the maps.
+        zoom : float, px/m
+            Of the maps.
+        start : float, px
+            Nothing is drawn to the left of this.
+        """
+        start = max(start, self.margin)
+        end = self.size[0] - self.margin
+        left = boxes[0][0]
+        right = max(box_left + width for box_left, _, width, _ in boxes)
+        bottom = max(box_top + height for _, box_top, _, height in boxes)
+        legend = self._measure_legend(handles, start)
+        if self._fits_next_to_bar(legend, len(handles), start):
+            y = bottom + 24 * self.scale
+            max_left = end - legend.width - (end - start - self._compute_legend_space(start))
+            bar_end = self._draw_scale_bar(max(min(left, max_left), start), y, zoom)
+            x = min(max(right, bar_end + _LEGEND_GAP * self.scale + legend.width), end)
+            self._draw_legend(handles, legend.columns, "center right", (x, y))
         else:
-            self._scale_bar(left, bottom + 20 * self.scale, zoom)
-            self._legend(handles, columns, "upper center", ((begin + end) / 2, bottom + 38 * self.scale))
+            self._draw_scale_bar(left, bottom + 20 * self.scale, zoom)
+            middle = ((start + end) / 2, bottom + 38 * self.scale)
+            self._draw_legend(handles, legend.columns, "upper center", middle)
 
-    def _beside_bar(self, begin: float) -> float:
-        """Return the width that the longest scale bar, with its words, leaves a legend in the same line."""
-        return self.size[0] - self.margin - begin - self._longest_bar - 80 * self.scale
+    def _fits_next_to_bar(self, legend: _LegendExtent, entries: int, start: float) -> bool:
+        """Return whether a legend is a single line that fits next to the scale bar."""
+        return legend.columns == entries and legend.width <= self._compute_legend_space(start)
 
-    def _scale_bar(self, left: float, y: float, zoom: float) -> float:
-        """Draw a bar of a round length; return where its words end."""
-        length = round_down(self._longest_bar / zoom)
-        tick, right = 4 * self.scale, left + length * zoom
-        for x1, x2, half in ((left, right, 0.0), (left, left, tick), (right, right, tick)):
-            (a, b), (c, d) = self.at(x1, y - half), self.at(x2, y + half)
-            self.figure.add_artist(Line2D([a, c], [b, d], color=tone(self.theme.ink), linewidth=1.3))
-        words = right + 8 * self.scale
-        self.text(format_scale_length(length), words, y, points=SMALL, bold=True)
-        return words + self.text_width(format_scale_length(length), points=SMALL, bold=True)
+    def _compute_legend_space(self, start: float) -> float:
+        """Return the width that the longest scale bar and its label leave for a legend in the same line."""
+        label_width = _SCALE_BAR_LABEL * self.scale
+        return self.size[0] - self.margin - start - self._max_bar_length - label_width
 
-    def _legend_extent(self, handles: Sequence[Artist], begin: float) -> tuple[int, float, float]:
-        """Return columns in which the legend fits the page in the fewest rows, and its width and height."""
-        for rows in range(1, len(handles) + 1):
+    def _draw_scale_bar(self, left: float, y: float, zoom: float) -> float:
+        """Draw a bar of a round length, and return where its label ends, px."""
+        length = round_down(self._max_bar_length / zoom)
+        right = left + length * zoom
+        half_tick = 4 * self.scale
+        self._draw_line((left, y), (right, y))
+        for x in (left, right):
+            self._draw_line((x, y - half_tick), (x, y + half_tick))
+        label = format_scale_length(length)
+        label_left = right + 8 * self.scale
+        self.write(label, label_left, y, points=SMALL, bold=True)
+        return label_left + self.measure_text(label, points=SMALL, bold=True)
+
+    def _draw_line(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Draw a line between two positions, px."""
+        start_x, start_y = self.to_figure(*start)
+        end_x, end_y = self.to_figure(*end)
+        line = Line2D([start_x, end_x], [start_y, end_y], color=to_plot_color(self.theme.ink), linewidth=1.3)
+        self.figure.add_artist(line)
+
+    def _measure_legend(self, handles: Sequence[Artist], start: float) -> _LegendExtent:
+        """Return the size of a legend in the fewest rows that fit to the right of a position, px."""
+        max_width = self.size[0] - start
+        rows = 1
+        while True:
             columns = -(-len(handles) // rows)
-            legend = self._legend(handles, columns, "upper left", (0.0, 0.0))
-            extent = legend.get_window_extent(self.figure.canvas.get_renderer())  # type: ignore[attr-defined]
+            legend = self._draw_legend(handles, columns, "upper left", (0.0, 0.0))
+            extent = legend.get_window_extent(self._get_renderer())
             legend.remove()
-            if extent.width <= self.size[0] - begin or columns == 1:
-                break
-        return columns, float(extent.width), float(extent.height)
+            if extent.width <= max_width or columns <= 1:
+                return _LegendExtent(columns, float(extent.width), float(extent.height))
+            rows += 1
 
-    def _legend(self, handles: Sequence[Artist], columns: int, place: str, at: tuple[float, float]) -> Legend:
-        """Draw a legend of which the `place`, as in "upper left", is `at` a pixel."""
-        style: Any = {"loc": place, "bbox_to_anchor": self.at(*at), "frameon": False, "fontsize": SMALL}
-        style |= {"labelcolor": tone(self.theme.ink), "borderpad": 0.0, "borderaxespad": 0.0}
-        style |= {"columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
-        return self.figure.legend(handles=list(handles), ncols=columns, **style)
+    def _draw_legend(
+        self, handles: Sequence[Artist], columns: int, anchor: _Anchor, position: tuple[float, float]
+    ) -> Legend:
+        """Draw a legend whose anchor, such as "upper left", is at a position, px."""
+        return self.figure.legend(
+            handles=list(handles),
+            ncols=columns,
+            loc=anchor,
+            bbox_to_anchor=self.to_figure(*position),
+            frameon=False,
+            fontsize=SMALL,
+            labelcolor=to_plot_color(self.theme.ink),
+            borderpad=0.0,
+            borderaxespad=0.0,
+            columnspacing=1.6,
+            handletextpad=0.6,
+            handlelength=1.6,
+        )

@@ -15,9 +15,9 @@ from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures import arena
-from robocov_app.figures.curves import Curve, draw_curves, end_label
+from robocov_app.figures.curves import Curve, draw_curves, format_end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, check_some, figure_of
+from robocov_app.figures.page import HEADING, TEXT, TITLE, FigurePage, PageBox, check_not_empty, get_figure
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -71,7 +71,7 @@ def plot_environment(
     else:
         arena.set_meter_axes(axes, environment, theme)
     arena.draw_map(axes, environment, theme)
-    return figure_of(axes)
+    return get_figure(axes)
 
 
 @plain_style()
@@ -116,7 +116,7 @@ def plot_trajectories(
     else:
         arena.set_meter_axes(axes, record.environment, theme)
     arena.draw_run(axes, record, theme, colors)
-    return figure_of(axes)
+    return get_figure(axes)
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def plot_comparison(
     aspect = (high_x - low_x) / (high_y - low_y)
     legends = [arena.build_run_handles(record, theme, colors) for record in records]
     handles = merge_legends(legends, arena.get_label)
-    page = Page(size or (_SHEET_WIDTH_PX, 1000), theme, _SHEET_SCALE if size is None else None)
+    page = FigurePage(size or (_SHEET_WIDTH_PX, 1000), theme, _SHEET_SCALE if size is None else None)
     scale = page.scale
     captions = _build_captions(page, records, mean_distances, mean_times)
     top = (50 if captions.shared else 8) * scale
@@ -196,14 +196,22 @@ def plot_comparison(
     if size is None:
         rows = -(-len(records) // columns)
         panels_height = rows * (above + slot / aspect + _PANEL_GAP * scale)
-        height = top + panels_height + page.footer_height(handles)
+        height = top + panels_height + page.measure_footer(handles)
         height = np.clip(height, _MIN_HEIGHT_PX, _MAX_COMPARISON_HEIGHT_PX)
-        page = Page((page.size[0], int(height)), theme, _SHEET_SCALE)
+        page = FigurePage((page.size[0], int(height)), theme, _SHEET_SCALE)
     caption_width = captions.max_joined_width if is_one_line else captions.max_width
-    footer_height = page.footer_height(handles)
-    panels = page.panels(len(records), columns, aspect, caption_width, above, top, footer_height)
+    footer_height = page.measure_footer(handles)
+    panels = page.arrange_panels(
+        len(records),
+        columns,
+        aspect=aspect,
+        caption_width=caption_width,
+        caption_height=above,
+        top=top,
+        bottom=footer_height,
+    )
     for number, (box, room) in enumerate(panels):
-        axes = page.map_axes(box, low_x, low_y, high_x, high_y)
+        axes = page.add_map_axes(box, low_x, low_y, high_x, high_y)
         arena.draw_run(axes, records[number], theme, colors)
         if is_one_line:
             right = box[0] + max(box[2], min(room, caption_width))
@@ -213,15 +221,17 @@ def plot_comparison(
     first_box, room = panels[0]
     if captions.shared:
         row = first_box[1] - above - 20 * scale
-        page.text(captions.shared, first_box[0], row, points=HEADING, bold=True, room=page.room)
+        page.write(
+            captions.shared, first_box[0], row, points=HEADING, bold=True, max_width=page.content_width
+        )
     min_width = room if is_one_line else 0.0
     footer_boxes = [(x, y, max(width, min_width), height) for (x, y, width, height), _ in panels]
-    page.footer(handles, footer_boxes, first_box[2] / (high_x - low_x))
+    page.draw_footer(handles, footer_boxes, first_box[2] / (high_x - low_x))
     return page.figure
 
 
 def _build_captions(
-    page: Page,
+    page: FigurePage,
     records: Sequence[Record],
     mean_distances: Sequence[float | None] | None,
     mean_times: Sequence[float | None] | None,
@@ -245,13 +255,13 @@ def _build_captions(
         shared=_join_facts(shared),
         names=[record.label for record in records],
         facts=own_facts,
-        name_widths=[page.text_width(record.label, points=TITLE, bold=True) for record in records],
-        facts_widths=[page.text_width(text) for text in own_facts],
+        name_widths=[page.measure_text(record.label, points=TITLE, bold=True) for record in records],
+        facts_widths=[page.measure_text(text) for text in own_facts],
         gap=_CAPTION_GAP * page.scale,
     )
 
 
-def _choose_columns(page: Page, captions: _Captions, aspect: float, top: float) -> int:
+def _choose_columns(page: FigurePage, captions: _Captions, aspect: float, top: float) -> int:
     """Return how many panels are side by side: as large as possible, with space for their captions."""
     space = (page.size[0], page.size[1] - 2 * top)
     best = choose_column_count(len(captions.names), aspect, space, row_margin=_TWO_LINE_CAPTION * page.scale)
@@ -259,19 +269,19 @@ def _choose_columns(page: Page, captions: _Captions, aspect: float, top: float) 
     return max(min(best, int(fitting)), 1)
 
 
-def _write_one_line(page: Page, captions: _Captions, number: int, box: Box, right: float) -> None:
+def _write_one_line(page: FigurePage, captions: _Captions, number: int, box: PageBox, right: float) -> None:
     """Write the name of a run at the left above its panel, and its facts at the right."""
     row = box[1] - 16 * page.scale
-    page.text(captions.names[number], box[0], row, points=TITLE, bold=True)
-    page.text(captions.facts[number], right, row, color=page.theme.faint, align="right")
+    page.write(captions.names[number], box[0], row, points=TITLE, bold=True)
+    page.write(captions.facts[number], right, row, color=page.theme.faint, align="right")
 
 
-def _write_two_lines(page: Page, captions: _Captions, number: int, box: Box, room: float) -> None:
+def _write_two_lines(page: FigurePage, captions: _Captions, number: int, box: PageBox, room: float) -> None:
     """Write the name of a run above its panel, and its facts below the name."""
     name_row = box[1] - 38 * page.scale
     facts_row = box[1] - 16 * page.scale
-    page.text(captions.names[number], box[0], name_row, points=TITLE, bold=True, room=room)
-    page.text(captions.facts[number], box[0], facts_row, color=page.theme.faint, room=room)
+    page.write(captions.names[number], box[0], name_row, points=TITLE, bold=True, max_width=room)
+    page.write(captions.facts[number], box[0], facts_row, color=page.theme.faint, max_width=room)
 
 
 @plain_style()
@@ -304,14 +314,14 @@ def plot_cost(
     ParameterError
         If there are no curves, or one has no finite value.
     """
-    check_some("curves", curves)
+    check_not_empty("curves", curves)
     for curve in curves:
         _check_curve(curve)
     theme = get_theme(theme)
     if axes is None:
         axes = _create_cost_page(curves, theme, size or (1000, 560), title)
     draw_curves(axes, curves, theme)
-    return figure_of(axes)
+    return get_figure(axes)
 
 
 def _check_curve(curve: Curve) -> None:
@@ -328,14 +338,14 @@ def _check_curve(curve: Curve) -> None:
 def _create_cost_page(curves: Sequence[Curve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
     """Create a page for curves alone, whose texts can be large."""
     width, height = size
-    page = Page(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
+    page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
     scale = page.scale
     left = 52 * scale
     top = 86 * scale
-    label_width = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+    label_width = max(page.measure_text(format_end_label(curve), bold=True) for curve in curves)
     right = min(40 * scale + label_width, 0.45 * width)
-    page.text(title, left, 30 * scale, points=TITLE, bold=True, room=width - left - page.margin)
-    return page.axes((left, top, width - left - right, height - top - 56 * scale))
+    page.write(title, left, 30 * scale, points=TITLE, bold=True, max_width=width - left - page.margin)
+    return page.add_axes((left, top, width - left - right, height - top - 56 * scale))
 
 
 def _create_map_page(
@@ -349,32 +359,34 @@ def _create_map_page(
     """Create a page with one map, a title and facts above it, and the legend below."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
-    page = Page(size or (1400, 1000), theme, None if size else _MAP_SCALE)
+    page = FigurePage(size or (1400, 1000), theme, None if size else _MAP_SCALE)
     if size is None:
-        surroundings = 58 * page.scale + page.footer_height(handles)
+        surroundings = 58 * page.scale + page.measure_footer(handles)
         page_width = float(np.clip((1300 - surroundings) * aspect + 2 * page.margin, 840, 1400))
         page_height = float(np.clip((page_width - 2 * page.margin) / aspect + surroundings, 300, 1300))
-        page = Page((int(page_width), int(page_height)), theme, _MAP_SCALE)
+        page = FigurePage((int(page_width), int(page_height)), theme, _MAP_SCALE)
     above = 58 * page.scale
-    free_height = page.size[1] - above - page.footer_height(handles)
-    width = min(page.room, free_height * aspect)
+    free_height = page.size[1] - above - page.measure_footer(handles)
+    width = min(page.content_width, free_height * aspect)
     height = width / aspect
     box = ((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
     _write_above_map(page, title, box, up=38, points=TITLE, is_title=True)
     _write_above_map(page, facts, box, up=16, points=TEXT, is_title=False)
-    page.footer(handles, [box], width / (high_x - low_x))
-    return page.map_axes(box, low_x, low_y, high_x, high_y)
+    page.draw_footer(handles, [box], width / (high_x - low_x))
+    return page.add_map_axes(box, low_x, low_y, high_x, high_y)
 
 
-def _write_above_map(page: Page, text: str, box: Box, *, up: float, points: float, is_title: bool) -> None:
+def _write_above_map(
+    page: FigurePage, text: str, box: PageBox, *, up: float, points: float, is_title: bool
+) -> None:
     """Write a line above a map, centered if it is wider than the map."""
     left, top, width, _ = box
-    text_width = min(page.text_width(text, points=points, bold=is_title), page.room)
+    text_width = min(page.measure_text(text, points=points, bold=is_title), page.content_width)
     if text_width > width:
         left = max(left + (width - text_width) / 2, page.margin)
     color = page.theme.ink if is_title else page.theme.faint
     row = top - up * page.scale
-    page.text(text, left, row, points=points, bold=is_title, color=color, room=page.room)
+    page.write(text, left, row, points=points, bold=is_title, color=color, max_width=page.content_width)
 
 
 def _join_facts(facts: Sequence[str]) -> str:
@@ -419,7 +431,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     map_width, map_height = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
     aspect = map_width / map_height
     handles = _list_different_handles(drawn, theme)
-    page = Page((_SHEET_WIDTH_PX, _MAX_SHEET_HEIGHT_PX), theme, _SHEET_SCALE)
+    page = FigurePage((_SHEET_WIDTH_PX, _MAX_SHEET_HEIGHT_PX), theme, _SHEET_SCALE)
     scale = page.scale
     above = 26 * scale
     top = (46 if title else 8) * scale
@@ -428,20 +440,28 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     rows = -(-len(drawn) // columns)
     panels_height = rows * (above + slot * map_height / map_width + _PANEL_GAP * scale)
     height = int(
-        np.clip(top + panels_height + page.footer_height(handles), _MIN_HEIGHT_PX, _MAX_SHEET_HEIGHT_PX)
+        np.clip(top + panels_height + page.measure_footer(handles), _MIN_HEIGHT_PX, _MAX_SHEET_HEIGHT_PX)
     )
-    page = Page((_SHEET_WIDTH_PX, height), theme, _SHEET_SCALE)
-    panels = page.panels(len(drawn), columns, aspect, 0.0, above, top, page.footer_height(handles))
+    page = FigurePage((_SHEET_WIDTH_PX, height), theme, _SHEET_SCALE)
+    panels = page.arrange_panels(
+        len(drawn),
+        columns,
+        aspect=aspect,
+        caption_width=0.0,
+        caption_height=above,
+        top=top,
+        bottom=page.measure_footer(handles),
+    )
     for environment, (box, room) in zip(drawn, panels, strict=True):
         low_x, low_y, _, _ = environment.region.bounds
-        axes = page.map_axes(box, low_x, low_y, low_x + map_width, low_y + map_height)
+        axes = page.add_map_axes(box, low_x, low_y, low_x + map_width, low_y + map_height)
         arena.draw_map(axes, environment, theme)
-        page.text(environment.name, box[0], box[1] - 12 * scale, bold=True, room=room)
+        page.write(environment.name, box[0], box[1] - 12 * scale, bold=True, max_width=room)
     first_box, _ = panels[0]
     if title:
         row = first_box[1] - above - 18 * scale
-        page.text(title, first_box[0], row, points=HEADING, bold=True, room=page.room)
-    page.footer(handles, [box for box, _ in panels], first_box[2] / map_width)
+        page.write(title, first_box[0], row, points=HEADING, bold=True, max_width=page.content_width)
+    page.draw_footer(handles, [box for box, _ in panels], first_box[2] / map_width)
     return page.figure
 
 
@@ -523,8 +543,8 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     matplotlib.figure.Figure
     """
     theme = get_theme(theme)
-    page = Page((1200, 800), theme)
-    page.title(title, 26)
+    page = FigurePage((1200, 800), theme)
+    page.write_title(title, 26)
     for number, panel in enumerate(METRIC_PANELS):
         curves = [
             (run.label, run.controller, run.metrics.time, panel.get_values(run.metrics)) for run in runs
@@ -534,14 +554,14 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     return page.figure
 
 
-def _create_metric_axes(page: Page, number: int, curves: Sequence[Curve], unit: str) -> Axes:
+def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[Curve], unit: str) -> Axes:
     """Create the axes of one of four panels, with space for the labels of its curves."""
     scale = page.scale
     width = 600.0
     height = 400.0 - 20 * scale
     row, column = divmod(number, 2)
-    label_width = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
     right = min(24 * scale + label_width, 0.5 * width)
     left = column * width + 44 * scale
     top = 40 * scale + row * height + 36 * scale
-    return page.axes((left, top, width - 44 * scale - right, height - 84 * scale))
+    return page.add_axes((left, top, width - 44 * scale - right, height - 84 * scale))

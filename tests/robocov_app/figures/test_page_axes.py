@@ -6,7 +6,7 @@ import pytest
 from drawn_run import ROOMS, run_of
 from PIL import Image
 
-from robocov_app.figures.page import Page
+from robocov_app.figures.page import FigurePage
 from robocov_app.figures.runs import plot_trajectories
 from robocov_app.look.theme import DARK
 
@@ -28,7 +28,7 @@ def test_what_is_drawn_on_them_later_is_shown():
 
 
 def test_it_looks_alike_whatever_style_the_user_has():
-    axes = Page((400, 300), DARK).axes((20, 20, 360, 260))
+    axes = FigurePage((400, 300), DARK).add_axes((20, 20, 360, 260))
     before = axes._repr_png_()
     with matplotlib.rc_context({"savefig.facecolor": "red", "savefig.bbox": "tight", "savefig.dpi": 17}):
         assert axes._repr_png_() == before

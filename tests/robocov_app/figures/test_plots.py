@@ -19,9 +19,9 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.team import Team
 from robocov.voronoi import partition
-from robocov_app.figures.curves import end_label
+from robocov_app.figures.curves import format_end_label
 from robocov_app.figures.files import save_figure
-from robocov_app.figures.page import tone
+from robocov_app.figures.page import to_plot_color
 from robocov_app.figures.runs import plot_comparison, plot_cost, plot_environment, plot_trajectories
 from robocov_app.look.theme import DARK, LIGHT
 
@@ -95,17 +95,17 @@ class TestTrajectories:
         record = run_of(ROOMS, 5)
         axes = plot_trajectories(record).axes[0]
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
-        assert {to_rgb(c) for c in lines.get_colors()} == {tone(LIGHT.trajectory)}
+        assert {to_rgb(c) for c in lines.get_colors()} == {to_plot_color(LIGHT.trajectory)}
         for robot, segment in enumerate(lines.get_segments()):
             assert segment == pytest.approx(record.positions[:, robot])
         (finals,) = [
             c for c in axes.collections if isinstance(c, PathCollection) and not isinstance(c, LineCollection)
         ]
         assert np.asarray(finals.get_offsets()) == pytest.approx(record.positions[-1])
-        assert {to_rgb(c) for c in finals.get_facecolors()} == {tone(LIGHT.final)}
+        assert {to_rgb(c) for c in finals.get_facecolors()} == {to_plot_color(LIGHT.final)}
         starts = next(line for line in axes.lines if line.get_marker() == "o")
         assert np.asarray(starts.get_xydata()) == pytest.approx(record.positions[0])
-        assert to_rgb(starts.get_markeredgecolor()) == tone(LIGHT.start)
+        assert to_rgb(starts.get_markeredgecolor()) == to_plot_color(LIGHT.start)
         assert starts.get_markerfacecolor() == "none"
 
     def test_cells_and_centroids_are_the_final_ones(self):
@@ -293,7 +293,7 @@ class TestCost:
         for line, (_, name, time, values) in zip(long, given_curves, strict=True):
             assert np.asarray(line.get_xdata()).tolist() == time.tolist()
             assert np.asarray(line.get_ydata()).tolist() == values.tolist()
-            assert to_rgb(line.get_color()) == tone(LIGHT.controllers[name])
+            assert to_rgb(line.get_color()) == to_plot_color(LIGHT.controllers[name])
         assert len({str(line.get_linestyle()) for line in long}) == 2
         assert [text.get_text() for text in axes.texts] == ["RAPF  1.005 m", "RPF  1.405 m"]
 
@@ -379,7 +379,7 @@ def test_names_are_words_whatever_is_in_them(tmp_path):
     ],
 )
 def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
-    assert end_label(("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit) == words
+    assert format_end_label(("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit) == words
 
 
 def test_moving_obstacles_have_an_arrow_a_path_and_a_legend_entry():

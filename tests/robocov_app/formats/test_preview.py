@@ -14,7 +14,7 @@ from PIL import Image
 from shapely import MultiPolygon, Polygon, box
 
 from robocov.errors import OutputError, ParameterError
-from robocov_app.figures.page import tone
+from robocov_app.figures.page import to_plot_color
 from robocov_app.formats import ForeignMap, Shaping, build_environment
 from robocov_app.formats.preview import plot_import, save_preview
 from robocov_app.look.theme import DARK, LIGHT
@@ -35,7 +35,7 @@ def plotted(free: Any, shaping: Shaping = Shaping(specks=0.05), theme: str = "li
 
 
 def marked(axes: Any, color: tuple[int, int, int]) -> list[Any]:
-    return [patch for patch in axes.patches if to_rgb(patch.get_facecolor()) == tone(color)]
+    return [patch for patch in axes.patches if to_rgb(patch.get_facecolor()) == to_plot_color(color)]
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)

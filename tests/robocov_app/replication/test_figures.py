@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from robocov.metrics import CostHistory
 from robocov.voronoi import partition
 from robocov_app.figures.files import save_figure
-from robocov_app.figures.page import tone
+from robocov_app.figures.page import to_plot_color
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.replication.figures.paper_figures import FIGURES, WIDE_PX, draw_figure
 from robocov_app.replication.results.study_results import FigureRun
@@ -42,7 +42,7 @@ def test_no_text_is_covered_or_cut_off(number, theme):
     figure = draw_figure(number, RUNS, PARTITION, theme)
     if number not in (3, 5, 7):
         all_clear(figure)
-    assert to_rgb(figure.get_facecolor()) == tone((LIGHT if theme == "light" else DARK).background)
+    assert to_rgb(figure.get_facecolor()) == to_plot_color((LIGHT if theme == "light" else DARK).background)
 
 
 def test_figures_are_found_by_their_numbers():
@@ -70,7 +70,7 @@ def test_a_partition_with_centers_of_mass():
     assert np.asarray(dots.get_xydata()) == pytest.approx(centers)
     (robots,) = [c for c in axes.collections if type(c) is PathCollection]
     assert np.asarray(robots.get_offsets()) == pytest.approx(PARTITION.positions[0])
-    assert {to_rgb(c) for c in robots.get_facecolors()} == {tone(LIGHT.final)}
+    assert {to_rgb(c) for c in robots.get_facecolors()} == {to_plot_color(LIGHT.final)}
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_panels_show_their_runs_in_the_papers_colors(number, left, right):
     for axes, name in zip(figure.axes, (left, right), strict=True):
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
         assert lines.get_segments()[2] == pytest.approx(RUNS[name].record.positions[:, 2])
-        assert {to_rgb(c) for c in lines.get_colors()} == {tone(LIGHT.trajectory)}
+        assert {to_rgb(c) for c in lines.get_colors()} == {to_plot_color(LIGHT.trajectory)}
     words = [text.get_text() for text in figure.texts]
     assert f"(a)  {RUNS[left].record.label}" in words and f"(b)  {RUNS[right].record.label}" in words
     for name in (left, right):
@@ -104,7 +104,7 @@ def test_cost_curves(number, case, other):
     long = [line for line in axes.lines if len(line.get_xdata()) == 121]
     for line, law in zip(long, ("rapf", other), strict=True):
         assert np.asarray(line.get_ydata()) == pytest.approx(RUNS[f"{case}/{law}"].history.mean_distance)
-        assert to_rgb(line.get_color()) == tone(LIGHT.controllers[law])
+        assert to_rgb(line.get_color()) == to_plot_color(LIGHT.controllers[law])
     figure.canvas.draw()
     for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label):
         box = text.get_window_extent()

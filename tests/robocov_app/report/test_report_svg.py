@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 from reported_results import HOSTILE
 
-from robocov_app.figures.results import (
-    Band,
-    Dependence,
-    Sample,
-    plot_cost_bands,
-    plot_final_costs,
-    plot_gain_grid,
-    plot_gains,
-)
+from robocov_app.figures.cost_bands import Band, plot_cost_bands
+from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.gains import Dependence, GainGrid, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report.svg import inline_svg
@@ -46,8 +40,8 @@ FIGURES = {
             )
         ],
         "distance (m)",
-        800,
-        1.25,
+        width=800,
+        scale=1.25,
     ),
     "gains": lambda name="RAPF": plot_gains(
         [Dependence(name, STYLES["lloyd"], np.array([1.0, 2.0, np.nan] * 9), np.ones(27))],
@@ -55,7 +49,9 @@ FIGURES = {
         PANEL,
         "distance (m)",
     ),
-    "grid": lambda name="RAPF": plot_gain_grid(PANEL, [1.0, 2.0], [1.0], np.array([[1.0, 2.0]]), (name, "b")),
+    "grid": lambda name="RAPF": plot_gain_grid(
+        GainGrid(name, "b", [1.0, 2.0], [1.0], np.array([[1.0, 2.0]])), PANEL
+    ),
 }
 
 

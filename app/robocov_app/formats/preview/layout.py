@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from matplotlib.artist import Artist
 
-from robocov_app.figures.page import SMALL, TITLE, Box, Page
+from robocov_app.figures.page import SMALL, TITLE, FigurePage, PageBox
 from robocov_app.look.theme import Theme
 from robocov_app.render.panel_grid import choose_column_count
 
@@ -49,7 +49,7 @@ class Panel(NamedTuple):
         Width of the space above it.
     """
 
-    box: Box
+    box: PageBox
     caption_width: float
 
 
@@ -58,14 +58,14 @@ class ImportPage(NamedTuple):
 
     Attributes
     ----------
-    page : Page
+    page : FigurePage
     panels : list of Panel
         The map as it was read, and as it became.
     lines : list of str
         Lines of the report, none wider than the page.
     """
 
-    page: Page
+    page: FigurePage
     panels: list[Panel]
     lines: list[str]
 
@@ -92,12 +92,12 @@ def lay_out_page(
     ImportPage
         Empty, but for its size.
     """
-    page = Page((_MAX_WIDTH_PX, _MAX_WIDTH_PX), theme, _SCALE)
+    page = FigurePage((_MAX_WIDTH_PX, _MAX_WIDTH_PX), theme, _SCALE)
     margin = page.margin
     title_height = _TITLE_HEIGHT_PX * page.scale
     caption_height = _CAPTION_HEIGHT_PX * page.scale
     caption_width = max(
-        measure_caption_indent(page, caption.name) + page.text_width(caption.facts) for caption in captions
+        measure_caption_indent(page, caption.name) + page.measure_text(caption.facts) for caption in captions
     )
     columns = choose_column_count(
         _ARENA_COUNT, aspect, (_MAX_WIDTH_PX, _MAX_ARENAS_HEIGHT_PX), row_margin=caption_height
@@ -111,25 +111,31 @@ def lay_out_page(
     width = max(columns * (arena_width + margin) + margin, _MIN_WIDTH_PX)
     slot_width = min(max(arena_height * aspect, caption_width), (width - margin) / columns - margin)
     left = (width - columns * slot_width - (columns - 1) * margin) / 2
-    page = Page((int(width), _MAX_WIDTH_PX), theme, _SCALE)
+    page = FigurePage((int(width), _MAX_WIDTH_PX), theme, _SCALE)
     lines = wrap_lines(page, lines, width - left - margin)
     lines_height = (LINE_HEIGHT_PX * len(lines) + _MARGIN_BELOW_LINES_PX) * page.scale
-    height_below = page.footer_height(handles) + lines_height
+    height_below = page.measure_footer(handles) + lines_height
     gaps_height = (rows - 1) * _ROW_GAP_PX * page.scale
     height = title_height + rows * (caption_height + arena_height) + gaps_height + height_below
-    page = Page((int(width), int(max(height, _MIN_HEIGHT_PX))), theme, _SCALE)
-    boxes = page.panels(
-        _ARENA_COUNT, columns, aspect, caption_width, caption_height, title_height, height_below
+    page = FigurePage((int(width), int(max(height, _MIN_HEIGHT_PX))), theme, _SCALE)
+    boxes = page.arrange_panels(
+        _ARENA_COUNT,
+        columns,
+        aspect=aspect,
+        caption_width=caption_width,
+        caption_height=caption_height,
+        top=title_height,
+        bottom=height_below,
     )
     return ImportPage(page, [Panel(box, width) for box, width in boxes], lines)
 
 
-def measure_caption_indent(page: Page, name: str) -> float:
+def measure_caption_indent(page: FigurePage, name: str) -> float:
     """Return the distance from the start of a caption to its facts, px."""
-    return page.text_width(name, points=TITLE, bold=True) + _CAPTION_GAP_PX * page.scale
+    return page.measure_text(name, points=TITLE, bold=True) + _CAPTION_GAP_PX * page.scale
 
 
-def wrap_lines(page: Page, lines: Sequence[str], max_width: float) -> list[str]:
+def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list[str]:
     """Return lines of the report no wider than `max_width`, px, and not too many."""
     wrapped: list[str] = []
     for line in lines:
@@ -140,15 +146,15 @@ def wrap_lines(page: Page, lines: Sequence[str], max_width: float) -> list[str]:
     return wrapped
 
 
-def _wrap_line(page: Page, line: str, max_width: float) -> list[str]:
+def _wrap_line(page: FigurePage, line: str, max_width: float) -> list[str]:
     """Return a line, or several if it is too wide, all but the first one indented."""
-    if page.text_width(line, points=SMALL) <= max_width:
+    if page.measure_text(line, points=SMALL) <= max_width:
         return [line]
     wrapped: list[str] = []
     current = ""
     for word in line.split():
         extended = f"{current} {word}" if current else word
-        if current and page.text_width(extended, points=SMALL) > max_width:
+        if current and page.measure_text(extended, points=SMALL) > max_width:
             wrapped.append(current)
             extended = f"{_CONTINUATION_INDENT}{word}"
         current = extended

@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.environment import Environment, Gap
 from robocov_app.figures.arena import build_map_handles, draw_map
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
-from robocov_app.figures.page import HEADING, SMALL, TITLE, Page, tone
+from robocov_app.figures.page import HEADING, SMALL, TITLE, FigurePage, to_plot_color
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion.comparison import ImportComparison, compare_maps
 from robocov_app.formats.preview.layout import (
@@ -101,14 +101,14 @@ def plot_import(
         for panel, caption in zip(layout.panels, captions, strict=True):
             _write_caption(layout.page, caption, panel.box[0], panel.box[1], panel.caption_width)
         boxes = [panel.box for panel in layout.panels]
-        before, after = (layout.page.map_axes(box, *comparison.bounds) for box in boxes)
+        before, after = (layout.page.add_map_axes(box, *comparison.bounds) for box in boxes)
         _draw_before(before, comparison, report, theme)
         draw_map(after, environment, theme)
         _draw_area(after, comparison.opened, theme.start, theme.start, _MARK_OPACITY)
         if comparison.gap is not None:
             _draw_gap(after, comparison.gap, theme)
         _, _, arena_width, _ = boxes[0]
-        layout.page.footer(handles, boxes, arena_width / (high_x - low_x))
+        layout.page.draw_footer(handles, boxes, arena_width / (high_x - low_x))
         _write_lines(layout)
         return layout.page.figure
 
@@ -122,18 +122,18 @@ def _write_title(layout: ImportPage, environment: Environment, report: ImportRep
     page = layout.page
     left = _get_left(layout)
     max_width = page.size[0] - left - page.margin
-    page.text(environment.name, left, 24 * page.scale, points=HEADING, bold=True, room=max_width)
+    page.write(environment.name, left, 24 * page.scale, points=HEADING, bold=True, max_width=max_width)
     width, height = report.size
     facts = f"{width:.4g} x {height:.4g} m, imported from {report.format}"
-    page.text(facts, left, 44 * page.scale, color=page.theme.faint, room=max_width)
+    page.write(facts, left, 44 * page.scale, color=page.theme.faint, max_width=max_width)
 
 
-def _write_caption(page: Page, caption: Caption, left: float, top: float, width: float) -> None:
+def _write_caption(page: FigurePage, caption: Caption, left: float, top: float, width: float) -> None:
     """Write a caption above an arena with a left and a top edge, px."""
     y = top - 14 * page.scale
-    page.text(caption.name, left, y, points=TITLE, bold=True)
+    page.write(caption.name, left, y, points=TITLE, bold=True)
     indent = measure_caption_indent(page, caption.name)
-    page.text(caption.facts, left + indent, y, color=page.theme.faint, room=width - indent)
+    page.write(caption.facts, left + indent, y, color=page.theme.faint, max_width=width - indent)
 
 
 def _write_lines(layout: ImportPage) -> None:
@@ -142,7 +142,7 @@ def _write_lines(layout: ImportPage) -> None:
     left = _get_left(layout)
     for k, line in enumerate(reversed(layout.lines)):
         y = page.size[1] - (LINE_HEIGHT_PX * k + 16) * page.scale
-        page.text(line, left, y, points=SMALL, color=page.theme.faint)
+        page.write(line, left, y, points=SMALL, color=page.theme.faint)
 
 
 def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport, theme: Theme) -> None:
@@ -153,15 +153,15 @@ def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport,
     rings = shapely.get_rings(shapely.get_parts(comparison.before))
     edges = LineCollection(
         [shapely.get_coordinates(ring) for ring in rings],
-        colors=tone(theme.obstacle_edge),
+        colors=to_plot_color(theme.obstacle_edge),
         linewidths=_EDGE_WIDTH_PT,
         clip_on=False,
         zorder=_AREA_ORDER,
     )
     axes.add_collection(edges, autolim=False)
     _draw_area(axes, comparison.lost, theme.trajectory, theme.trajectory, _MARK_OPACITY)
-    ink = tone(theme.ink)
-    halo = [withStroke(linewidth=3.0, foreground=tone(theme.background))]
+    ink = to_plot_color(theme.ink)
+    halo = [withStroke(linewidth=3.0, foreground=to_plot_color(theme.background))]
     for x, y in report.others:
         axes.plot([x], [y], marker="+", markersize=8.0, color=ink, zorder=_MARK_ORDER, path_effects=halo)
         axes.annotate(
@@ -186,8 +186,8 @@ def _draw_area(axes: Axes, area: BaseGeometry, fill: Color, edge: Color, opacity
         patch = PathPatch(
             outline,
             zorder=_AREA_ORDER,
-            facecolor=(*tone(fill), opacity),
-            edgecolor=tone(edge),
+            facecolor=(*to_plot_color(fill), opacity),
+            edgecolor=to_plot_color(edge),
             linewidth=_EDGE_WIDTH_PT,
         )
         axes.add_patch(patch)
@@ -195,9 +195,9 @@ def _draw_area(axes: Axes, area: BaseGeometry, fill: Color, edge: Color, opacity
 
 def _draw_gap(axes: Axes, gap: Gap, theme: Theme) -> None:
     """Draw the narrowest passage as a line, with a ring around it if the line is short."""
-    color = tone(theme.final)
+    color = to_plot_color(theme.final)
     points = np.array(gap.between)
-    halo = [withStroke(linewidth=4.2, foreground=tone(theme.background))]
+    halo = [withStroke(linewidth=4.2, foreground=to_plot_color(theme.background))]
     axes.plot(
         points[:, 0],
         points[:, 1],
@@ -237,15 +237,15 @@ def _build_handles(environment: Environment, theme: Theme, comparison: ImportCom
         handles.append(_build_mark_handle(f"opened: {area} m² were solid", theme.start))
     if comparison.gap is not None:
         label = f"narrowest passage, {comparison.gap.width:.3g} m"
-        handles.append(Line2D([], [], color=tone(theme.final), linewidth=2.0, label=label))
+        handles.append(Line2D([], [], color=to_plot_color(theme.final), linewidth=2.0, label=label))
     return handles
 
 
 def _build_mark_handle(label: str, color: Color) -> Patch:
     return Patch(
         label=label,
-        facecolor=(*tone(color), _MARK_OPACITY),
-        edgecolor=tone(color),
+        facecolor=(*to_plot_color(color), _MARK_OPACITY),
+        edgecolor=to_plot_color(color),
         linewidth=_EDGE_WIDTH_PT,
     )
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from robocov_app.figures.results import Sample
+from robocov_app.figures.final_costs import Sample
 from robocov_app.look.theme import Theme, get_theme
 from robocov_app.replication.design.contenders import OWN, TARGETS, TEAMS
 from robocov_app.replication.design.studies import DISTURBED

@@ -10,8 +10,10 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from robocov.arrays import Array
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TITLE, Page
-from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_pairs
+from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.gains import GainGrid, draw_gain_grid
+from robocov_app.figures.page import TITLE, FigurePage
+from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.look.theme import Theme
 from robocov_app.replication.design.contenders import OURS
@@ -79,7 +81,7 @@ def plan_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Draw 
 
 
 def _draw_pairs(pairs: Sequence[Pairs], label: str, theme: Theme) -> Figure:
-    figure = plot_pairs(pairs, label, WIDE_PX, PAGE_SCALE, theme)
+    figure = plot_pairs(pairs, label, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
     low, high = axes.get_xlim()
     if sum(low <= tick <= high for tick in axes.get_xticks()) < _MIN_TICKS:
@@ -111,13 +113,22 @@ def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme
     if not with_samples:
         return None
     label = "J/J_ref at the end (1: the centralized reference)"
-    return partial(plot_final_costs, with_samples, label, WIDE_PX, PAGE_SCALE, theme, origin=1.0)
+    return partial(
+        plot_final_costs,
+        with_samples,
+        label,
+        width=WIDE_PX,
+        scale=PAGE_SCALE,
+        theme=theme,
+        origin=1.0,
+    )
 
 
 @plain_style()
 def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     """Draw gaps, in percent, on an axis of square roots."""
-    figure = plot_final_costs([("", samples)], "J/J_ref − 1 at the end (%)", WIDE_PX, PAGE_SCALE, theme)
+    label = "J/J_ref − 1 at the end (%)"
+    figure = plot_final_costs([("", samples)], label, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
     low = min(float(values.min()), 0.0)
@@ -155,15 +166,21 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     below = 44 * PAGE_SCALE
     width = WIDE_PX / columns - left - right
     height = len(rho_0) * 24 * PAGE_SCALE
-    page = Page((WIDE_PX, round(rows * (height + above + below))), theme, PAGE_SCALE)
+    page = FigurePage((WIDE_PX, round(rows * (height + above + below))), theme, PAGE_SCALE)
     for number, (name, grid) in enumerate(panels):
         row, column = divmod(number, columns)
         x = left + column * (width + left + right)
         y = above + row * (height + above + below)
-        axes = page.axes((x, y, width, height))
-        gaps = _compute_mean_gaps(grid, k_rep, rho_0)
-        plot_gain_grid(axes, k_rep, rho_0, gaps, ("k_rep (N m³)", "rho_0 (m)"), theme)
-        page.text(name, x - left / 2, y - 36 * PAGE_SCALE, points=TITLE, bold=True)
+        axes = page.add_axes((x, y, width, height))
+        gap_grid = GainGrid(
+            column_label="k_rep (N m³)",
+            row_label="rho_0 (m)",
+            columns=k_rep,
+            rows=rho_0,
+            values=_compute_mean_gaps(grid, k_rep, rho_0),
+        )
+        draw_gain_grid(axes, gap_grid, theme)
+        page.write(name, x - left / 2, y - 36 * PAGE_SCALE, points=TITLE, bold=True)
     return page.figure
 
 

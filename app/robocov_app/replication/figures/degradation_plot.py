@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from robocov.errors import format_count
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, Page, quiet_axes, tone
+from robocov_app.figures.page import SMALL, TEXT, FigurePage, style_axes, to_plot_color
 from robocov_app.look.colors import mix
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -45,15 +45,15 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     panel_width = (width - 40) / columns
     panel_height = (height - 110) / rows
     bottom, top = _find_limits(degradations)
-    page = Page(_SIZE_PX, theme, scale=1.0)
-    page.title("Coverage when things go wrong", 26)
+    page = FigurePage(_SIZE_PX, theme, scale=1.0)
+    page.write_title("Coverage when things go wrong", 26)
     subtitle = "final mean distance, as a multiple of the same run's in which that does not go wrong"
-    page.text(subtitle, page.margin, 50, color=quiet, room=page.room)
+    page.write(subtitle, page.margin, 50, color=quiet, max_width=page.content_width)
     for number, name in enumerate(names):
         row, column = divmod(number, columns)
         x = 64 + column * panel_width
         y = 100 + row * panel_height
-        axes = page.axes((x, y, panel_width - 60, panel_height - 84))
+        axes = page.add_axes((x, y, panel_width - 60, panel_height - 84))
         axes.set_ylim(bottom, top)
         _draw_panel(
             axes, name, [degradation for degradation in degradations if degradation.axis == name], theme
@@ -64,14 +64,14 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
         labels,
         ncols=len(handles),
         loc="center right",
-        bbox_to_anchor=page.at(width - page.margin, 26),
+        bbox_to_anchor=page.to_figure(width - page.margin, 26),
         frameon=False,
         fontsize=SMALL,
-        labelcolor=tone(theme.ink),
+        labelcolor=to_plot_color(theme.ink),
     )
     pairs = format_count(max(degradation.runs for degradation in degradations), "pair")
     note = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
-    page.text(note, page.margin, height - 18, points=SMALL, color=quiet)
+    page.write(note, page.margin, height - 18, points=SMALL, color=quiet)
     return page.figure
 
 
@@ -89,7 +89,7 @@ def _find_limits(degradations: Sequence[Degradation]) -> tuple[float, float]:
 def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], theme: Theme) -> None:
     values = list(dict.fromkeys(degradation.value for degradation in degradations))
     styles = choose_controller_styles(degradation.controller for degradation in degradations)
-    axes.axhline(1.0, color=tone(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
+    axes.axhline(1.0, color=to_plot_color(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
     for k, (controller, style) in enumerate(styles.items()):
         own = [degradation for degradation in degradations if degradation.controller == controller]
         offset = _OFFSET * (k - (len(styles) - 1) / 2)
@@ -97,18 +97,18 @@ def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], them
         _draw_curve(axes, x, own, style, theme)
     unit = f" ({UNITS[name]})" if UNITS[name] else ""
     title = f"{CAPTIONS[f'axis-{name}']}{unit}"
-    axes.set_title(title, fontsize=TEXT, color=tone(theme.ink), loc="left")
+    axes.set_title(title, fontsize=TEXT, color=to_plot_color(theme.ink), loc="left")
     labels = ["no limit" if value is None else f"{value:g}" for value in values]
     axes.set_xticks(range(len(values)), labels)
     axes.set_xlim(-0.4, len(values) - 0.6)
-    quiet_axes(axes, theme, grid="y")
+    style_axes(axes, theme, grid="y")
 
 
 def _draw_curve(
     axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
 ) -> None:
     """Draw the median ratios of a controller, with their intervals."""
-    color = tone(style.get_color(theme))
+    color = to_plot_color(style.get_color(theme))
     y = np.array([degradation.ratio.estimate for degradation in degradations])
     ends = np.array([[degradation.ratio.low, degradation.ratio.high] for degradation in degradations])
     errors = np.nan_to_num(np.abs(ends - y[:, None]).T)

@@ -18,7 +18,7 @@ from robocov.locational_cost.best_points import find_best_points
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, Box, Page, quiet_axes, tone
+from robocov_app.figures.page import SMALL, FigurePage, PageBox, style_axes, to_plot_color
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
 
@@ -122,15 +122,15 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     path = find_sensor_optima(np.geomspace(_MIN_HEIGHT_M, _MAX_HEIGHT_M, _PATH_POINTS).tolist())
     labeled = _select_labeled_optima(path_heights=[n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)])
     median = find_best_points(cell, Distance())[0]
-    page = Page(size, theme, scale)
+    page = FigurePage(size, theme, scale)
     top = 44 * scale
     height = size[1] - top - 46 * scale
     left = page.margin + 26 * scale
     width = size[0] - page.margin - left
     panels = []
     for start, panel_width, heading in _PANELS:
-        panels.append(page.axes((left + start * width, top, panel_width * width, height)))
-        page.text(heading, left + start * width, top - 16 * scale)
+        panels.append(page.add_axes((left + start * width, top, panel_width * width, height)))
+        page.write(heading, left + start * width, top - 16 * scale)
     points = np.array([[optimum.x, optimum.y] for optimum in path] + [median])
     frame = _find_frame(points, _PANELS[1][1] * width / height)
     cell_axes, frame_axes, distance_axes = panels
@@ -144,7 +144,7 @@ def draw_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
             xyB=(0.0, side),
             coordsA=cell_axes.transData,
             coordsB=frame_axes.transAxes,
-            color=tone(theme.faint),
+            color=to_plot_color(theme.faint),
             linewidth=0.8,
         )
         page.figure.add_artist(connection)
@@ -165,7 +165,7 @@ def _select_labeled_optima(path_heights: Sequence[float]) -> list[SensorOptimum]
     return [*labeled, last]
 
 
-def _find_frame(points: Array, aspect: float) -> Box:
+def _find_frame(points: Array, aspect: float) -> PageBox:
     """Return x, y, width and height of the enlarged frame: all points, with space for labels at the right."""
     low = points.min(axis=0)
     high = points.max(axis=0)
@@ -174,11 +174,15 @@ def _find_frame(points: Array, aspect: float) -> Box:
     return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
 
 
-def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: Box, theme: Theme) -> None:
-    fill = tone(mix(theme.background, theme.robots[1], theme.tint))
-    axes.add_patch(Polygon(cell.polygons[0], facecolor=fill, edgecolor=tone(theme.boundary), linewidth=1.6))
+def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: PageBox, theme: Theme) -> None:
+    fill = to_plot_color(mix(theme.background, theme.robots[1], theme.tint))
+    axes.add_patch(
+        Polygon(cell.polygons[0], facecolor=fill, edgecolor=to_plot_color(theme.boundary), linewidth=1.6)
+    )
     x, y, width, height = frame
-    axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=tone(theme.ink), linewidth=1.2))
+    axes.add_patch(
+        Rectangle((x, y), width, height, fill=False, edgecolor=to_plot_color(theme.ink), linewidth=1.2)
+    )
     axes.set_aspect("equal")
     axes.margins(0.02)
     axes.autoscale_view()
@@ -191,14 +195,14 @@ def _draw_path(
     axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], median: Array, theme: Theme
 ) -> None:
     """Draw the path of the optimum with labels, and the geometric median."""
-    line = tone(theme.final)
-    faint = tone(theme.faint)
+    line = to_plot_color(theme.final)
+    faint = to_plot_color(theme.faint)
     label_style: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
     axes.plot([row.x for row in path], [row.y for row in path], color=line, linewidth=2.4, zorder=2)
     first, *inner, last = labeled
     for optimum in inner:
         axes.plot(optimum.x, optimum.y, "o", color=line, markersize=5.5, markeredgewidth=0.0, zorder=3)
-    for optimum, marker, face in ((first, "o", tone(theme.background)), (last, "P", line)):
+    for optimum, marker, face in ((first, "o", to_plot_color(theme.background)), (last, "P", line)):
         axes.plot(
             optimum.x,
             optimum.y,
@@ -212,13 +216,15 @@ def _draw_path(
     labels = [(optimum, f"h = {optimum.height:g} m") for optimum in inner]
     labels += [(first, "h → 0"), (last, "h → ∞: the centroid")]
     for optimum, label in labels:
-        axes.annotate(label, (optimum.x, optimum.y), (11, -1), color=tone(theme.ink), zorder=5, **label_style)
+        axes.annotate(
+            label, (optimum.x, optimum.y), (11, -1), color=to_plot_color(theme.ink), zorder=5, **label_style
+        )
     x, y = median.tolist()
     axes.plot(x, y, "D", color=faint, markersize=6.0, zorder=3)
     axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **label_style)
 
 
-def _set_frame(axes: Axes, frame: Box, theme: Theme) -> None:
+def _set_frame(axes: Axes, frame: PageBox, theme: Theme) -> None:
     """Limit axes to the enlarged frame, and outline it."""
     x, y, width, height = frame
     axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal")
@@ -226,17 +232,17 @@ def _set_frame(axes: Axes, frame: Box, theme: Theme) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4, prune="both"))
     for side in axes.spines.values():
-        side.set(visible=True, color=tone(theme.ink), linewidth=1.2)
+        side.set(visible=True, color=to_plot_color(theme.ink), linewidth=1.2)
 
 
 def _draw_distance(
     axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], theme: Theme
 ) -> None:
     """Draw the distance of the optimum from the centroid against the height."""
-    line = tone(theme.final)
+    line = to_plot_color(theme.final)
     highest = 1e3 * path[0].distance
     inner = path[1:-1]
-    axes.axhline(highest, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.axhline(highest, color=to_plot_color(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
     axes.plot(*_get_distance_curve(inner), color=line, linewidth=2.4)
     axes.plot(
         *_get_distance_curve(labeled[1:-1]),
@@ -259,10 +265,10 @@ def _draw_distance(
         (0.04, 0.07),
         xycoords="axes fraction",
         fontsize=SMALL,
-        color=tone(theme.ink),
+        color=to_plot_color(theme.ink),
         ha="left",
         va="bottom",
-        bbox={"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0},
+        bbox={"facecolor": to_plot_color(theme.background), "edgecolor": "none", "pad": 2.0},
     )
 
 
@@ -274,6 +280,6 @@ def _get_distance_curve(optima: Sequence[SensorOptimum]) -> tuple[list[float], l
 
 
 def _simplify_axes(axes: Axes, theme: Theme, label: str = "", grid: Literal["y", ""] = "") -> None:
-    quiet_axes(axes, theme, label, grid=grid)
+    style_axes(axes, theme, label, grid=grid)
     axes.tick_params(length=3.0, left=True)
     axes.minorticks_off()

@@ -19,9 +19,9 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.voronoi import partition
 from robocov_app.figures import arena
-from robocov_app.figures.curves import draw_curves, end_label
+from robocov_app.figures.curves import draw_curves, format_end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TITLE, Page, tone
+from robocov_app.figures.page import SMALL, TITLE, FigurePage, to_plot_color
 from robocov_app.look.colors import mix
 from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -195,8 +195,13 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     """Draw the Voronoi cells at the start of a run, and their centers of mass."""
     environment = run.environment
     positions = run.positions[0]
-    edge_color = tone(theme.cell_edge)
-    dot_style: Any = {"linestyle": "none", "marker": "o", "markersize": 4.0, "color": tone(theme.ink)}
+    edge_color = to_plot_color(theme.cell_edge)
+    dot_style: Any = {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": 4.0,
+        "color": to_plot_color(theme.ink),
+    }
     handles: list[Artist] = [
         arena.build_robot_handle("robot", theme.final, theme),
         Line2D([], [], label="centre of mass of its cell", **dot_style),
@@ -209,7 +214,7 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     fills = []
     for k in range(len(positions)):
         color = theme.robots[k % len(theme.robots)]
-        fills.append(tone(mix(theme.background, color, theme.paper_tint)))
+        fills.append(to_plot_color(mix(theme.background, color, theme.paper_tint)))
     collection = PolyCollection(
         list(cells.polygons), facecolors=fills, edgecolors=edge_color, linewidths=0.8, zorder=1
     )
@@ -252,8 +257,8 @@ def draw_side_by_side(
         left = box.x0 * page.size[0]
         right = box.x1 * page.size[0]
         top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
-        page.text(f"({letter})  {title}", left, top, points=TITLE, bold=True)
-        page.text(cost, right, top, points=SMALL, color=theme.faint, align="right")
+        page.write(f"({letter})  {title}", left, top, points=TITLE, bold=True)
+        page.write(cost, right, top, points=SMALL, color=theme.faint, align="right")
     return page.figure
 
 
@@ -263,12 +268,12 @@ def draw_costs(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
     curves = [
         (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
     ]
-    page = Page((WIDE_PX, _COST_HEIGHT_PX), theme, PAGE_SCALE)
+    page = FigurePage((WIDE_PX, _COST_HEIGHT_PX), theme, PAGE_SCALE)
     edge = 34 * page.scale
-    label_width = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+    label_width = max(page.measure_text(format_end_label(curve), bold=True) for curve in curves)
     width = WIDE_PX - 2 * edge - label_width
     height = _COST_HEIGHT_PX - edge - 44 * page.scale
-    draw_curves(page.axes((edge, edge, width, height)), curves, theme)
+    draw_curves(page.add_axes((edge, edge, width, height)), curves, theme)
     return page.figure
 
 
@@ -280,7 +285,7 @@ def build_panels(
     theme: Theme,
     *,
     above: float,
-) -> tuple[Page, list[Axes]]:
+) -> tuple[FigurePage, list[Axes]]:
     """Build a page with equal axes for one map in a row, and its legend and scale bar.
 
     Parameters
@@ -298,17 +303,17 @@ def build_panels(
 
     Returns
     -------
-    page : Page
+    page : FigurePage
     panels : list of Axes
     """
     min_x, min_y, max_x, max_y = environment.region.bounds
-    sketch = Page((width, width), theme, PAGE_SCALE)
+    sketch = FigurePage((width, width), theme, PAGE_SCALE)
     panel_width = (width - (count + 1) * sketch.margin) / count
     panel_height = panel_width / ((max_x - min_x) / (max_y - min_y))
     top = above * PAGE_SCALE
-    page = Page((width, round(top + panel_height + sketch.footer_height(handles))), theme, PAGE_SCALE)
+    page = FigurePage((width, round(top + panel_height + sketch.measure_footer(handles))), theme, PAGE_SCALE)
     boxes = [
         (page.margin + k * (panel_width + page.margin), top, panel_width, panel_height) for k in range(count)
     ]
-    page.footer(handles, boxes, panel_width / (max_x - min_x))
-    return page, [page.map_axes(box, min_x, min_y, max_x, max_y) for box in boxes]
+    page.draw_footer(handles, boxes, panel_width / (max_x - min_x))
+    return page, [page.add_map_axes(box, min_x, min_y, max_x, max_y) for box in boxes]

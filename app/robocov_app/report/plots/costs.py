@@ -7,8 +7,9 @@ from matplotlib.figure import Figure
 
 from robocov.arrays import Array
 from robocov.errors import format_count
+from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
 from robocov_app.figures.curves import DISTANCE
-from robocov_app.figures.results import Band, Sample, compute_quartiles, plot_cost_bands, plot_final_costs
+from robocov_app.figures.final_costs import Sample, plot_final_costs
 from robocov_app.report.analysis.scaling import compute_medians, scale_distances
 from robocov_app.report.plots.plot import (
     FINAL_DISTANCE_LABEL,
@@ -136,7 +137,7 @@ def _build_final_cost_plot(panel: Panel, samples: list[Sample]) -> PagePlot:
 
     def draw(size: tuple[int, int]) -> Figure:
         width, _ = size
-        return plot_final_costs([("", samples)], label, width, 1.0)
+        return plot_final_costs([("", samples)], label, width=width, scale=1.0)
 
     return build_panel_plot(panel, f"{label}. {texts}.", draw)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, format_value
-from robocov_app.figures.results import MAX_LEVELS, Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.gains import MAX_LEVELS, Dependence, GainGrid, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.report.analysis.groups import RunGroup, find_varying_gains, group_by_controller
 from robocov_app.report.analysis.scaling import Scales, compute_medians, scale_distance
@@ -225,13 +225,14 @@ def _build_grid_plot(
         medians[row, column] = np.median(distances[is_in_cell])
     if np.isnan(medians).mean() > _MAX_MISSING_FRACTION:
         return None
-    figure = plot_gain_grid(
-        PANEL_SIZE_PX,
-        [first.to_value(coordinate) for coordinate in columns],
-        [second.to_value(coordinate) for coordinate in rows],
-        medians,
-        (first.title, second.title),
+    grid = GainGrid(
+        column_label=first.title,
+        row_label=second.title,
+        columns=[first.to_value(coordinate) for coordinate in columns],
+        rows=[second.to_value(coordinate) for coordinate in rows],
+        values=medians,
     )
+    figure = plot_gain_grid(grid, PANEL_SIZE_PX)
     title = f"{group.label} over {first.name} and {second.name}"
     distance = "final distance in m" if axis.label == FINAL_DISTANCE_LABEL else SCALED_DISTANCE_LABEL
     span = _describe_grid(medians, first, second, columns, rows)

@@ -7,8 +7,8 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
+from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.curves import TIME
-from robocov_app.figures.results import Band, plot_cost_bands
 from robocov_app.figures.runs import to_free_area_percent
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import has_path

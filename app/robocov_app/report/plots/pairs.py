@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robocov_app.figures.results import Pairs, plot_pairs
+from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.report.analysis.comparisons import GroupComparison, format_ratio
 from robocov_app.report.plots.plot import MAX_PANELS, PANEL_SIZE_PX, GroupStyles, PagePlot
 from robocov_app.report.svg import inline_svg
@@ -30,7 +30,7 @@ def build_pair_plots(comparisons: Sequence[GroupComparison], styles: GroupStyles
             continue
         rows = _list_rows(comparison, styles)
         texts = "; ".join(f"{row.label}: ratio {format_ratio(row.interval)}" for row in rows)
-        figure = plot_pairs(rows, "ratio of final mean distances (log)", PANEL_SIZE_PX[0], 1.0)
+        figure = plot_pairs(rows, "ratio of final mean distances (log)", width=PANEL_SIZE_PX[0], scale=1.0)
         description = f"{comparison.label}, pair by pair. {texts}."
         plots.append(PagePlot(comparison.label, inline_svg(figure, f"{key}-{number}", description)))
     return plots

@@ -1,0 +1,114 @@
+"""Plots of runs over time: medians with bands between the quartiles."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from robocov.arrays import Array
+from robocov_app.figures.curves import Curve, draw_curves, format_end_label
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import FigurePage
+from robocov_app.look.curve_styles import CurveStyle
+from robocov_app.look.labels import shorten_text
+from robocov_app.look.theme import LIGHT
+
+_FULL_WEIGHT_WIDTH_PX = 700.0
+"""Width of a page from which on lines have their full width. They would fill a small page."""
+_SMALL_WEIGHT = 0.7
+_LEFT_PX = 44
+_TOP_PX = 44
+_HEIGHT_MARGINS_PX = 94
+_LABEL_MARGIN_PX = 30
+
+
+class Band(NamedTuple):
+    """The runs of one controller over time.
+
+    Attributes
+    ----------
+    label : str
+    style : CurveStyle
+    time : (T,) array, s
+    values : (m, T) array
+        Values of each run; nan if there is none.
+    """
+
+    label: str
+    style: CurveStyle
+    time: Array
+    values: Array
+
+
+@plain_style()
+def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, unit: str) -> Figure:
+    """Plot values against time.
+
+    Parameters
+    ----------
+    bands : sequence of Band
+        Several runs have their median and a band between the quartiles, a single run has its line.
+    size : (width, height), px
+    label : str
+        Of the axis of values.
+    unit : str
+        Of the final values at the ends of the curves.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    width, height = size
+    page = FigurePage(size, LIGHT, 1.0)
+    curves = []
+    quartile_bands: list[tuple[Array, Array] | None] = []
+    for band in bands:
+        low, middle, high = compute_quartiles(band.values)
+        curves.append(_build_curve(page, band, middle, unit))
+        quartile_bands.append((low, high) if len(band.values) > 1 else None)
+    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
+    right = _LABEL_MARGIN_PX + label_width
+    axes = page.add_axes((_LEFT_PX, _TOP_PX, width - _LEFT_PX - right, height - _HEIGHT_MARGINS_PX))
+    draw_curves(
+        axes,
+        curves,
+        LIGHT,
+        styles=[band.style for band in bands],
+        bands=quartile_bands,
+        label=label,
+        unit=unit,
+        weight=1.0 if width >= _FULL_WEIGHT_WIDTH_PX else _SMALL_WEIGHT,
+    )
+    return page.figure
+
+
+def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> Curve:
+    """Return the median of a band, with a name that fits with its final value into half of the page."""
+
+    def measure_end_label(name: str) -> float:
+        return page.measure_text(format_end_label((name, "", band.time, median), unit), bold=True)
+
+    max_width = 0.5 * page.size[0] - _LABEL_MARGIN_PX
+    name = shorten_text(band.label, measure_end_label, max_width, min_chars=1)
+    return name, band.style.name, band.time, median
+
+
+def compute_quartiles(values: Array) -> Array:
+    """Compute the quartiles and the median of runs over time.
+
+    Parameters
+    ----------
+    values : (m, T) array
+        Values that are not finite do not count.
+
+    Returns
+    -------
+    (3, T) array
+        First quartile, median and third quartile; nan at times without a value.
+    """
+    finite_values = np.where(np.isfinite(values), values, np.nan)
+    quartiles = np.full((3, values.shape[1]), np.nan)
+    has_value = ~np.isnan(finite_values).all(axis=0)
+    quartiles[:, has_value] = np.nanpercentile(finite_values[:, has_value], [25, 50, 75], axis=0)
+    return quartiles

@@ -1,0 +1,133 @@
+"""Plots of the distributions of final costs, as horizontal boxes with points."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from robocov.arrays import Array
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import TEXT, get_figure, set_value_axis, to_plot_color
+from robocov_app.figures.rows import (
+    HALF_BOX_HEIGHT,
+    MIN_BOX_VALUES,
+    arrange_rows,
+    create_row_axes,
+    draw_row_marks,
+    draw_row_median,
+    draw_row_points,
+    label_rows,
+)
+from robocov_app.look.curve_styles import CurveStyle
+from robocov_app.look.theme import LIGHT, Theme
+
+_WHISKER_LENGTH = 1.5
+"""Maximum length of whiskers, in lengths of the box."""
+_MARGIN_FRACTION = 0.06
+
+
+class Sample(NamedTuple):
+    """One value of each of several runs.
+
+    Attributes
+    ----------
+    label : str
+    style : CurveStyle
+    values : (m,) array
+    """
+
+    label: str
+    style: CurveStyle
+    values: Array
+
+
+@plain_style()
+def plot_final_costs(
+    groups: Sequence[tuple[str, Sequence[Sample]]],
+    label: str,
+    *,
+    width: int,
+    scale: float,
+    theme: Theme = LIGHT,
+    origin: float = 0.0,
+) -> Figure:
+    """Plot samples in groups, such as maps: boxes with the quartiles, and every value as a point.
+
+    Parameters
+    ----------
+    groups : sequence of (str, sequence of Sample)
+        Name of each group, which may be empty, and its samples. Values that are not finite are left out.
+        Samples of less than `MIN_BOX_VALUES` values have no box.
+    label : str
+        Of the axis of values.
+    width : int, px
+        Of the page, whose height depends on the number of samples.
+    scale : float
+        Of texts and lines.
+    theme : Theme
+    origin : float
+        The axis starts here unless all values are far from it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    samples = [sample for _, group in groups for sample in group]
+    positions = arrange_rows([(name, len(group)) for name, group in groups])
+    names = [sample.label for sample in samples]
+    axes, short_names = create_row_axes(positions.total, names, theme, width=width, scale=scale)
+    finite_values = [np.sort(sample.values[np.isfinite(sample.values)]) for sample in samples]
+    for sample, values, row in zip(samples, finite_values, positions.rows, strict=True):
+        draw_box(axes, values, row, sample.style, theme)
+    label_rows(axes, positions.rows, short_names, theme, label)
+    draw_row_marks(axes, positions.rows, [sample.style for sample in samples], theme)
+    set_value_axis(axes.xaxis, np.concatenate(finite_values), margin=_MARGIN_FRACTION, origin=origin)
+    group_names = [name for name, _ in groups]
+    _write_headings(axes, group_names, positions.headings, theme)
+    return get_figure(axes)
+
+
+def _write_headings(axes: Axes, names: Sequence[str], heights: Sequence[float], theme: Theme) -> None:
+    """Write the name of each group at the left edge of the page."""
+    box = axes.get_position()
+    left = -box.x0 / box.width + 0.01
+    for name, height in zip(names, heights, strict=True):
+        if name:
+            axes.text(
+                left,
+                height,
+                name,
+                transform=axes.get_yaxis_transform(),
+                fontsize=TEXT,
+                fontweight="bold",
+                va="center",
+                color=to_plot_color(theme.ink),
+            )
+
+
+def draw_box(axes: Axes, values: Array, row: float, style: CurveStyle, theme: Theme) -> None:
+    """Draw one row of sorted values: points, median, and a box with whiskers if there are enough values."""
+    draw_row_points(axes, values, row, style, theme)
+    low, middle, high = np.percentile(values, [25, 50, 75])
+    if len(values) >= MIN_BOX_VALUES:
+        color = to_plot_color(style.get_color(theme))
+        max_length = _WHISKER_LENGTH * (high - low)
+        start = values[values >= low - max_length].min()
+        end = values[values <= high + max_length].max()
+        line: dict[str, Any] = {"color": color, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
+        axes.plot([start, low], [row, row], **line)
+        axes.plot([high, end], [row, row], **line)
+        top = row - HALF_BOX_HEIGHT
+        bottom = row + HALF_BOX_HEIGHT
+        axes.fill(
+            [low, high, high, low],
+            [top, top, bottom, bottom],
+            facecolor=(*color, 0.14),
+            edgecolor=color,
+            linewidth=1.4,
+            zorder=2,
+        )
+    if len(values) > 1:
+        draw_row_median(axes, float(middle), row, theme)
