@@ -104,7 +104,7 @@ def test_reports_contain_saved_branches_and_sessions(
     assert main(["run", path, *SMALL, "--out", str(tmp_path / "branch")]) == 0
     assert main(["report", str(tmp_path / "branch")]) == 0
     page = (tmp_path / "branch" / "report.html").read_text()
-    titles = ["0.0 to 0.2 s, begun", "0.2 to 0.4 s, circle drawn", "0.4 to 0.6 s, robot 4 joined"]
+    titles = ["0.0 to 0.2 s, started", "0.2 to 0.4 s, circle drawn", "0.4 to 0.6 s, robot 4 joined"]
     assert all(f" · {title}</h2>" in page for title in titles)
     capsys.readouterr()
     assert main(["report", path]) == 0
