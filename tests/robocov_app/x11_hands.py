@@ -1,4 +1,4 @@
-"""Windows on a display that nobody sees, and hands for them: Xvfb and xdotool."""
+"""Windows on an invisible display, used by keys and mouse with Xvfb and xdotool."""
 
 import os
 import shutil
@@ -21,137 +21,172 @@ MARKS = [
     pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),
 ]
 
-PATIENCE = 45.0
+MAX_WAIT_S = 45.0
 
 
-def ended(process: subprocess.Popen) -> int:
-    """Wait for the end of a process, and see to it."""
+def wait_for_end(process: subprocess.Popen) -> int:
+    """Wait until a process ends, and return its status; kill it if that takes too long."""
     try:
-        return process.wait(PATIENCE)
+        return process.wait(MAX_WAIT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         return process.wait()
 
 
 @contextmanager
-def invisible_display(size: str = "1200x800x24") -> Iterator[str]:
-    """Start a display that nobody sees, on a number that is free."""
-    read, write = os.pipe()
+def start_display(size: str = "1200x800x24") -> Iterator[str]:
+    """Start an invisible display, and yield its name."""
+    read_end, write_end = os.pipe()
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", size, "-nolisten", "tcp", "-noreset"],
-        pass_fds=(write,),
+        ["Xvfb", "-displayfd", str(write_end), "-screen", "0", size, "-nolisten", "tcp", "-noreset"],
+        pass_fds=(write_end,),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    os.close(write)
+    os.close(write_end)
     try:
-        with os.fdopen(read) as told:
-            number = told.readline().strip()
+        with os.fdopen(read_end) as pipe:
+            number = pipe.readline().strip()
         assert number, "Xvfb did not start"
         yield f":{number}"
     finally:
         server.terminate()
-        ended(server)
+        wait_for_end(server)
 
 
 class Hands:
-    """Presses keys and the mouse in the window of a process."""
+    """Presses keys and moves the mouse in the window of a process.
+
+    Parameters
+    ----------
+    process : subprocess.Popen
+        The process.
+    display : str
+        Name of its display.
+    folder : Path
+        Folder in which the window saves screenshots.
+    """
 
     def __init__(self, process: subprocess.Popen, display: str, folder: Path) -> None:
-        self.process, self.folder = process, folder
-        self.shots = len(list(folder.glob("robocov-*.png")))
-        self.kept = {**os.environ, "DISPLAY": display}
+        self.process = process
+        self.folder = folder
+        self.screenshots = len(list(folder.glob("robocov-*.png")))
+        self.environment = {**os.environ, "DISPLAY": display}
         self.window = ""
 
-    def tool(self, *words: object) -> str:
-        done = subprocess.run(
-            ["xdotool", *map(str, words)], env=self.kept, capture_output=True, text=True, check=False
-        )
+    def run_xdotool(self, *arguments: object) -> str:
+        command = ["xdotool", *map(str, arguments)]
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
         return done.stdout.strip()
 
-    def until(self, there: Callable[[], object], what: str) -> None:
-        began = time.monotonic()
-        while not there():
-            assert self.process.poll() is None, f"it has ended before {what}: {said(self.process)}"
-            assert time.monotonic() - began < PATIENCE, f"no {what}"
+    def wait_until(self, condition: Callable[[], object], description: str) -> None:
+        started_at = time.monotonic()
+        while not condition():
+            errors = "" if self.process.poll() is None else read_errors(self.process)
+            assert self.process.poll() is None, f"the process has ended before {description}: {errors}"
+            assert time.monotonic() - started_at < MAX_WAIT_S, f"no {description}"
             time.sleep(0.03)
 
-    def find(self) -> None:
-        def found() -> bool:
-            self.window = self.tool("search", "--onlyvisible", "--pid", self.process.pid).split("\n")[0]
+    def find_window(self) -> None:
+        """Wait for the window, and give it the focus."""
+
+        def has_window() -> bool:
+            windows = self.run_xdotool("search", "--onlyvisible", "--pid", self.process.pid)
+            self.window = windows.split("\n")[0]
             return bool(self.window)
 
-        self.until(found, "window")
-        # there is no window manager that would do it
-        self.tool("windowfocus", "--sync", self.window)
+        self.wait_until(has_window, "window")
+        # There is no window manager that would give it the focus.
+        self.run_xdotool("windowfocus", "--sync", self.window)
         time.sleep(0.3)
 
-    def key(self, *names: str) -> None:
-        self.tool("key", "--delay", "60", *names)
+    def press(self, *keys: str) -> None:
+        self.run_xdotool("key", "--delay", "60", *keys)
 
     def move(self, x: float, y: float) -> None:
-        self.tool("mousemove", "--window", self.window, round(x), round(y))
+        self.run_xdotool("mousemove", "--window", self.window, round(x), round(y))
         time.sleep(0.06)
 
     def drag(self, *path: tuple[float, float]) -> None:
         self.move(*path[0])
-        self.tool("mousedown", 1)
+        self.run_xdotool("mousedown", 1)
         time.sleep(0.06)
-        for place in path[1:]:
-            self.move(*place)
-        self.tool("mouseup", 1)
+        for point in path[1:]:
+            self.move(*point)
+        self.run_xdotool("mouseup", 1)
         time.sleep(0.06)
 
     def click(self, x: float, y: float, *, times: int = 1) -> None:
         self.move(x, y)
-        self.tool("click", "--repeat", times, "--delay", 60, 1)
+        self.run_xdotool("click", "--repeat", times, "--delay", 60, 1)
         time.sleep(0.08)
 
     def type(self, text: str) -> None:
-        self.tool("type", "--delay", "25", text)
+        self.run_xdotool("type", "--delay", "25", text)
 
-    def shot(self) -> np.ndarray:
-        """Press F12, and return the picture that this saves; the first may come before anything is drawn."""
+    def take_screenshot(self) -> np.ndarray:
+        """Press F12, and return the saved picture. Pictures from before the first drawing are skipped."""
         while True:
-            self.shots += 1
-            path = self.folder / f"robocov-{self.shots}.png"
-            self.key("F12")
-            self.until(path.exists, f"picture {path.name}")
+            self.screenshots += 1
+            path = self.folder / f"robocov-{self.screenshots}.png"
+            self.press("F12")
+            self.wait_until(path.exists, f"picture {path.name}")
             with Image.open(path) as picture:
                 pixels = np.asarray(picture.convert("RGB")).astype(int)
             if pixels.any():
                 return pixels
 
-    def sees(self, there: Callable[[np.ndarray], object], what: str) -> np.ndarray:
-        """Return the first picture in which something is there; what was done is drawn a frame later."""
+    def wait_for_picture(self, condition: Callable[[np.ndarray], object], description: str) -> np.ndarray:
+        """Return the first picture that fulfills a condition. An action is drawn a frame later."""
         pictures = []
-        self.until(lambda: pictures.append(self.shot()) or there(pictures[-1]), what)
+
+        def is_fulfilled() -> object:
+            pictures.append(self.take_screenshot())
+            return condition(pictures[-1])
+
+        self.wait_until(is_fulfilled, description)
         return pictures[-1]
 
 
 @contextmanager
-def run_window(display: str, folder: Path, command: Sequence[object], **environment: str) -> Iterator[Hands]:
-    """Run a command that shows a window, with hands for it."""
-    kept = {
-        key: value for key, value in os.environ.items() if key not in ("SDL_VIDEODRIVER", "WAYLAND_DISPLAY")
-    }
-    kept |= {"DISPLAY": display, "SDL_VIDEODRIVER": "x11", **environment}
+def run_window(display: str, folder: Path, command: Sequence[object], **variables: str) -> Iterator[Hands]:
+    """Run a command that shows a window; yield hands for the window.
+
+    Parameters
+    ----------
+    display : str
+        Name of the display.
+    folder : Path
+        Folder in which the window saves screenshots.
+    command : sequence
+        Program and arguments.
+    **variables : str
+        Further environment variables.
+    """
+    environment = dict(os.environ)
+    environment.pop("WAYLAND_DISPLAY", None)
+    environment |= {"DISPLAY": display, "SDL_VIDEODRIVER": "x11", **variables}
     process = subprocess.Popen(
-        [str(word) for word in command], env=kept, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [str(argument) for argument in command],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     try:
         hands = Hands(process, display, folder)
-        hands.find()
+        hands.find_window()
         yield hands
     finally:
         if process.poll() is None:
             process.kill()
-        ended(process)
+        wait_for_end(process)
         for stream in (process.stdout, process.stderr):
             if stream is not None:
                 stream.close()
 
 
-def said(process: subprocess.Popen) -> str:
+def read_errors(process: subprocess.Popen) -> str:
+    """Return the error output of a process that has ended, without a warning of SDL."""
     assert process.stderr is not None
     return "\n".join(line for line in process.stderr.read().splitlines() if "XDG_RUNTIME_DIR" not in line)

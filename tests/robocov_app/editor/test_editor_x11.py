@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from called import COMMAND
 from PIL import Image
-from x11_hands import MARKS, PATIENCE, Hands, ended, invisible_display, run_window, said
+from x11_hands import MARKS, MAX_WAIT_S, Hands, read_errors, run_window, start_display, wait_for_end
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
@@ -30,7 +30,7 @@ PLAN = (0.0, 0.0, 12.0, 8.0)
 
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
-    with invisible_display() as number:
+    with start_display() as number:
         yield number
 
 
@@ -40,7 +40,7 @@ def edited(display: str, folder: Path, *words: object) -> Iterator[Hands]:
     command = [*COMMAND, "edit", *words, "--folder", folder, "--size", size, "--scale", "1"]
     places = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
     with run_window(display, folder, command, **places) as hands:
-        hands.shot()  # now it listens
+        hands.take_screenshot()  # now it listens
         yield hands
 
 
@@ -61,53 +61,53 @@ class Sheet:
 def test_a_floor_plan_from_nothing_to_a_running_demo_and_saved(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path) as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))  # the boundary that is offered
-        hands.key("b")
+        hands.press("b")
         hands.click(*at(0, 0))
         hands.move(*at(5, 5))
         hands.type("12 x 8")
-        hands.key("Return")
-        hands.key("f")
+        hands.press("Return")
+        hands.press("f")
         at = Sheet(PLAN)
 
-        hands.key("w")
+        hands.press("w")
         for point in ((4, 0), (4, 5)):
             hands.click(*at(*point))
-        hands.key("Return")
+        hands.press("Return")
         time.sleep(0.4)  # or it would be a double click
         hands.click(*at(8, 8))
         hands.move(*at(8, 6))
         hands.type("5")  # meters downwards
-        hands.key("Return", "Return")
-        hands.key("r")
+        hands.press("Return", "Return")
+        hands.press("r")
         hands.drag(at(9, 1), at(10, 1.5), at(11, 2))
-        hands.key("c")
+        hands.press("c")
         hands.drag(at(2, 2), at(2.3, 2), at(2.5, 2))
-        hands.key("p")
+        hands.press("p")
         for point in ((1, 5), (3, 5), (3, 7)):
             hands.click(*at(*point))
-        hands.key("Return")
-        hands.key("s")
+        hands.press("Return")
+        hands.press("s")
         hands.drag(at(6, 4), at(6.5, 4), at(7, 4))
-        drawn = hands.shot()
+        drawn = hands.take_screenshot()
         assert np.abs(drawn - drawn[5, 500]).max() > 60
 
-        hands.key("ctrl+s")
-        hands.key("ctrl+BackSpace")
+        hands.press("ctrl+s")
+        hands.press("ctrl+BackSpace")
         hands.type("plan")
-        hands.key("Return")
-        hands.until((tmp_path / "plan.json").exists, "saved map")
+        hands.press("Return")
+        hands.wait_until((tmp_path / "plan.json").exists, "saved map")
 
-        hands.key("F5")
+        hands.press("F5")
         tried = differs(hands, drawn, 0.3)  # cells are colored
         differs(hands, tried, 0.0)  # robots move
-        hands.key("F5")
+        hands.press("F5")
         time.sleep(0.5)
 
         # nothing was lost: what was done before can still be undone and done again
-        hands.key("ctrl+z", "ctrl+y", "ctrl+s")
-        hands.key("ctrl+q")
-        assert ended(hands.process) == 0, said(hands.process)
-        assert said(hands.process) == ""
+        hands.press("ctrl+z", "ctrl+y", "ctrl+s")
+        hands.press("ctrl+q")
+        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
+        assert read_errors(hands.process) == ""
 
     plan = load_map(tmp_path / "plan.json")
     assert sorted(plan.boundary) == [(0.0, 0.0), (0.0, 8.0), (12.0, 0.0), (12.0, 8.0)]
@@ -127,32 +127,32 @@ def differs(hands: Hands, from_picture: np.ndarray, part: float) -> np.ndarray:
     arena = np.s_[: SIZE[1] - 210, : SIZE[0] - 320]
     began = time.monotonic()
     while True:
-        picture = hands.shot()
+        picture = hands.take_screenshot()
         if (np.abs(picture - from_picture)[arena].max(axis=2) > 30).mean() > part:
             return picture
-        assert time.monotonic() - began < PATIENCE, "nothing happens"
+        assert time.monotonic() - began < MAX_WAIT_S, "nothing happens"
         time.sleep(0.2)
 
 
 def test_kill_9_in_the_middle_loses_nothing(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path) as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
-        hands.key("r")
+        hands.press("r")
         hands.drag(at(1, 1), at(2, 2), at(3, 3))
         hands.drag(at(5, 5), at(6, 6), at(7, 7))
-        hands.until(lambda: kept(tmp_path) == 2, "draft with both rectangles")
+        hands.wait_until(lambda: kept(tmp_path) == 2, "draft with both rectangles")
         hands.process.send_signal(signal.SIGKILL)
-        assert ended(hands.process) == -signal.SIGKILL
+        assert wait_for_end(hands.process) == -signal.SIGKILL
 
     with edited(display, tmp_path) as hands:
-        hands.key("Return")  # Recover
+        hands.press("Return")  # Recover
         time.sleep(0.3)
-        hands.key("ctrl+s", "ctrl+BackSpace")
+        hands.press("ctrl+s", "ctrl+BackSpace")
         hands.type("saved")
-        hands.key("Return")
-        hands.until((tmp_path / "saved.json").exists, "saved map")
-        hands.key("ctrl+q")
-        assert ended(hands.process) == 0, said(hands.process)
+        hands.press("Return")
+        hands.wait_until((tmp_path / "saved.json").exists, "saved map")
+        hands.press("ctrl+q")
+        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
     plan = load_map(tmp_path / "saved.json")
     assert [set(shape.vertices) for shape in plan.obstacles] == [
         {(1, 1), (3, 1), (3, 3), (1, 3)},
@@ -172,33 +172,33 @@ def kept(folder: Path) -> int:
 def test_a_question_before_unsaved_work_is_closed(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path, tmp_path / "fresh.json") as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
-        hands.key("c")
-        empty = hands.shot()
+        hands.press("c")
+        empty = hands.take_screenshot()
         hands.drag(at(5, 5), at(5.5, 5), at(6, 5))
         drawn = differs(hands, empty, 0.002)
-        hands.key("ctrl+q")
+        hands.press("ctrl+q")
         differs(hands, drawn, 0.002)  # there is a question
         assert hands.process.poll() is None
-        hands.key("Escape")  # cancel
-        hands.shot()
+        hands.press("Escape")  # cancel
+        hands.take_screenshot()
         assert hands.process.poll() is None
-        hands.key("ctrl+q", "s")
-        assert ended(hands.process) == 0, said(hands.process)
+        hands.press("ctrl+q", "s")
+        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
     assert not (tmp_path / "drafts").exists() or not list((tmp_path / "drafts").rglob("*.json"))
 
 
 def test_copies_go_from_one_window_to_another(display: str, tmp_path: Path) -> None:
     with edited(display, tmp_path) as first:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
-        first.key("r")
+        first.press("r")
         first.drag(at(1, 1), at(2, 2), at(3, 3))
-        first.key("ctrl+c")
-        first.shot()
+        first.press("ctrl+c")
+        first.take_screenshot()
         with edited(display, tmp_path, tmp_path / "second.json") as second:
-            second.key("ctrl+shift+v", "ctrl+s")
-            second.until((tmp_path / "second.json").exists, "saved map")
-            second.key("ctrl+q")
-            assert ended(second.process) == 0, said(second.process)
+            second.press("ctrl+shift+v", "ctrl+s")
+            second.wait_until((tmp_path / "second.json").exists, "saved map")
+            second.press("ctrl+q")
+            assert wait_for_end(second.process) == 0, read_errors(second.process)
     (pasted,) = load_map(tmp_path / "second.json").obstacles
     assert set(pasted.vertices) == {(1, 1), (3, 1), (3, 3), (1, 3)}
 
@@ -212,17 +212,17 @@ def test_a_picture_is_imported_with_the_room_that_was_clicked(display: str, tmp_
 
         def left_out() -> tuple[float, float]:
             """Return the middle of what is red, px; (0, 0) for nothing."""
-            red, green, blue = np.moveaxis(hands.shot(), 2, 0)
+            red, green, blue = np.moveaxis(hands.take_screenshot(), 2, 0)
             found = np.argwhere((red > 180) & (green < 160) & (blue < 160))
             return (0.0, 0.0) if len(found) < 1000 else (np.median(found[:, 1]), np.median(found[:, 0]))
 
-        hands.until(lambda: left_out()[0], "room that is left out")
+        hands.wait_until(lambda: left_out()[0], "room that is left out")
         x, y = left_out()
         hands.click(x, y)
-        hands.until(lambda: 0 < left_out()[0] < x - 50, "other room that is left out")
-        hands.key("Return", "ctrl+s")
-        hands.key("Return")
-        hands.until((tmp_path / "plan.json").exists, "saved map")
-        hands.key("ctrl+q")
-        assert ended(hands.process) == 0, said(hands.process)
+        hands.wait_until(lambda: 0 < left_out()[0] < x - 50, "other room that is left out")
+        hands.press("Return", "ctrl+s")
+        hands.press("Return")
+        hands.wait_until((tmp_path / "plan.json").exists, "saved map")
+        hands.press("ctrl+q")
+        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
     assert load_map(tmp_path / "plan.json").free_area == pytest.approx(56.0)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from called import COMMAND
 from served_window import served
-from x11_hands import MARKS, Hands, invisible_display, run_window
+from x11_hands import MARKS, Hands, run_window, start_display
 
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE
@@ -24,7 +24,7 @@ HANG_LIMIT_S = 40.0  # it takes a second at most; machines of tests may be busy
 
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
-    with invisible_display() as number:
+    with start_display() as number:
         yield number
 
 
@@ -64,27 +64,27 @@ def test_a_compiling_served_window_ends(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def draw_circle(hands: Hands) -> None:
-    hands.shot()
-    hands.key("c")
+    hands.take_screenshot()
+    hands.press("c")
     hands.drag((300, 300), (330, 300), (350, 300))
-    hands.shot()
+    hands.take_screenshot()
 
 
 def ask_to_save(hands: Hands) -> None:
-    hands.key("ctrl+q")
+    hands.press("ctrl+q")
 
 
 def choose_file(hands: Hands) -> None:
-    hands.key("ctrl+o")
+    hands.press("ctrl+o")
 
 
 def show_palette(hands: Hands) -> None:
-    hands.key("ctrl+k")
+    hands.press("ctrl+k")
 
 
 def start_drag(hands: Hands) -> None:
     hands.move(400, 400)
-    hands.tool("mousedown", 1)
+    hands.run_xdotool("mousedown", 1)
     hands.move(430, 430)
 
 

@@ -1,4 +1,4 @@
-"""The real window under X11: with real keys, a real mouse and a real end."""
+"""The viewer's window under X11, with keys, mouse and signals of the system."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import COMMAND
-from x11_hands import MARKS, Hands, ended, invisible_display, run_window, said
+from x11_hands import MARKS, Hands, read_errors, run_window, start_display, wait_for_end
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
 
@@ -23,97 +23,107 @@ SIZE = (1000, 640)
 
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
-    with invisible_display() as number:
+    with start_display() as number:
         yield number
 
 
 @contextmanager
-def shown(display: str, folder: Path, *words: str) -> Iterator[Hands]:
+def open_window(display: str, folder: Path) -> Iterator[Hands]:
     command = [*COMMAND, "demo", "square", "--folder", str(folder), "--size", f"{SIZE[0]}x{SIZE[1]}"]
-    options = ["--scale", "1", "--lattice", "16", "--robots", "3", "--paused", *words]
+    options = ["--scale", "1", "--lattice", "16", "--robots", "3", "--paused"]
     settings = folder / "settings"
     settings.mkdir(exist_ok=True)
-    (settings / "window.json").write_text("{}")  # not the first start, at which the lesson is offered
+    # With a settings file, the window does not offer the lesson.
+    (settings / "window.json").write_text("{}")
     with run_window(display, folder, [*command, *options], **{FOLDER_VARIABLE: str(settings)}) as hands:
         yield hands
 
 
-def test_keys_and_mouse_reach_the_window_and_it_ends_as_it_should(display: str, tmp_path: Path) -> None:
-    with shown(display, tmp_path) as hands:
-        first = hands.shot()
-        assert first.shape == (SIZE[1], SIZE[0], 3) and first.mean() > 190
+def test_keys_and_mouse_reach_the_window_until_it_is_closed(display: str, tmp_path: Path) -> None:
+    with open_window(display, tmp_path) as hands:
+        first = hands.take_screenshot()
+        assert first.shape == (SIZE[1], SIZE[0], 3)
+        assert first.mean() > 190
 
-        hands.key("t", "w")
-        dark = hands.sees(lambda picture: picture.mean() < 90, "dark window")
+        hands.press("t", "w")
+        dark = hands.wait_for_picture(lambda picture: picture.mean() < 90, "dark window")
 
-        hands.key("c")
+        hands.press("c")
         hands.drag((300, 200), (330, 200), (340, 200))
         hands.move(20, 20)
 
-        def pillar_there(picture: np.ndarray) -> bool:
+        def shows_pillar(picture: np.ndarray) -> bool:
             around = np.abs(picture - dark)[170:230, 270:330].max(axis=2)
             return (around > 20).mean() > 0.6
 
-        drawn = hands.sees(pillar_there, "pillar")
+        drawn = hands.wait_for_picture(shows_pillar, "pillar")
 
-        hands.key("v", "space")
+        hands.press("v", "space")
         time.sleep(0.4)
-        hands.key("space")
-        played = hands.sees(lambda picture: not np.array_equal(picture, drawn), "motion")
+        hands.press("space")
+        played = hands.wait_for_picture(lambda picture: not np.array_equal(picture, drawn), "motion")
 
-        hands.key("slash")
-        hands.tool("type", "--delay", "20", "robots 1")
-        hands.key("Return")
+        hands.press("slash")
+        hands.run_xdotool("type", "--delay", "20", "robots 1")
+        hands.press("Return")
         hands.move(20, 20)
         track = np.s_[SIZE[1] - 26 :]
-        alone = hands.sees(lambda picture: not np.array_equal(picture[track], played[track]), "time 0")
+
+        def has_restarted(picture: np.ndarray) -> bool:
+            return not np.array_equal(picture[track], played[track])
+
+        one_robot = hands.wait_for_picture(has_restarted, "time 0")
         hands.move(SIZE[0] - 234, 74)  # the field of the number of robots
-        hands.tool("click", 1)
-        hands.tool("type", "--delay", "20", "3")
-        hands.key("Return")
+        hands.run_xdotool("click", 1)
+        hands.run_xdotool("type", "--delay", "20", "3")
+        hands.press("Return")
         hands.move(20, 20)
-        hands.sees(lambda picture: np.abs(picture - alone)[:400, :600].max() > 60, "three robots")
-        hands.key("ctrl+shift+s")
-        hands.until(lambda: (tmp_path / "square-1.json").exists(), "saved map")
+        hands.wait_for_picture(
+            lambda picture: np.abs(picture - one_robot)[:400, :600].max() > 60, "three robots"
+        )
+        hands.press("ctrl+shift+s")
+        hands.wait_until(lambda: (tmp_path / "square-1.json").exists(), "saved map")
         (pillar,) = json.loads((tmp_path / "square-1.json").read_text())["obstacles"]
-        assert pillar["kind"] == "circle" and pillar["radius"] > 0.3
+        assert pillar["kind"] == "circle"
+        assert pillar["radius"] > 0.3
 
-        hands.key("ctrl+q")
-        assert ended(hands.process) == 0, said(hands.process)
-        assert said(hands.process) == ""
+        hands.press("ctrl+q")
+        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
+        assert read_errors(hands.process) == ""
     settings = json.loads((tmp_path / "settings/window.json").read_text())
-    assert settings["theme"] == "dark" and (settings["width"], settings["height"]) == (1280, 720)
+    assert settings["theme"] == "dark"
+    assert (settings["width"], settings["height"]) == (1280, 720)
 
 
-def test_full_screen_and_back(display: str, tmp_path: Path) -> None:
-    with shown(display, tmp_path) as hands:
-        hands.shot()
+def test_full_screen_can_be_switched_on_and_off(display: str, tmp_path: Path) -> None:
+    with open_window(display, tmp_path) as hands:
+        hands.take_screenshot()
         for shape in ((800, 1200, 3), (SIZE[1], SIZE[0], 3)):
-            hands.key("F11")
+            hands.press("F11")
             time.sleep(0.5)
-            hands.find()
-            picture = hands.shot()
+            hands.find_window()
+            picture = hands.take_screenshot()
             assert picture.shape == shape
-            assert picture[:, -1].mean() > 190  # the panel is at the edge again
-        hands.key("F11")
+            assert picture[:, -1].mean() > 190, "the panel is at the right edge"
+        hands.press("F11")
         time.sleep(0.5)
-        hands.find()
-        hands.key("ctrl+q")
-        assert ended(hands.process) == 0, said(hands.process)
-        assert said(hands.process) == ""
+        hands.find_window()
+        hands.press("ctrl+q")
+        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
+        assert read_errors(hands.process) == ""
     settings = json.loads((tmp_path / "settings/window.json").read_text())
-    assert (settings["width"], settings["height"]) == (1280, 720), "options hold for one start"
+    assert (settings["width"], settings["height"]) == (1280, 720), "the option --size is not saved"
 
 
-def test_a_signal_closes_it_cleanly_and_ends_its_film(display: str, tmp_path: Path) -> None:
-    with shown(display, tmp_path) as hands:
-        hands.key("space", "t", "F9")
-        hands.until(lambda: list(tmp_path.glob("*.mp4")), "film")
+def test_a_signal_closes_the_window_and_completes_its_video(display: str, tmp_path: Path) -> None:
+    with open_window(display, tmp_path) as hands:
+        hands.press("space", "t", "F9")
+        hands.wait_until(lambda: list(tmp_path.glob("*.mp4")), "video")
         time.sleep(0.5)
         hands.process.send_signal(signal.SIGTERM)
-        status = ended(hands.process)
-        words = said(hands.process)
-        assert status == 0 and words == ""
+        status = wait_for_end(hands.process)
+        assert status == 0
+        assert read_errors(hands.process) == ""
     import imageio_ffmpeg
 
     assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "robocov-1.mp4"))[0] > 3
