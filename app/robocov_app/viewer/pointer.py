@@ -10,7 +10,7 @@ from robocov_app.toolkit.mouse_cursor import MouseCursor
 from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
 from robocov_app.toolkit.tool import CursorShape
 from robocov_app.viewer.canvas import ViewerCanvas
-from robocov_app.viewer.chart import Chart
+from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.tools.snapping import MapSnapper

@@ -17,7 +17,7 @@ from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.canvas import ViewerCanvas
-from robocov_app.viewer.chart import Chart
+from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.commands import GROUPS, list_parameter_commands, list_viewer_commands
 from robocov_app.viewer.cost_curves import CostCurves
 from robocov_app.viewer.lesson_guide import LessonGuide

@@ -8,7 +8,7 @@ from robocov_app.toolkit.command import Command, CommandGroup
 from robocov_app.toolkit.command_window import Action, WindowActions
 from robocov_app.toolkit.viewport import PAN_STEP_PX, ZOOM_STEP
 from robocov_app.viewer.canvas import ViewerCanvas
-from robocov_app.viewer.chart import Chart
+from robocov_app.viewer.chart.chart import Chart
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,77 @@
+"""Captions at the right of the chart: the displayed value of each curve, and its gap to the best."""
+
+import pygame
+
+from robocov_app.look.labels import spread_labels
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.fonts import shorten_to_width
+from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.viewer.chart.curves import map_curve_colors
+from robocov_app.viewer.chart.frame import ChartFrame
+from robocov_app.viewer.chart.scale import ChartScale
+
+# Lengths in pixels at scale 1.
+MIN_CAPTION_GAP_PX = 15.0
+"""Minimum distance between the middles of captions."""
+_LEFT_PX = 9
+_RIGHT_PX = 6
+_BOTTOM_PX = 8
+_MAX_PERCENT_WITH_DECIMAL = 99.95
+
+
+def draw_captions(screen: pygame.Surface, frame: ChartFrame, scale: ChartScale) -> None:
+    """Draw the captions onto the window; they are newer than the page.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    frame : ChartFrame
+    scale : ChartScale
+        That of the page.
+    """
+    chart = screen.subsurface(pygame.Rect(frame.layout.chart).clip(screen.get_rect()))
+    canvas = create_flat_canvas(chart, frame.theme, frame.scale)
+    size = frame.theme.small_text
+    _, values = frame.session.displayed.get_costs(frame.quantity.name)
+    colors = map_curve_colors(frame.timeline.panes, frame.theme)
+    panes = [pane for pane in frame.timeline.panes if pane.number in values]
+    panes.sort(key=lambda pane: -values[pane.number])
+    gap = MIN_CAPTION_GAP_PX * frame.scale
+    rows = spread_labels(
+        [scale.to_row(values[pane.number]) for pane in panes],
+        gap=gap,
+        low=0.5 * gap,
+        high=frame.layout.chart[3] - _BOTTOM_PX * frame.scale,
+    )
+    left = frame.times.right + _LEFT_PX * frame.scale
+    for row, pane in zip(rows, panes, strict=True):
+        value = values[pane.number]
+        text = f"{value:.3f}"
+        if len(values) > 1:
+            text += format_gap(value, min(values.values()))
+            width = chart.get_width() - left - _RIGHT_PX * frame.scale
+            text = _add_name(canvas, pane.controller.label, text, width)
+        canvas.draw_text(text, (left, row), color=colors[pane.number], bold=True, size=size)
+
+
+def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:
+    """Return a name and a text, the name shortened so that both fit into a width, px."""
+    size = canvas.theme.small_text
+    name_width = width - canvas.measure_text(f"  {text}", size, bold=True)
+    short_name = shorten_to_width(name, canvas.scale_text_size(size), name_width, bold=True)
+    return f"{short_name}  {text}"
+
+
+def format_gap(value: float, best: float) -> str:
+    """Return how much a value is above the best one, as text.
+
+    Examples
+    --------
+    >>> format_gap(2.2, 2.0), format_gap(5.0, 2.0), format_gap(2.0, 2.0)
+    ('  +10.0 %', '  +150 %', '  best')
+    """
+    if value <= best:
+        return "  best"
+    percent = 100 * (value / best - 1)
+    decimals = 1 if percent < _MAX_PERCENT_WITH_DECIMAL else 0
+    return f"  +{percent:.{decimals}f} %"

@@ -1,0 +1,167 @@
+"""The chart of the coverage cost against time, and the time line below it."""
+
+import numpy as np
+import pygame
+
+from robocov_app.look.theme import Theme
+from robocov_app.toolkit.layout import Box, Layout, is_inside
+from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.viewer.chart.axes import draw_axes, draw_computation_state, draw_switch, draw_title
+from robocov_app.viewer.chart.captions import draw_captions
+from robocov_app.viewer.chart.curves import (
+    GHOST_REACH_PX,
+    GhostLine,
+    draw_curves,
+    draw_ghosts,
+    find_nearest_ghost,
+)
+from robocov_app.viewer.chart.events import draw_events
+from robocov_app.viewer.chart.frame import ChartFrame
+from robocov_app.viewer.chart.pointer_tag import draw_pointer_tag
+from robocov_app.viewer.chart.scale import ChartScale, TimeScale, build_chart_scale
+from robocov_app.viewer.chart.time_line import draw_empty_time_line, draw_present
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.past.curves import DISTANCE, TIME, PlottedQuantity
+
+REFRESH_INTERVAL_S = 0.1
+"""Curves that grow are drawn again after this time, not in each frame."""
+
+
+class Chart:
+    """Chart and time line of a session. The parts that seldom change are drawn once, on a page.
+
+    Parameters
+    ----------
+    viewer : Presenter
+
+    Attributes
+    ----------
+    hover : (x, y) or None, px
+        Position of the pointer in the window.
+    ghosts : list of GhostLine
+        Curves of other branches on the page.
+    switch_box : Box or None
+        Box in the window that switches to the other quantity; None if there is none.
+    """
+
+    def __init__(self, viewer: Presenter) -> None:
+        self.viewer = viewer
+        self.hover: tuple[int, int] | None = None
+        self.ghosts: list[GhostLine] = []
+        self.switch_box: Box | None = None
+        self._quantity = DISTANCE
+        self._page: pygame.Surface | None = None
+        self._scale: ChartScale
+        self._page_key: object = None
+        self._page_samples: object = None
+        self._page_time = -1.0
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Adopt the layout and the theme of the window."""
+        self._layout = layout
+        self._theme = theme
+        self._page = None
+
+    @property
+    def plotted(self) -> PlottedQuantity:
+        """The quantity that the chart shows."""
+        return self._quantity if self._has_times else DISTANCE
+
+    @property
+    def times(self) -> TimeScale:
+        """The axis of times, in pixels of the window."""
+        return self._frame.times
+
+    @property
+    def _has_times(self) -> bool:
+        """Whether mean times are known, since robots are not equally fast."""
+        return any(len(pane.curves["time"]) for pane in self.viewer.session.timeline.panes)
+
+    @property
+    def _frame(self) -> ChartFrame:
+        return ChartFrame(self._layout, self._theme, self.viewer.session, self.plotted)
+
+    def switch_quantity(self) -> str:
+        """Show the other quantity, and return the status message."""
+        if not self._has_times:
+            return "all robots are equally fast: the mean time is proportional to the mean distance"
+        self._quantity = TIME if self.plotted is DISTANCE else DISTANCE
+        self._page = None
+        title = self._quantity.title
+        return f"plotted: {title[:1].lower()}{title[1:]}"
+
+    def is_on_switch(self, pixel: tuple[int, int]) -> bool:
+        """Return whether a click at a pixel of the window switches the quantity."""
+        return self.switch_box is not None and is_inside(self.switch_box, pixel)
+
+    def find_ghost(self, pixel: tuple[int, int]) -> int | None:
+        """Return the node of the branch whose curve is at a pixel of the window; None without one."""
+        point = np.array([pixel[0], pixel[1] - self._layout.chart[1]])
+        return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self._layout.scale)
+
+    def to_time(self, column: float) -> float:
+        """Return the time, s, of a column of the window, within the session."""
+        end_time = self.viewer.session.timeline.end_time
+        return float(np.clip(self.times.to_time(column), 0.0, end_time))
+
+    def to_column(self, time: float) -> float:
+        """Return the column of a time, s, in the window."""
+        return self.times.to_column(time)
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw the chart and the time line onto the window."""
+        frame = self._frame
+        page = self._page
+        if self._update_page_key(frame) or page is None:
+            page = self._draw_page(frame)
+        screen.blit(page, self._layout.chart[:2])
+        draw_captions(screen, frame, self._scale)
+        draw_present(screen, frame)
+        if self.hover is not None:
+            draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]))
+
+    def _update_page_key(self, frame: ChartFrame) -> bool:
+        """Update the key of what the page shows; return whether the page has to be drawn again."""
+        timeline = frame.timeline
+        samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in frame.list_curves()]
+        key = (
+            tuple(pane.number for pane in timeline.panes),
+            len(timeline.events),
+            len(timeline.ghosts),
+            frame.times,
+            frame.quantity,
+            self.viewer.costs.state,
+            None if timeline.is_live else frame.session.displayed.time,
+            timeline.past_version,
+        )
+        is_old = self.viewer.now - self._page_time >= REFRESH_INTERVAL_S
+        has_grown = is_old and samples != self._page_samples
+        if self._page is not None and key == self._page_key and not has_grown:
+            return False
+        self._page_key = key
+        self._page_samples = samples
+        return True
+
+    def _draw_page(self, frame: ChartFrame) -> pygame.Surface:
+        """Draw the parts that seldom change: axes, events, curves and the time line."""
+        layout = frame.layout
+        page = pygame.Surface((layout.chart[2], layout.chart[3] + layout.track[3]), 0, 32)
+        self._page = page
+        self._page_time = self.viewer.now
+        curves = [curve.values for curve in frame.list_curves()]
+        ghosts = [ghost.values for ghost in frame.list_ghosts()]
+        scale = build_chart_scale(frame.times, layout, curves + ghosts)
+        self._scale = scale
+        canvas = create_flat_canvas(page, frame.theme, frame.scale)
+        page.fill(frame.theme.panel)
+        title_end = draw_title(canvas, frame)
+        self.switch_box = draw_switch(canvas, frame, title_end) if self._has_times else None
+        draw_computation_state(
+            canvas, frame, self.viewer.costs.state, left=title_end, right=scale.times.right
+        )
+        draw_axes(canvas, frame, scale)
+        draw_events(canvas, frame, scale)
+        self.ghosts = draw_ghosts(canvas, frame, scale)
+        draw_curves(canvas, frame, scale)
+        draw_empty_time_line(canvas, frame, scale.times)
+        return page

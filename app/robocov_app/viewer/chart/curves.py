@@ -1,0 +1,139 @@
+"""Curves of the panes and of other branches."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.look.colors import Color, mix
+from robocov_app.look.robot_colors import choose_curve_colors
+from robocov_app.look.theme import Theme
+from robocov_app.render.canvas import Canvas
+from robocov_app.viewer.chart.frame import ChartFrame
+from robocov_app.viewer.chart.scale import ChartScale
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.curves import GhostCurve
+
+GHOST_REACH_PX = 6.0
+"""A click within this distance of the curve of another branch opens it, at scale 1."""
+MIN_DASHED_POINTS = 12
+"""Curves of other branches with at least this many points are dashed."""
+MIN_THINNED_POINTS = 400
+"""Curves with at least this many points are thinned."""
+_MAX_POINTS_PER_PX = 1.5
+_CURVE_WIDTH_PX = 1.8
+_GHOST_STRENGTH = 0.45
+_SEGMENTS_PER_DASH = 4
+"""Number of segments from one dash to the next; the last of them is left out."""
+
+# Position of the name of a branch relative to the end of its curve, px at scale 1.
+_NAME_LEFT_PX = 4
+_NAME_UP_PX = 9
+
+
+class GhostLine(NamedTuple):
+    """Curve of another branch as it is drawn.
+
+    Attributes
+    ----------
+    node : int
+        Node at which the branch ends.
+    points : (k, 2) array, px
+        On the page of the chart.
+    """
+
+    node: int
+    points: Array
+
+
+def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
+    """Draw the curve of each pane."""
+    panes = frame.timeline.panes
+    colors = map_curve_colors(panes, frame.theme)
+    for pane in panes:
+        curve = pane.curves[frame.quantity.name]
+        points = thin_points(scale.to_points(curve.times, curve.values))
+        if len(points) > 1:
+            segments = np.hstack([points[:-1], points[1:]])
+            canvas.draw_segments(segments, colors[pane.number], canvas.scale_width(_CURVE_WIDTH_PX))
+
+
+def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[GhostLine]:
+    """Draw the curves of other branches, pale and dashed, with their names at their ends.
+
+    Returns
+    -------
+    list of GhostLine
+    """
+    lines = []
+    for ghost in frame.list_ghosts():
+        points = scale.to_points(ghost.times, ghost.values)
+        lines.append(GhostLine(ghost.node, points))
+        controller_color = frame.theme.get_controller_color(ghost.controller)
+        color = mix(frame.theme.panel, controller_color, _GHOST_STRENGTH)
+        _draw_ghost_line(canvas, points, color)
+        if len(points):
+            _draw_ghost_name(canvas, frame, ghost, points[-1], color)
+    return lines
+
+
+def _draw_ghost_line(canvas: Canvas, points: Array, color: Color) -> None:
+    is_dashed = len(points) >= MIN_DASHED_POINTS
+    for index in range(len(points) - 1):
+        is_gap = is_dashed and index % _SEGMENTS_PER_DASH == _SEGMENTS_PER_DASH - 1
+        if not is_gap:
+            canvas.draw_line(points[index].tolist(), points[index + 1].tolist(), color)
+
+
+def _draw_ghost_name(canvas: Canvas, frame: ChartFrame, ghost: GhostCurve, end: Array, color: Color) -> None:
+    """Draw the description of a branch at the end, (2,) px, of its curve."""
+    size = frame.theme.small_text
+    name_width = canvas.measure_text(ghost.description, size)
+    right = max(end[0] - _NAME_LEFT_PX * frame.scale, frame.times.left + name_width)
+    position = (right, end[1] - _NAME_UP_PX * frame.scale)
+    canvas.draw_text(ghost.description, position, size=size, color=color, anchor="right")
+
+
+def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) -> int | None:
+    """Return the node of the branch whose curve is nearest to a point of the page.
+
+    Parameters
+    ----------
+    ghosts : sequence of GhostLine
+    point : (2,) array, px
+    reach : float, px
+        Maximum distance.
+
+    Returns
+    -------
+    int or None
+        None if no curve is within reach.
+    """
+    nearest_node = None
+    min_distance = reach
+    for ghost in ghosts:
+        distance = float(np.hypot(*(ghost.points - point).T).min())
+        if distance < min_distance:
+            min_distance = distance
+            nearest_node = ghost.node
+    return nearest_node
+
+
+def map_curve_colors(panes: Sequence[Pane], theme: Theme) -> dict[int, Color]:
+    """Return the color of the curve of each pane by its number."""
+    controllers = {pane.number: pane.controller.name for pane in panes}
+    colors = choose_curve_colors(list(controllers.values()), theme)
+    return dict(zip(controllers, colors, strict=True))
+
+
+def thin_points(points: Array) -> Array:
+    """Drop points of a curve, (k, 2) px, that are too close to the next one to be told apart.
+
+    The last point always stays, since the curve grows there.
+    """
+    if len(points) < MIN_THINNED_POINTS:
+        return points
+    columns = np.rint(points[:, 0] * _MAX_POINTS_PER_PX)
+    is_last_in_column = np.append(columns[1:] != columns[:-1], True)
+    return np.asarray(points[is_last_in_column])

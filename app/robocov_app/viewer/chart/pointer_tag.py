@@ -1,0 +1,58 @@
+"""The tag at the pointer: events or values at its time."""
+
+import numpy as np
+import pygame
+
+from robocov_app.look.colors import mix
+from robocov_app.toolkit.layout import is_inside
+from robocov_app.toolkit.overlay import create_flat_canvas, draw_tag
+from robocov_app.viewer.chart.events import describe_events_at
+from robocov_app.viewer.chart.frame import ChartFrame
+from robocov_app.viewer.chart.scale import TOP_PX
+
+# Position of the tag relative to the pointer's column and the top of the curves, px at scale 1.
+_LEFT_PX = 12
+_TOP_GAP_PX = 16
+
+
+def draw_pointer_tag(screen: pygame.Surface, frame: ChartFrame, pixel: tuple[int, int], time: float) -> None:
+    """Draw the tag onto the window, if the pointer is over the curves or the time line.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    frame : ChartFrame
+    pixel : (int, int), px
+        The pointer in the window.
+    time : float, s
+        The time at the pointer.
+    """
+    if not _is_over_axis(frame, pixel):
+        return
+    theme = frame.theme
+    scale = frame.scale
+    times = frame.times
+    top = frame.layout.chart[1]
+    column = round(times.to_column(time))
+    frame.draw_rule(screen, column, mix(theme.panel, theme.ink, 0.35), top=top)
+    text = describe_events_at(frame, pixel[0]) or _describe_values(frame, time)
+    text_width = create_flat_canvas(screen, theme, scale).measure_text(text)
+    left = min(column + _LEFT_PX * scale, times.right - text_width)
+    draw_tag(screen, text, (left, top + (TOP_PX + _TOP_GAP_PX) * scale), theme, scale)
+
+
+def _is_over_axis(frame: ChartFrame, pixel: tuple[int, int]) -> bool:
+    """Return whether a pixel of the window is over the curves or the time line."""
+    is_in_box = is_inside(frame.layout.chart, pixel) or is_inside(frame.layout.track, pixel)
+    times = frame.times
+    return is_in_box and times.left <= pixel[0] <= times.right
+
+
+def _describe_values(frame: ChartFrame, time: float) -> str:
+    """Return the values of all curves at a time, s, as text."""
+    texts = [f"{time:.1f} s"]
+    for pane in frame.timeline.panes:
+        value = pane.curves[frame.quantity.name].interpolate(time)
+        if np.isfinite(value):
+            texts.append(f"{pane.controller.label} {value:.3f} {frame.quantity.unit}")
+    return "   ".join(texts)

@@ -1,0 +1,106 @@
+"""The time line below the chart."""
+
+from functools import partial
+
+import pygame
+
+from robocov_app.look.colors import Color, mix
+from robocov_app.render import sprites
+from robocov_app.render.canvas import Canvas
+from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.viewer.chart.frame import ChartFrame
+from robocov_app.viewer.chart.scale import TimeScale
+
+# Lengths in pixels at scale 1.
+_THICKNESS_PX = 5
+_MIN_THICKNESS_PX = 4
+_TITLE_LEFT_PX = 12
+_STATE_GAP_PX = 9
+_EVENT_DOT_PX = 5
+_MIN_EVENT_DOT_RADIUS_PX = 2.0
+_HANDLE_RADIUS_PX = 6.5
+_HANDLE_RING_PX = 2.0
+
+
+def draw_empty_time_line(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> None:
+    """Draw the bar of the time line, and whether the present or the past is shown.
+
+    Parameters
+    ----------
+    canvas : Canvas
+        Of the page, on which the time line is below the chart.
+    frame : ChartFrame
+    times : TimeScale
+        That of the page.
+    """
+    theme = frame.theme
+    top = frame.layout.chart[3]
+    middle = top + 0.5 * frame.layout.track[3]
+    canvas.surface.fill(theme.panel, pygame.Rect(0, top, *frame.layout.track[2:]))
+    thickness = _get_thickness(frame)
+    bar = pygame.Rect(
+        round(times.left), round(middle - thickness / 2), round(times.right - times.left), thickness
+    )
+    pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), bar, border_radius=thickness)
+    title_position = (_TITLE_LEFT_PX * frame.scale, middle)
+    canvas.draw_text("time", title_position, color=theme.faint, size=theme.small_text)
+    _draw_state(canvas, frame, times.right + _STATE_GAP_PX * frame.scale, middle)
+
+
+def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -> None:
+    """Draw whether the present is shown, and whether the past is coarser than it was."""
+    theme = frame.theme
+    size = theme.small_text
+    if not frame.timeline.is_live:
+        canvas.draw_text("past", (left, middle), color=theme.final, bold=True, size=size)
+        return
+    if not frame.timeline.history.thinned:
+        canvas.draw_text("live", (left, middle), color=theme.start, bold=True, size=size)
+        return
+    text = "live · past thinned"
+    if left + canvas.measure_text(text, size=size) > frame.layout.track[2]:
+        text = "thinned"
+    canvas.draw_text(text, (left, middle), color=theme.start, size=size)
+
+
+def draw_present(screen: pygame.Surface, frame: ChartFrame) -> None:
+    """Draw the simulated and the displayed time onto the window, and the events."""
+    theme = frame.theme
+    times = frame.times
+    timeline = frame.timeline
+    canvas = create_flat_canvas(screen, theme, frame.scale)
+    middle = frame.layout.track[1] + 0.5 * frame.layout.track[3]
+    column = times.to_column(frame.session.displayed.time)
+    end_column = times.to_column(timeline.end_time)
+    _fill_bar(screen, frame, end_column, mix(theme.panel, theme.ink, 0.4))
+    if not timeline.is_live:
+        _fill_bar(screen, frame, column, theme.final)
+        frame.draw_rule(screen, column, theme.final, top=frame.layout.chart[1])
+    dot_radius = max(_MIN_EVENT_DOT_RADIUS_PX, round(_EVENT_DOT_PX * frame.scale) / 2)
+    dot = partial(sprites.render_dot, dot_radius, theme.ink)
+    for event in timeline.events:
+        canvas.draw_sprite(dot, (times.to_column(event.time), middle))
+    handle = partial(
+        sprites.render_disc,
+        round(2 * _HANDLE_RADIUS_PX * frame.scale) / 2,
+        fill=theme.ink if timeline.is_live else theme.final,
+        ring=theme.background,
+        ring_width=_HANDLE_RING_PX * frame.scale,
+        edge=theme.faint,
+    )
+    canvas.draw_sprite(handle, (column, middle))
+
+
+def _fill_bar(screen: pygame.Surface, frame: ChartFrame, end: float, color: Color) -> None:
+    """Fill the time line in the window from its start to a column."""
+    thickness = _get_thickness(frame)
+    middle = frame.layout.track[1] + 0.5 * frame.layout.track[3]
+    left = round(frame.times.to_column(0.0))
+    width = max(round(end) - left, thickness)
+    bar = pygame.Rect(left, round(middle - thickness / 2), width, thickness)
+    pygame.draw.rect(screen, color, bar, border_radius=thickness)
+
+
+def _get_thickness(frame: ChartFrame) -> int:
+    """Return the thickness of the time line, px."""
+    return max(_MIN_THICKNESS_PX, round(_THICKNESS_PX * frame.scale))
