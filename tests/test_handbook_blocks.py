@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from fuzz_seeds import IMDF, imdf_zip
-from swept import InProcess
+from swept import DirectExecutor
 
 from robocov.errors import InputError
 from robocov_app.benchmark import suite
@@ -49,8 +49,8 @@ def parsed_alone(words: list[str]) -> None:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder; sweeps in this process, tracks of half a second."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
-    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", InProcess)
+    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
+    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", DirectExecutor)
     for name in suite.QUICK_TRACKS:
         track = replace(suite.TRACKS[name], duration=0.5, maps=suite.TRACKS[name].maps[:1])
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Small studies and what comes of them, for the tests of sweeps."""
+"""Small studies, controllers and results for the tests of sweeps."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Mine:
 PULL = "        return self.pull * (own.centroid - own.position)\n"
 
 
-def small_study(**changes: Any) -> Study:
-    """A study whose runs take some hundredths of a second."""
-    said: dict[str, Any] = {
+def build_small_study(**changes: Any) -> Study:
+    """Build a study whose runs take some hundredths of a second."""
+    options: dict[str, Any] = {
         "maps": (StudyMap("room", ROOM),),
         "controllers": ("rapf", "rpf"),
         "seeds": range(2),
@@ -47,26 +47,28 @@ def small_study(**changes: Any) -> Study:
         "lattice": 8,
         "record_hz": 4.0,
     }
-    return Study(**said | changes)
+    return Study(**options | changes)
 
 
-def controller(folder: Path, law: str, name: str = "mine.py") -> str:
-    """Write a controller of one's own, of which `law` is the beginning; return its name."""
-    (folder / name).write_text(HEAD + law + PULL)
+def write_controller(folder: Path, code: str, name: str = "mine.py") -> str:
+    """Write a controller whose method starts with some code, and return its name."""
+    (folder / name).write_text(HEAD + code + PULL)
     return f"{folder / name}:Mine"
 
 
-def tables(folder: Path) -> list[bytes]:
+def read_tables(folder: Path) -> list[bytes]:
+    """Return the content of the tables of a sweep."""
     return [path.read_bytes() for path in sorted(folder.glob("results.*"))]
 
 
-def run_folders(folder: Path) -> list[str]:
+def list_run_folders(folder: Path) -> list[str]:
+    """Return the names of the folders of runs."""
     runs = folder / "runs"
     return sorted(path.name for path in runs.iterdir()) if runs.is_dir() else []
 
 
-class InProcess(Executor):
-    """Does tasks in this process, in place of a `LocalPool`."""
+class DirectExecutor(Executor):
+    """Executes tasks in this process, instead of a `LocalPool`."""
 
     capacity = 2
 

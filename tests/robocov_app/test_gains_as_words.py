@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from driven_window import open_viewer
 from reported_results import build_result, build_run
-from swept import ROOM, InProcess, small_study
+from swept import ROOM, DirectExecutor, build_small_study
 
 from robocov.errors import InputError, ParameterError
 from robocov.mapfile import save_map
@@ -115,8 +115,8 @@ def swept_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("words") / "out"
     gains = {"rapf": {"target": ["centroid", "median"]}}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
-        sweep(small_study(gains=gains), folder, quiet=True)
+        patch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
+        sweep(build_small_study(gains=gains), folder, quiet=True)
     return folder
 
 

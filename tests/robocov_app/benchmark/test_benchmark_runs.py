@@ -20,7 +20,7 @@ from called import COMMAND, answer, complaint
 from driven_browser import CHROMIUM, DRIVER, Browser
 from hypothesis import given
 from hypothesis import strategies as st
-from swept import HEAD, PULL, InProcess
+from swept import HEAD, PULL, DirectExecutor
 
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.page import ParetoPoint, build_page, find_pareto_front, place_labels
@@ -47,8 +47,8 @@ def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("ideal", "lossy"):
         track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,))
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
-    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
-    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", InProcess)
+    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
+    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", DirectExecutor)
 
 
 def run_short_benchmark(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 import pytest
-from swept import InProcess
+from swept import DirectExecutor
 
 from robocov_app.runs import artifacts
 from robocov_app.runs import cost as run_cost
@@ -11,7 +11,7 @@ def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
     """Pictures of distances from few sites, and sweeps in this process; but for the thorough run."""
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr(run_cost, "MIN_FIGURE_LATTICE", 32)
-        monkeypatch.setattr(sweeping, "LocalPool", InProcess)
+        monkeypatch.setattr(sweeping, "LocalPool", DirectExecutor)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from called import answer, complaint
-from swept import ROOM, controller, run_folders, tables
+from swept import ROOM, list_run_folders, read_tables, write_controller
 
 from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
@@ -29,7 +29,7 @@ k_rep = [1, 3]
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
     save_map(ROOM, tmp_path / "room.json")
-    controller(tmp_path, "")
+    write_controller(tmp_path, "")
     path = tmp_path / "study.toml"
     path.write_text(STUDY)
     return path
@@ -161,11 +161,11 @@ def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
         patch.setattr(Path, "write_bytes", full)
         said = complaint(capsys, *words, "--json")
     assert said.endswith("cannot be written: No space left on device")
-    assert run_folders(out) == []
+    assert list_run_folders(out) == []
     assert answer(capsys, *words)["done"] == 8
     again = study.parent / "again"
     answer(capsys, "sweep", str(study), "--out", str(again), "--workers", "1")
-    assert tables(again) == tables(out)
+    assert read_tables(again) == read_tables(out)
 
 
 @pytest.mark.parametrize("name", ["results.csv", "results.parquet", "runs", "study.json", ".lock"])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from called import complaint
-from swept import ROOM, InProcess, controller
+from swept import ROOM, DirectExecutor, write_controller
 
 from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
@@ -39,7 +39,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run, a comparison and a sweep of controllers whose code has become evil since."""
     folder = tmp_path_factory.mktemp("shared")
     save_map(ROOM, folder / "room.json")
-    name = controller(folder, "")
+    name = write_controller(folder, "")
     (folder / "study.toml").write_text(STUDY)
     (folder / "ours.toml").write_text(STUDY.replace("mine.py:Mine", "lloyd"))
     room = str(folder / "room.json")
@@ -51,7 +51,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "planted.py").write_text((folder / "mine.py").read_text())
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
-        patch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
+        patch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
         for command in (
             ["run", room, "--controller", name, "--out", str(folder / "run")],
             ["run", room, "--controller", "planted", "--out", str(folder / "offered")],
@@ -157,7 +157,7 @@ def test_who_opens_a_run_may_load_its_controller(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    name = controller(tmp_path, "", "safe.py")
+    name = write_controller(tmp_path, "", "safe.py")
     assert main(["replay", str(shared / "run"), "--controller", name]) == 0
     (session,) = windows
     assert session.timeline.panes[0].controller.name == name

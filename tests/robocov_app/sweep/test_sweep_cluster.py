@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from called import answer
-from swept import controller, small_study, tables
+from swept import build_small_study, read_tables, write_controller
 
 from robocov.errors import OutputError, RobocovError
 from robocov_app.cli import main
@@ -41,7 +41,7 @@ def a_cluster(*, processes: bool, workers: int = 1) -> Iterator[Any]:
 
 
 def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    study = small_study(seeds=range(4), robots=(2, 500), gains={"rapf": {"k_rep": [0.1, 1.0]}})
+    study = build_small_study(seeds=range(4), robots=(2, 500), gains={"rapf": {"k_rep": [0.1, 1.0]}})
     expected = Totals(12, 12, 0, False)
     assert sweep(study, tmp_path / "here", workers=1, quiet=True) == expected
     with a_cluster(processes=False) as cluster:
@@ -53,14 +53,14 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFi
         file.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
         words = ("sweep", str(file), "--dry-run", "--scheduler", address)
         assert answer(capsys, *words)["workers"] == 2
-    assert tables(tmp_path / "there") == tables(tmp_path / "here")
+    assert read_tables(tmp_path / "there") == read_tables(tmp_path / "here")
 
 
 def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
     """Dask blames all tasks that were with a worker when it ended; only one of them is at fault."""
     dask = pytest.importorskip("dask")
-    name = controller(tmp_path, "        os._exit(3)\n")
-    study = small_study(controllers=("rapf", name), seeds=range(2))
+    name = write_controller(tmp_path, "        os._exit(3)\n")
+    study = build_small_study(controllers=("rapf", name), seeds=range(2))
     strict = dask.config.set({"distributed.scheduler.allowed-failures": 0})
     # two, as now and then Dask does not start one again
     with strict, a_cluster(processes=True, workers=2) as cluster:
@@ -73,7 +73,7 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
 
 def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster_module, "_THREAD_COUNT_INTERVAL_S", 0.05)
-    task = next(generate_tasks(small_study()))
+    task = next(generate_tasks(build_small_study()))
     with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         assert executor.wait_for_next(0.1) is None
@@ -91,8 +91,8 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
 ) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "weights_of_mine.py").write_text("PULL = 0.5\n")
-    name = controller(tmp_path, "        from weights_of_mine import PULL\n        self = Mine(PULL)\n")
-    (task, *_) = generate_tasks(small_study(controllers=(name,)))
+    name = write_controller(tmp_path, "        from weights_of_mine import PULL\n        self = Mine(PULL)\n")
+    (task, *_) = generate_tasks(build_small_study(controllers=(name,)))
     here = perform(task)
     for path in tmp_path.iterdir():
         path.unlink()
@@ -105,8 +105,8 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
 
 
 def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp_path: Path) -> None:
-    name = controller(tmp_path, "        time.sleep(0.02)\n")
-    study = small_study(controllers=(name,), seeds=range(12))
+    name = write_controller(tmp_path, "        time.sleep(0.02)\n")
+    study = build_small_study(controllers=(name,), seeds=range(12))
     with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         for task in generate_tasks(study):
             executor.submit(task)
@@ -152,7 +152,7 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
     def unknown(task: object) -> None:
         raise ModuleNotFoundError("No module named 'robocov_app'")
 
-    task = next(generate_tasks(small_study()))
+    task = next(generate_tasks(build_small_study()))
     monkeypatch.setattr(cluster_module, "perform", unknown)
     with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
@@ -164,7 +164,7 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
 def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:
     from concurrent.futures import ThreadPoolExecutor
 
-    tasks = list(generate_tasks(small_study(seeds=range(8))))
+    tasks = list(generate_tasks(build_small_study(seeds=range(8))))
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(perform, tasks)) == [perform(task) for task in tasks]
 
@@ -179,4 +179,4 @@ def test_nothing_of_dask_is_loaded_without_a_scheduler(
         return imported(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", watched)
-    assert sweep(small_study(seeds=(0,)), tmp_path, workers=1, quiet=True).done == 2
+    assert sweep(build_small_study(seeds=(0,)), tmp_path, workers=1, quiet=True).done == 2

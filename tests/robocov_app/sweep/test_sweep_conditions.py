@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from swept import small_study
+from swept import build_small_study
 
 from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError
@@ -16,7 +16,7 @@ from robocov_app.sweep.worker import perform
 
 
 def test_every_combination_is_tried() -> None:
-    study = small_study(conditions={"loss": [0.0, 0.5], "fail": ["", "1@0.2"], "delay": 0.1})
+    study = build_small_study(conditions={"loss": [0.0, 0.5], "fail": ["", "1@0.2"], "delay": 0.1})
     assert len(study.teams) == 4
     assert study.varied_parameters == ("loss", "fail")
     assert len(list(generate_tasks(study))) == len(study) == 16
@@ -30,14 +30,14 @@ def test_every_combination_is_tried() -> None:
 
 def test_a_study_without_conditions_has_the_tasks_that_it_had() -> None:
     """What was done before there were conditions is not done again."""
-    assert [task.digest for task in generate_tasks(small_study())] == [
-        task.digest for task in generate_tasks(small_study(conditions={}))
+    assert [task.digest for task in generate_tasks(build_small_study())] == [
+        task.digest for task in generate_tasks(build_small_study(conditions={}))
     ]
-    assert "loss" not in next(generate_tasks(small_study())).team
+    assert "loss" not in next(generate_tasks(build_small_study())).team
 
 
 def test_a_run_is_under_its_conditions() -> None:
-    study = small_study(conditions={"loss": 0.5, "fail": "2@0.2"}, controllers=("rapf",), seeds=[3])
+    study = build_small_study(conditions={"loss": 0.5, "fail": "2@0.2"}, controllers=("rapf",), seeds=[3])
     (task,) = generate_tasks(study)
     assert build_conditions(task.team, task.seed, task.robots) == Conditions(
         loss=0.5, failures=((2, 0.2),), seed=3
@@ -66,7 +66,7 @@ def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None
 
 def test_robots_that_are_not_there_cannot_fail() -> None:
     with pytest.raises(ParameterError, match="expected a robot from 1 to 2, got robot 3"):
-        small_study(conditions={"fail": "3@0.1"})
+        build_small_study(conditions={"fail": "3@0.1"})
 
 
 def test_a_file_says_it_in_a_table() -> None:

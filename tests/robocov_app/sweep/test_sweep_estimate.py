@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from swept import HALL, ROOM, small_study
+from swept import HALL, ROOM, build_small_study
 
 from robocov_app.sweep import estimate as estimate_module
 from robocov_app.sweep.estimate import count_axes, estimate_sweep
@@ -13,9 +13,9 @@ from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
 
-def test_the_axes_are_counted() -> None:
+def test_the_values_of_each_axis_are_counted() -> None:
     maps = (StudyMap("room", ROOM), StudyMap("hall", HALL))
-    study = small_study(
+    study = build_small_study(
         maps=maps, starts="*", robots=(2, 3), max_speed=(1, 2), gains={"rapf": {"k_rep": [1, 2]}}
     )
     assert count_axes(study) == {
@@ -31,15 +31,15 @@ def test_the_axes_are_counted() -> None:
     assert len(study) == 2 * 2 * 3 * 2 * (2 + 1)
 
 
-def test_time_and_space_are_those_of_one_run_times_their_number(
+def test_time_and_space_are_those_of_one_run_times_the_number_of_runs(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    study = small_study(seeds=range(5))
-    moments = iter([10.0, 12.5])
-    monkeypatch.setattr(estimate_module.time, "perf_counter", lambda: next(moments))
+    study = build_small_study(seeds=range(5))
+    clock_times = iter([10.0, 12.5])
+    monkeypatch.setattr(estimate_module.time, "perf_counter", lambda: next(clock_times))
     estimate = estimate_sweep(study, tmp_path / "none", workers=4)
     first = next(generate_tasks(study))
-    size = sum(map(len, perform(first).files.values()))
+    size = sum(len(content) for content in perform(first).files.values())
     assert (estimate.runs, estimate.left, estimate.run, estimate.error) == (10, 10, first.name, None)
     assert estimate.seconds_a_run == 2.5
     assert estimate.seconds == 2.5 * 10 / 4
@@ -47,8 +47,8 @@ def test_time_and_space_are_those_of_one_run_times_their_number(
     assert not (tmp_path / "none").exists()
 
 
-def test_what_is_done_already_is_not_counted(tmp_path: Path) -> None:
-    study = small_study(seeds=range(3))
+def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
+    study = build_small_study(seeds=range(3))
     tasks = list(generate_tasks(study))
     with open_ledger(tmp_path, study.to_json()) as ledger:
         for task in tasks[:2]:
@@ -59,6 +59,6 @@ def test_what_is_done_already_is_not_counted(tmp_path: Path) -> None:
     assert sorted(path.stat().st_mtime_ns for path in tmp_path.rglob("*")) == before
 
 
-def test_a_run_that_fails_says_so(tmp_path: Path) -> None:
-    estimate = estimate_sweep(small_study(robots=(500,)), tmp_path, workers=1)
+def test_the_error_of_a_failed_run_is_reported(tmp_path: Path) -> None:
+    estimate = estimate_sweep(build_small_study(robots=(500,)), tmp_path, workers=1)
     assert estimate.error is not None and "room for about" in estimate.error

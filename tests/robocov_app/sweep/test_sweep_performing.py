@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pymunk
 import pytest
-from swept import HEAD, ROOM, controller, small_study
+from swept import HEAD, ROOM, build_small_study, write_controller
 
 from robocov.cost import CoverageCost
 from robocov.metrics import compute_cost_history, summarize
@@ -34,7 +34,7 @@ def kept(outcome: Outcome, folder: Path) -> Record:
 
 
 def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
-    task = first(small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
+    task = first(build_small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
     whole = simulate(task)
     outcome = perform(task)
     assert outcome.error is None
@@ -55,7 +55,7 @@ def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
 
 
 def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: Path) -> None:
-    task = first(small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
+    task = first(build_small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
     whole = simulate(task)
     history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     summary = summarize(whole, history)
@@ -73,12 +73,14 @@ def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: P
 
 
 def test_the_same_task_gives_the_same_bytes() -> None:
-    for task in generate_tasks(small_study()):
+    for task in generate_tasks(build_small_study()):
         assert perform(task) == perform(task)
 
 
 def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
-    task = first(small_study(controllers=("mine.py:Mine",), folder=Path(controller(tmp_path, "")).parent))
+    task = first(
+        build_small_study(controllers=("mine.py:Mine",), folder=Path(write_controller(tmp_path, "")).parent)
+    )
     content = json.loads(perform(task).files["run.json"])
     assert content["controller"]["name"] == "mine.py:Mine"
     assert task.source is not None and content["controller"]["source"] == task.source.text
@@ -107,8 +109,8 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
     ],
 )
 def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -> None:
-    controller(tmp_path, "")
-    task = first(small_study(controllers=("mine.py:Mine",), folder=tmp_path))
+    write_controller(tmp_path, "")
+    task = first(build_small_study(controllers=("mine.py:Mine",), folder=tmp_path))
     # the file is well when the study is made
     assert task.source is not None
     task = replace(task, source=task.source._replace(text=HEAD + law))
@@ -122,13 +124,13 @@ def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -
 
 
 def test_a_start_without_room_is_an_outcome() -> None:
-    outcome = perform(first(small_study(robots=(500,))))
+    outcome = perform(first(build_small_study(robots=(500,))))
     assert outcome.error is not None and outcome.error.startswith("start 'corner': room for about")
 
 
 def test_costs_of_the_last_maps_are_remembered() -> None:
     maps = [StudyMap(f"room {k}", replace(ROOM, name=f"room {k}")) for k in range(6)]
-    tasks = list(generate_tasks(small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
+    tasks = list(generate_tasks(build_small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
     costs = [prepare_cost(task) for task in tasks]
     assert prepare_cost(tasks[-1]) is costs[-1]
     assert prepare_cost(tasks[0]) is not costs[0], "memory does not grow with the number of maps"
@@ -154,7 +156,7 @@ def test_nothing_of_the_physics_outlives_a_run(
 
     for kind in (pymunk.Space, pymunk.Body, pymunk.Poly, pymunk.Circle):
         watched(kind)
-    perform(first(small_study(controllers=(controller(tmp_path, law),))))
+    perform(first(build_small_study(controllers=(write_controller(tmp_path, law),))))
     assert len(alive) > 8
     assert not [thing for thing in alive if thing() is not None]
     assert gc.isenabled()
@@ -162,7 +164,9 @@ def test_nothing_of_the_physics_outlives_a_run(
 
 def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
     law = "        ring = []\n        ring.append(ring)\n"
-    task = first(small_study(controllers=(controller(tmp_path, law),), duration=100.0, robots=(2,)))
+    task = first(
+        build_small_study(controllers=(write_controller(tmp_path, law),), duration=100.0, robots=(2,))
+    )
     seen: list[int] = []
     gc.callbacks.append(lambda phase, said: seen.append(said["collected"]) if phase == "stop" else None)
     try:
@@ -174,7 +178,7 @@ def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
 
 
 def test_runs_without_a_moment_but_the_first() -> None:
-    outcome = perform(first(small_study(duration=0.0)))
+    outcome = perform(first(build_small_study(duration=0.0)))
     assert outcome.error is None
     with np.load(io.BytesIO(outcome.files["record.npz"])) as arrays:
         assert arrays["time"].tolist() == [0.0]
@@ -185,7 +189,7 @@ def test_runs_without_a_moment_but_the_first() -> None:
 
 def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
     group = ({"count": 1, "max_speed": 1.0, "radius": 0.2}, {"count": 2, "max_speed": 0.4})
-    study = small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
+    study = build_small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
     outcome = perform(first(study))
     assert outcome.error is None
     known = [column.name for column in build_columns(study)]
@@ -193,6 +197,6 @@ def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
     assert {"mean_time_s", "sensed_area_m2", "near_final_s", "robot_clearance_m"} <= set(outcome.figures)
     assert outcome.figures["mean_time_s"] > outcome.figures["mean_distance_m"]
     assert outcome.files["cost.csv"].splitlines()[0].endswith(b",mean_time_s")
-    plain = small_study()
+    plain = build_small_study()
     assert set(perform(first(plain)).figures) == set(FIGURES)
     assert not {"mean_time_s", "sensed_area_m2"} & {column.name for column in build_columns(plain)}

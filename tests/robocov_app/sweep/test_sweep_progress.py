@@ -10,7 +10,7 @@ from robocov_app.sweep.progress import SweepProgress, report_progress
 
 
 class Clock:
-    """Time that passes when it is told to."""
+    """A clock that the test sets."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
@@ -22,7 +22,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return Clock(monkeypatch)
 
 
-def test_what_is_left_is_estimated_from_what_was_done_now(clock: Clock) -> None:
+def test_the_remaining_time_is_estimated_from_the_runs_of_this_call(clock: Clock) -> None:
     progress = SweepProgress(100, start_time=clock.now)
     assert (progress.rate, progress.remaining_time) == (0.0, None)
     progress.reused = 40
@@ -34,7 +34,7 @@ def test_what_is_left_is_estimated_from_what_was_done_now(clock: Clock) -> None:
     assert progress.describe() == "50 of 100 runs, 2 failed, 40 reused, 2 a second"
 
 
-def test_where_there_is_no_terminal_a_line_comes_now_and_then(
+def test_without_a_terminal_lines_are_printed_from_time_to_time(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
     progress = SweepProgress(1000, start_time=clock.now)
@@ -49,10 +49,12 @@ def test_where_there_is_no_terminal_a_line_comes_now_and_then(
     assert lines[-1] == "sweep: 100 of 1000 runs, 2 a second, 7 min 30 s left"
 
 
-def test_a_wait_is_told_once_in_place_of_an_estimate(
+def test_the_reason_of_a_wait_is_printed_once_instead_of_an_estimate(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    progress = SweepProgress(10, start_time=clock.now, done=2, waiting_reason="nobody is there; waiting")
+    progress = SweepProgress(
+        10, start_time=clock.now, done=2, waiting_reason="no workers are connected; waiting"
+    )
     with report_progress("sweep", progress, quiet=False) as reporter:
         for _ in range(100):
             clock.now += 1.0
@@ -60,12 +62,12 @@ def test_a_wait_is_told_once_in_place_of_an_estimate(
         progress.waiting_reason = ""
         progress.lost_workers = 3
     assert capsys.readouterr().err.splitlines() == [
-        "sweep: 2 of 10 runs, 2 a second, nobody is there; waiting",
+        "sweep: 2 of 10 runs, 2 a second, no workers are connected; waiting",
         "sweep: 2 of 10 runs, 3 workers lost, 0.02 a second, 6 min 40 s left",
     ]
 
 
-def test_nobody_is_told_when_nobody_wants_to_know(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_quiet_sweep_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     with report_progress("sweep", SweepProgress(1), quiet=True) as reporter:
         reporter.update(SweepProgress(1))
     assert capsys.readouterr() == ("", "")
@@ -76,7 +78,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_a_terminal_gets_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -86,6 +88,6 @@ def test_a_terminal_gets_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
         progress.done = 1
         progress.failed = 1
         reporter.update(progress)
-    said = terminal.getvalue()
-    assert "2 of 4 runs, 1 failed" in said
-    assert "[bold]mine[/] [/x]" in said
+    output = terminal.getvalue()
+    assert "2 of 4 runs, 1 failed" in output
+    assert "[bold]mine[/] [/x]" in output

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from swept import HALL, ROOM, controller, small_study
+from swept import HALL, ROOM, build_small_study, write_controller
 
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.parameters import build_swept_team
@@ -17,7 +17,7 @@ MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
 
 def test_a_study_takes_lists_and_single_values() -> None:
-    study = small_study(robots=[1, 2], max_speed=[0.5, 1], radius=0.2, communication_range="null")
+    study = build_small_study(robots=[1, 2], max_speed=[0.5, 1], radius=0.2, communication_range="null")
     assert study.robots == (1, 2)
     assert [team["max_speed"] for team in study.teams] == [0.5, 1.0]
     assert all(team["radius"] == 0.2 and team["communication_range"] is None for team in study.teams)
@@ -26,22 +26,22 @@ def test_a_study_takes_lists_and_single_values() -> None:
 
 
 def test_the_number_of_runs_counts_starts_and_gains() -> None:
-    study = small_study(maps=MAPS, starts="*", gains={"rapf": {"k_rep": [1, 2, 3]}}, seeds=range(5))
+    study = build_small_study(maps=MAPS, starts="*", gains={"rapf": {"k_rep": [1, 2, 3]}}, seeds=range(5))
     assert [study.list_starts(each) for each in study.maps] == [("corner", "spread"), ("door",)]
     assert len(study) == 3 * 5 * (3 + 1)
 
 
 def test_by_default_the_first_start_of_each_map_is_taken() -> None:
-    study = small_study(maps=MAPS)
+    study = build_small_study(maps=MAPS)
     assert [study.list_starts(each) for each in study.maps] == [("corner",), ("door",)]
     bare = StudyMap("bare", replace(ROOM, starts={}))
     for starts in ((), ("*",)):
-        assert small_study(maps=(bare,), starts=starts).list_starts(bare) == ("uniform",)
-    assert small_study(maps=MAPS, starts=("uniform",)).list_starts(MAPS[1]) == ("uniform",)
+        assert build_small_study(maps=(bare,), starts=starts).list_starts(bare) == ("uniform",)
+    assert build_small_study(maps=MAPS, starts=("uniform",)).list_starts(MAPS[1]) == ("uniform",)
 
 
 def test_a_team_is_what_the_study_says() -> None:
-    (said,) = small_study(sensing_range=float("inf"), communication_range=2).teams
+    (said,) = build_small_study(sensing_range=float("inf"), communication_range=2).teams
     team = build_swept_team(3, said)
     assert len(team) == 3
     assert team.sensing_range.tolist() == [float("inf")] * 3
@@ -49,8 +49,8 @@ def test_a_team_is_what_the_study_says() -> None:
 
 
 def test_a_controller_of_ones_own_is_read_when_the_study_is_made(tmp_path: Path) -> None:
-    controller(tmp_path, "")
-    study = small_study(
+    write_controller(tmp_path, "")
+    study = build_small_study(
         controllers=("mine.py:Mine",), folder=tmp_path, gains={"mine.py:Mine": {"pull": [1, 2]}}
     )
     source = study.sources["mine.py:Mine"]
@@ -61,8 +61,8 @@ def test_a_controller_of_ones_own_is_read_when_the_study_is_made(tmp_path: Path)
 
 
 def test_the_study_is_written_whole(tmp_path: Path) -> None:
-    name = controller(tmp_path, "")
-    study = small_study(
+    name = write_controller(tmp_path, "")
+    study = build_small_study(
         controllers=("rpf", name),
         gains={"rpf": {"k_rep": Range(1, 2, "log")}},
         sampling=Sampling(samples=3),
@@ -135,18 +135,18 @@ WRONG = [
 @pytest.mark.parametrize(("changes", "message"), WRONG)
 def test_what_cannot_be_run_is_named_with_its_place(changes: dict, message: str) -> None:
     with pytest.raises(InputError) as caught:
-        small_study(**changes)
+        build_small_study(**changes)
     assert str(caught.value).startswith(message)
 
 
 def test_a_file_of_a_controller_must_be_text(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_bytes(b"\xff\xfe")
     with pytest.raises(ParameterError, match=r"controllers\[0\]: 'mine.py:Mine': .*mine.py: not UTF-8"):
-        small_study(controllers=("mine.py:Mine",), folder=tmp_path)
+        build_small_study(controllers=("mine.py:Mine",), folder=tmp_path)
 
 
 def test_a_study_cannot_be_changed() -> None:
-    study = small_study()
+    study = build_small_study()
     with pytest.raises(AttributeError):
         study.seeds = (1,)
     assert isinstance(study, Study)
@@ -156,7 +156,7 @@ GROUPS = ({"count": 1, "max_speed": 1.0, "radius": 0.15}, {"count": 2, "max_spee
 
 
 def test_a_team_of_groups() -> None:
-    study = small_study(group=GROUPS, robots=(6,), viscosity=(1.0, 2.0))
+    study = build_small_study(group=GROUPS, robots=(6,), viscosity=(1.0, 2.0))
     assert study.robots == (3,)
     assert study.has_mixed_speeds
     assert study.varied_parameters == ("viscosity",)
@@ -165,28 +165,28 @@ def test_a_team_of_groups() -> None:
     assert team.max_speed.tolist() == [1.0, 0.4, 0.4]
     assert team.radius.tolist() == [0.15, 0.1, 0.1]
     assert team.viscosity.tolist() == [1.0, 1.0, 1.0]
-    assert not small_study().has_mixed_speeds
+    assert not build_small_study().has_mixed_speeds
     with pytest.raises(
         ParameterError, match=r"robots: expected 3 as in the groups of the team, got \[2, 4\]"
     ):
-        small_study(group=GROUPS, robots=(2, 4))
+        build_small_study(group=GROUPS, robots=(2, 4))
     with pytest.raises(InputError, match=r"team.group\[1\].max_speed: expected .* got -1.0 m/s"):
-        small_study(group=(GROUPS[0], {"count": 2, "max_speed": -1.0}), robots=(3,))
+        build_small_study(group=(GROUPS[0], {"count": 2, "max_speed": -1.0}), robots=(3,))
 
 
 def test_metrics_are_another_task() -> None:
-    tasks = [next(generate_tasks(small_study(metrics=value))) for value in (False, True)]
+    tasks = [next(generate_tasks(build_small_study(metrics=value))) for value in (False, True)]
     assert [task.metrics for task in tasks] == [False, True]
     assert tasks[0].digest != tasks[1].digest
     with pytest.raises(ParameterError, match="metrics: expected true or false, got 1"):
-        small_study(metrics=1)
+        build_small_study(metrics=1)
 
 
 def test_kinematics_are_swept_as_words() -> None:
-    study = small_study(kinematics=["point", "unicycle"], turning_rate=2.0)
+    study = build_small_study(kinematics=["point", "unicycle"], turning_rate=2.0)
     assert study.varied_parameters == ("kinematics",)
     assert [build_swept_team(2, team).track_width[1] for team in study.teams] == [0.0, pytest.approx(0.16)]
     assert all(build_swept_team(1, team).turning_rate[0] == 2.0 for team in study.teams)
-    assert not {"kinematics", "track_width", "turning_rate"} & set(small_study().teams[0])
+    assert not {"kinematics", "track_width", "turning_rate"} & set(build_small_study().teams[0])
     with pytest.raises(ParameterError, match=r"team.kinematics: expected point or unicycle, got 'car'"):
-        small_study(kinematics="car")
+        build_small_study(kinematics="car")

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from swept import HALL, controller
+from swept import HALL, write_controller
 
 from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, save_map
@@ -50,7 +50,7 @@ seed = 9
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "plans").mkdir()
     save_map(HALL, tmp_path / "plans" / "hall.json")
-    controller(tmp_path, "")
+    write_controller(tmp_path, "")
     return tmp_path
 
 

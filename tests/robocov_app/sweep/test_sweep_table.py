@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from swept import small_study, tables
+from swept import build_small_study, read_tables
 
 from robocov.controllers import Rapf, get_gains
 from robocov.errors import OutputError, RobocovError
@@ -52,7 +52,7 @@ def written(folder: Path, study: Study, entries: list[Entry], *, parquet: bool =
 
 
 def test_the_columns_are_those_of_the_study() -> None:
-    study = small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
+    study = build_small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
     assert [column.name for column in build_columns(study)] == [
         *("map", "controller", "robots", "start", "seed"),
         *get_gains(Rapf),
@@ -62,7 +62,7 @@ def test_the_columns_are_those_of_the_study() -> None:
         *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
         *("run", "error"),
     ]
-    assert "max_speed_m_s" not in [column.name for column in build_columns(small_study())]
+    assert "max_speed_m_s" not in [column.name for column in build_columns(build_small_study())]
 
 
 def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> None:
@@ -72,7 +72,7 @@ def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> Non
 
 
 def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
-    study = small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
+    study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     entries = [FIGURED, FAILED, FIGURED, FIGURED]
     written(tmp_path, study, entries)
     rows = list(read_results(tmp_path).rows())
@@ -98,7 +98,7 @@ def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
 
 
 def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: Path) -> None:
-    study = small_study()
+    study = build_small_study()
     task = replace(next(iter(generate_tasks(study))), map="=1+1", start="-1")
     with Table(tmp_path, build_columns(study), study_json(study), parquet=True) as table:
         table.add(build_row(task, FAILED._replace(error="+ of 'two'")))
@@ -115,7 +115,7 @@ def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: P
 
 def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    study = small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
+    study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     written(tmp_path, study, [FIGURED, FAILED, FIGURED, FIGURED], parquet=True)
     assert pq.read_table(tmp_path / "results.parquet").to_pylist() == list(read_results(tmp_path).rows())
     schema = pq.read_schema(tmp_path / "results.parquet")
@@ -133,12 +133,12 @@ def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path
 def test_the_same_rows_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     monkeypatch.setattr(table_module, "ROW_GROUP_SIZE", 3)
-    study = small_study(seeds=range(5))
+    study = build_small_study(seeds=range(5))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         written(tmp_path / name, study, [FIGURED] * len(study), parquet=True)
-    assert len(tables(tmp_path / "one")) == 2
-    assert tables(tmp_path / "one") == tables(tmp_path / "two")
+    assert len(read_tables(tmp_path / "one")) == 2
+    assert read_tables(tmp_path / "one") == read_tables(tmp_path / "two")
     groups = pq.ParquetFile(tmp_path / "one" / "results.parquet").metadata
     assert [groups.row_group(k).num_rows for k in range(groups.num_row_groups)] == [3, 3, 3, 1]
 
@@ -152,40 +152,40 @@ def no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study = small_study()
+    study = build_small_study()
     written(tmp_path, study, [FIGURED] * len(study))
     assert [len(row) for row in read_results(tmp_path).rows()] == [len(build_columns(study))] * len(study)
     wanted = 'pyarrow is not installed: pip install "robocov[parquet]"'
     for dry in ([], ["--dry-run"]):
         assert main(["sweep", "study.toml", "--parquet", *dry]) == 2
         assert capsys.readouterr().err == f"robocov: error: {wanted}\n"
-    before = tables(tmp_path)
+    before = read_tables(tmp_path)
     (tmp_path / "results.parquet").touch()  # of an earlier version, say: it would not be of these rows
     for asked in (True, False):
         refused = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {wanted}"))
         with refused, Table(tmp_path, build_columns(study), parquet=asked):
             pass
-    assert tables(tmp_path) == [*before, b""]
+    assert read_tables(tmp_path) == [*before, b""]
     assert not list(tmp_path.glob(".*"))
 
 
 def test_parquet_that_is_there_is_kept_up_to_date(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    for study in (small_study(), small_study(seeds=range(5))):
+    for study in (build_small_study(), build_small_study(seeds=range(5))):
         written(tmp_path, study, [FIGURED] * len(study), parquet=len(study) == 4)
         assert pq.read_table(tmp_path / "results.parquet").num_rows == len(study)
 
 
 def test_a_table_without_rows_has_columns(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    with Table(tmp_path, build_columns(small_study()), parquet=True):
+    with Table(tmp_path, build_columns(build_small_study()), parquet=True):
         pass
     assert pq.read_table(tmp_path / "results.parquet").num_rows == len(read_results(tmp_path)) == 0
 
 
 def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    study = small_study()
+    study = build_small_study()
     tasks = list(generate_tasks(study))
     with Table(tmp_path, build_columns(study), b"{}", parquet=True) as table:
         for k, task in enumerate(tasks):
@@ -204,10 +204,10 @@ def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Pat
 def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_complete(
     tmp_path: Path, complete: bool, rows: int, finished: bool
 ) -> None:
-    study = small_study()
+    study = build_small_study()
     written(tmp_path, study, [FIGURED] * len(study))
     if not finished:  # as a sweep leaves it that was killed
-        (tmp_path / "study.json").write_bytes(study_json(small_study(seeds=range(5))))
+        (tmp_path / "study.json").write_bytes(study_json(build_small_study(seeds=range(5))))
     before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
     with Table(tmp_path, build_columns(study), b"{}") as table:
         for k, task in enumerate(list(generate_tasks(study))[:rows]):
@@ -225,7 +225,7 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
 def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_that_was_killed(
     tmp_path: Path,
 ) -> None:
-    study = small_study()
+    study = build_small_study()
     written(tmp_path, study, [FIGURED] * len(study))
     (tmp_path / "study.json").unlink()
     lengths = []
@@ -241,12 +241,12 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
 def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     told = pytest.raises(OutputError, match=f"{name}: expected a file, got a folder")
-    with told, Table(tmp_path, build_columns(small_study()), parquet=True):
+    with told, Table(tmp_path, build_columns(build_small_study()), parquet=True):
         pass
 
 
 def test_an_error_leaves_no_half_of_a_table(tmp_path: Path) -> None:
-    study = small_study()
+    study = build_small_study()
     with pytest.raises(ZeroDivisionError), Table(tmp_path, build_columns(study)) as table:
         table.add(build_row(next(generate_tasks(study)), FIGURED))
         raise ZeroDivisionError
@@ -271,7 +271,7 @@ class Full:
 
 
 def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
-    study = small_study()
+    study = build_small_study()
     row = build_row(next(generate_tasks(study)), FIGURED)
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
     with full, Table(tmp_path, build_columns(study)) as table:
@@ -296,7 +296,7 @@ def test_a_full_disk_leaves_no_half_of_parquet(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     pq = pytest.importorskip("pyarrow.parquet")
-    study = small_study()
+    study = build_small_study()
     told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
     with told, Table(tmp_path, build_columns(study), parquet=True) as table:
         monkeypatch.setattr(pq.ParquetWriter, broken, full)
@@ -307,7 +307,7 @@ def test_a_full_disk_leaves_no_half_of_parquet(
 
 def test_no_table_can_be_made_where_there_is_no_folder(tmp_path: Path) -> None:
     told = pytest.raises(OutputError, match=r"results.csv: cannot be written")
-    with told, Table(tmp_path / "none", build_columns(small_study())):
+    with told, Table(tmp_path / "none", build_columns(build_small_study())):
         pass
 
 
@@ -321,7 +321,7 @@ def test_columns_have_different_names_whatever_gains_are_called(tmp_path: Path) 
         "    def force(self, own):\n"
         "        return own.centroid - own.position\n"
     )
-    study = small_study(controllers=("rapf", "rpf", "lloyd", "odd.py:Odd"), folder=tmp_path)
+    study = build_small_study(controllers=("rapf", "rpf", "lloyd", "odd.py:Odd"), folder=tmp_path)
     names = [column.name for column in build_columns(study)]
     assert len(set(names)) == len(names)
     rows = [build_row(task, FIGURED) for task in generate_tasks(study) if task.seed == 1]

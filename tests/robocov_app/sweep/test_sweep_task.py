@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from swept import HALL, ROOM, controller, small_study
+from swept import HALL, ROOM, build_small_study, write_controller
 
 from robocov.mapfile import load_map
 from robocov_app.sweep.study import StudyMap
@@ -37,7 +37,7 @@ def test_tasks_come_in_the_order_of_the_table(
     k_rep: list[float],
     controllers: list[str],
 ) -> None:
-    study = small_study(
+    study = build_small_study(
         maps=MAPS[:maps],
         robots=robots,
         max_speed=speeds,
@@ -70,7 +70,7 @@ def test_tasks_come_in_the_order_of_the_table(
 
 
 def test_every_controller_begins_in_the_same_places() -> None:
-    study = small_study(
+    study = build_small_study(
         controllers=("rapf", "rpf", "lloyd"), gains={"rapf": {"k_rep": [0.1, 1.0]}}, duration=0.0
     )
     starts: dict[int, set[bytes]] = {}
@@ -83,7 +83,7 @@ def test_every_controller_begins_in_the_same_places() -> None:
 
 
 def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
-    study = small_study(controllers=(controller(tmp_path, ""),))
+    study = build_small_study(controllers=(write_controller(tmp_path, ""),))
     (tmp_path / "mine.py").unlink()
     task = next(generate_tasks(study))
     assert pickle.loads(pickle.dumps(task)) == task
@@ -92,8 +92,8 @@ def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
 
 
 def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) -> None:
-    tasks = {task.name: task for task in generate_tasks(small_study())}
-    assert set(tasks) == {task.name for task in generate_tasks(small_study())}
+    tasks = {task.name: task for task in generate_tasks(build_small_study())}
+    assert set(tasks) == {task.name for task in generate_tasks(build_small_study())}
     for changes in (
         {"maps": (StudyMap("room", replace(ROOM, description="another")),)},
         {"duration": 0.6},
@@ -108,7 +108,7 @@ def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) 
         {"starts": ("spread",)},
         {"gains": {"rapf": {"k_rep": 1.5}, "rpf": {"k_rep": 1.5}}},
     ):
-        others = {task.name for task in generate_tasks(small_study(**changes))}
+        others = {task.name for task in generate_tasks(build_small_study(**changes))}
         assert not others & set(tasks), changes
 
 
@@ -116,8 +116,8 @@ def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path
     names = []
     for folder, law in (("a", ""), ("b", ""), ("c", "        # another one\n")):
         (tmp_path / folder).mkdir()
-        controller(tmp_path / folder, law)
-        study = small_study(controllers=("mine.py:Mine",), folder=tmp_path / folder)
+        write_controller(tmp_path / folder, law)
+        study = build_small_study(controllers=("mine.py:Mine",), folder=tmp_path / folder)
         names.append([task.name for task in generate_tasks(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
@@ -128,11 +128,11 @@ def test_the_text_of_what_a_controller_imports_counts(
 ) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "part_of_mine.py").write_text("import rest_of_mine\n")
-    name = controller(tmp_path, "        import part_of_mine\n")
+    name = write_controller(tmp_path, "        import part_of_mine\n")
     names = []
     for text in ("PULL = 1.0\n", "PULL = 1.0\n", "PULL = 2.0\n"):
         (tmp_path / "rest_of_mine.py").write_text(text)
-        study = small_study(controllers=(name,))
+        study = build_small_study(controllers=(name,))
         names.append([task.name for task in generate_tasks(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
@@ -141,15 +141,15 @@ def test_the_text_of_what_a_controller_imports_counts(
 
 
 def test_a_default_that_is_stated_is_the_same_run() -> None:
-    said = small_study(gains={"rapf": {"k_rep": 0.3}})
+    said = build_small_study(gains={"rapf": {"k_rep": 0.3}})
     assert [task.name for task in generate_tasks(said)] == [
-        task.name for task in generate_tasks(small_study())
+        task.name for task in generate_tasks(build_small_study())
     ]
 
 
 def test_names_of_folders_are_fit_for_any_system() -> None:
     odd = StudyMap("Büro/2: *?<>|" + "x" * 60, ROOM)
-    for task in generate_tasks(small_study(maps=(odd,))):
+    for task in generate_tasks(build_small_study(maps=(odd,))):
         assert task.name.isascii()
         assert not set(task.name) & set('/\\:*?"<>| ')
         assert len(task.name) < 120
@@ -158,5 +158,5 @@ def test_names_of_folders_are_fit_for_any_system() -> None:
 
 def test_a_bundled_map_is_carried_whole() -> None:
     rooms = load_map("rooms")
-    (task, *_) = generate_tasks(small_study(maps=(StudyMap("rooms", rooms),)))
+    (task, *_) = generate_tasks(build_small_study(maps=(StudyMap("rooms", rooms),)))
     assert '"corridor"' in task.document
