@@ -1,4 +1,4 @@
-"""The locational cost (4) against quadrature, dilogarithms, the paper's own formulas, and its properties."""
+"""The locational cost (4): quadrature, dilogarithms, formulas of the paper, and general properties."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def compute_hessians(edges: CellEdges, points: np.ndarray, f: Performance) -> np
 
 
 def build_cell_edges(ring: np.ndarray) -> CellEdges:
-    """Return a ring of vertices as the one cell of a generator at the origin."""
+    """Return a ring of vertices as the single cell of a generator at the origin."""
     count = len(ring)
     return CellEdges(ring, np.roll(ring, -1, axis=0), np.zeros(count, dtype=int), np.full(count, -1))
 
@@ -53,7 +53,7 @@ def build_cell_edges(ring: np.ndarray) -> CellEdges:
 def integrate_by_quadrature(
     ring: np.ndarray, p: np.ndarray, f: Performance, tolerance: float = 1e-10
 ) -> float:
-    """Return ∫ f(|q-p|) dq over a convex ring by scipy's adaptive quadrature, cut where it has corners."""
+    """Return ∫ f(|q-p|) dq over a convex ring by adaptive quadrature between the x of its corners."""
     edges = list(pairwise([*ring.tolist(), ring[0].tolist()]))
 
     def find_heights(x: float) -> tuple[float, float]:
@@ -64,9 +64,11 @@ def integrate_by_quadrature(
         ]
         return min(heights), max(heights)
 
-    cuts = sorted({*ring[:, 0].tolist(), *([p[0]] if ring[:, 0].min() < p[0] < ring[:, 0].max() else [])})
+    limits = set(ring[:, 0].tolist())
+    if min(limits) < p[0] < max(limits):
+        limits.add(p[0])
     total = 0.0
-    for low, high in pairwise(cuts):
+    for low, high in pairwise(sorted(limits)):
         total += dblquad(
             lambda y, x: float(evaluate_performance(f, np.hypot(x - p[0], y - p[1]))),
             low,
@@ -82,15 +84,16 @@ def integrate_by_quadrature(
 @pytest.mark.parametrize("f", FUNCTIONS[:2] + FUNCTIONS[3:], ids=repr)
 @pytest.mark.parametrize("p", [(2.1, 1.7), (-1.0, 1.5), (6.0, -2.0)], ids=["inside", "corner", "outside"])
 def test_values_agree_with_quadrature(f: Performance, p: tuple[float, float]) -> None:
-    found = compute_locational_costs(build_cell_edges(PENTAGON.vertices), np.array([p]), f)[0]
-    assert found == pytest.approx(integrate_by_quadrature(PENTAGON.vertices, np.array(p), f, 1e-8), rel=3e-8)
+    cost = compute_locational_costs(build_cell_edges(PENTAGON.vertices), np.array([p]), f)[0]
+    assert cost == pytest.approx(integrate_by_quadrature(PENTAGON.vertices, np.array(p), f, 1e-8), rel=3e-8)
 
 
 def integrate_by_dilogarithms(ring: np.ndarray, p: np.ndarray, h: float) -> float:
     """Return ∫ dq / (|q-p|² + h²) over a ring in closed form, by the imaginary parts of dilogarithms."""
 
     def evaluate_clausen(z: complex) -> float:
-        return float(np.imag(spence(1.0 + z)))  # Im Li₂(-z)
+        """Return Im Li₂(-z)."""
+        return float(np.imag(spence(1.0 + z)))
 
     total = 0.0
     for a, b in pairwise([*(ring - p), ring[0] - p]):
@@ -114,7 +117,8 @@ def integrate_by_dilogarithms(ring: np.ndarray, p: np.ndarray, h: float) -> floa
 def test_sensing_is_a_sum_of_dilogarithms(seed: int, name: str, size: float) -> None:
     rng = np.random.default_rng(seed)
     ring = REGIONS[name].vertices - REGIONS[name].centroid
-    p, h = rng.normal(scale=3.0, size=2), 10.0**size
+    p = rng.normal(scale=3.0, size=2)
+    h = 10.0**size
     assert compute_locational_costs(build_cell_edges(ring), p[None], Sensing(h))[0] == pytest.approx(
         integrate_by_dilogarithms(ring, p, h), rel=1e-10
     )
@@ -122,17 +126,18 @@ def test_sensing_is_a_sum_of_dilogarithms(seed: int, name: str, size: float) -> 
 
 @pytest.mark.parametrize("h", [1e-9, 1e-4, 1.0, 1e4, 1e9])
 @pytest.mark.parametrize("width", [1e-12, 1e-6, 1.0, 1e6])
-def test_sensing_keeps_its_digits_at_every_height_and_in_every_width(h: float, width: float) -> None:
-    """Of a slab about a generator, by one integral that no part of the implementation uses."""
+def test_sensing_is_accurate_for_any_height_and_width(h: float, width: float) -> None:
+    """For a rectangle about a generator, by an integral that the implementation does not use."""
     ring = np.array([[-width, -1.0], [width, -1.0], [width, 1.0], [-width, 1.0]]) / 2.0
 
-    def evaluate_strip(t: float) -> float:  # with y = e^t, which spreads what happens near the generator
+    def evaluate_strip(t: float) -> float:
+        # The substitution y = e^t resolves the neighborhood of the generator.
         y = np.exp(t)
         root = np.hypot(y, h)
         return float(y * 4.0 * np.arctan(0.5 * width / root) / root)
 
     low = np.log(0.5 * min(1.0, h, width)) - 40.0
-    points = [np.log(each) for each in (h, width) if np.log(each) > low and each < 0.5]
+    points = [np.log(length) for length in (h, width) if np.exp(low) < length < 0.5]
     expected, _ = quad(
         evaluate_strip, low, np.log(0.5), points=points or None, limit=500, epsabs=0.0, epsrel=1e-12
     )
@@ -143,43 +148,44 @@ def test_sensing_keeps_its_digits_at_every_height_and_in_every_width(h: float, w
 
 @settings(max_examples=120)
 @given(seeds, names, functions)
-def test_gradient_and_hessian_are_finite_differences(seed: int, name: str, f: Performance) -> None:
+def test_gradient_and_hessian_agree_with_finite_differences(seed: int, name: str, f: Performance) -> None:
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     ring = region.vertices - region.centroid
-    # a sensor low over the edge of a cell sees a step there, which no finite difference resolves
     p = scatter_points(region, 1, rng) - region.centroid
-    p = 0.8 * p if isinstance(f, Sensing) and f.height < 1.0 else p + rng.normal(scale=2.0, size=2)
-    step = 1e-4 * min(1.0, np.sqrt(region.area))
+    size = region.diameter
+    if isinstance(f, Sensing):
+        size = min(size, f.height)
     if isinstance(f, Sensing) and f.height < 1.0:
+        # At the edge of a cell the cost of a low sensor has a step that finite differences do not resolve.
+        p = 0.8 * p
         step = 1e-3 * f.height
-    edges, ends = build_cell_edges(ring), step * np.array([[1.0, 0.0], [0.0, 1.0]])
-    slope = [
-        (compute_locational_costs(edges, p + e, f) - compute_locational_costs(edges, p - e, f))[0]
-        / (2.0 * step)
-        for e in ends
-    ]
-    bend = [
-        (compute_gradients(edges, p + e, f) - compute_gradients(edges, p - e, f))[0] / (2.0 * step)
-        for e in ends
-    ]
-    found = compute_locational_costs(edges, p, f)[0]
-    size = min(region.diameter, getattr(f, "height", np.inf))
-    noise = 1e-13 * found / step
-    steepest, sharpest = (
-        np.abs(compute_gradients(edges, p, f)).max(),
-        np.abs(compute_hessians(edges, p, f)).max(),
-    )
-    np.testing.assert_allclose(compute_gradients(edges, p, f)[0], slope, rtol=0, atol=2e-5 * steepest + noise)
-    np.testing.assert_allclose(
-        compute_hessians(edges, p, f)[0], bend, rtol=0, atol=2e-5 * sharpest + noise / size
-    )
+    else:
+        p = p + rng.normal(scale=2.0, size=2)
+        step = 1e-4 * min(1.0, np.sqrt(region.area))
+    edges = build_cell_edges(ring)
+    slope = []
+    curvature = []
+    for shift in step * np.eye(2):
+        cost_difference = compute_locational_costs(edges, p + shift, f) - compute_locational_costs(
+            edges, p - shift, f
+        )
+        slope.append(cost_difference[0] / (2.0 * step))
+        gradient_difference = compute_gradients(edges, p + shift, f) - compute_gradients(edges, p - shift, f)
+        curvature.append(gradient_difference[0] / (2.0 * step))
+    noise = 1e-13 * compute_locational_costs(edges, p, f)[0] / step
+    gradient = compute_gradients(edges, p, f)[0]
+    tolerance = 2e-5 * np.abs(gradient).max() + noise
+    np.testing.assert_allclose(gradient, slope, rtol=0, atol=tolerance)
+    hessian = compute_hessians(edges, p, f)[0]
+    tolerance = 2e-5 * np.abs(hessian).max() + noise / size
+    np.testing.assert_allclose(hessian, curvature, rtol=0, atol=tolerance)
 
 
 @settings(max_examples=60)
 @given(seeds, names, st.integers(1, 9))
-def test_squares_give_mass_centroid_and_the_parallel_axis(seed: int, name: str, n: int) -> None:
-    """(2), (3) and (13), by integrals that know nothing of mass and centroid."""
+def test_squared_distances_obey_the_parallel_axis_theorem(seed: int, name: str, n: int) -> None:
+    """Check (2), (3) and (13) with integrals that do not use mass and centroid."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     cells = partition(scatter_points(region, n, rng), region)
@@ -195,9 +201,9 @@ def test_squares_give_mass_centroid_and_the_parallel_axis(seed: int, name: str, 
     np.testing.assert_allclose(
         compute_gradients(cells.edges, points, f), slope, rtol=1e-9, atol=1e-11 * size**3
     )
-    bend = 2.0 * cells.mass[:, None, None] * np.eye(2)
+    curvature = 2.0 * cells.mass[:, None, None] * np.eye(2)
     np.testing.assert_allclose(
-        compute_hessians(cells.edges, points, f), bend, rtol=1e-9, atol=1e-12 * size**2
+        compute_hessians(cells.edges, points, f), curvature, rtol=1e-9, atol=1e-12 * size**2
     )
     np.testing.assert_allclose(
         compute_derivatives(cells.edges, points, f).area, cells.mass, rtol=1e-9, atol=1e-12 * size**2
@@ -205,31 +211,32 @@ def test_squares_give_mass_centroid_and_the_parallel_axis(seed: int, name: str, 
 
 
 def compute_total_cost(points: np.ndarray, borders: np.ndarray, region: Region, f: Performance) -> float:
-    """Return (4) for robots at `points` that look after the Voronoi cells of `borders`."""
+    """Return (4) for robots at `points` that cover the Voronoi cells of `borders`."""
     cells = partition(borders, region)
     return float(compute_locational_costs(cells.edges, points - cells.generators, f).sum())
 
 
 @settings(max_examples=60)
 @given(seeds, names, functions, st.integers(2, 9), st.floats(-4.0, 0.0))
-def test_no_other_partition_is_better_than_that_of_voronoi(
-    seed: int, name: str, f: Performance, n: int, far: float
+def test_no_other_partition_is_better_than_the_voronoi_partition(
+    seed: int, name: str, f: Performance, n: int, log_distance: float
 ) -> None:
-    """(5): whatever is moved from one cell to another, the cost gets no better."""
+    """Check (5): the cells of other generators do not improve the cost."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     points = scatter_points(region, n, rng)
-    others = points + 10.0**far * region.diameter * rng.normal(size=(n, 2))
-    own, theirs = compute_total_cost(points, points, region, f), compute_total_cost(points, others, region, f)
-    assert f.sign * (theirs - own) >= -1e-11 * abs(own)
-    if far > -1.0:
-        assert theirs != own
+    others = points + 10.0**log_distance * region.diameter * rng.normal(size=(n, 2))
+    cost = compute_total_cost(points, points, region, f)
+    other_cost = compute_total_cost(points, others, region, f)
+    assert f.sign * (other_cost - cost) >= -1e-11 * abs(cost)
+    if log_distance > -1.0:
+        assert other_cost != cost
 
 
 @settings(max_examples=40)
 @given(seeds, st.sampled_from(["square", "pentagon", "round"]), functions, st.integers(2, 8))
 def test_boundary_terms_cancel_and_leave_equation_11(seed: int, name: str, f: Performance, n: int) -> None:
-    """(8)-(11): the gradient of the whole cost, cells and all, is that with the cells held still."""
+    """Check (8) to (11): the gradient of the cost with moving cells equals that with fixed cells."""
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     points = region.centroid + 0.7 * (scatter_points(region, n, rng) - region.centroid)
@@ -244,33 +251,30 @@ def test_boundary_terms_cancel_and_leave_equation_11(seed: int, name: str, f: Pe
         for axis in range(2):
             move = np.zeros((n, 2))
             move[i, axis] = step
-            whole = compute_total_cost(points + move, points + move, region, f)
-            whole -= compute_total_cost(points - move, points - move, region, f)
-            borders = compute_total_cost(points, points + move, region, f) - compute_total_cost(
-                points, points - move, region, f
-            )
+            total_change = compute_total_cost(points + move, points + move, region, f)
+            total_change -= compute_total_cost(points - move, points - move, region, f)
+            border_change = compute_total_cost(points, points + move, region, f)
+            border_change -= compute_total_cost(points, points - move, region, f)
             noise = 1e-4 * scale + 1e-13 * scale * np.sqrt(region.area) / step
-            assert whole / (2.0 * step) == pytest.approx(slopes[i, axis], rel=1e-3, abs=noise)
-            assert borders / (2.0 * step) == pytest.approx(0.0, abs=noise)
+            assert total_change / (2.0 * step) == pytest.approx(slopes[i, axis], rel=1e-3, abs=noise)
+            assert border_change / (2.0 * step) == pytest.approx(0.0, abs=noise)
 
 
-def test_far_from_the_origin_nothing_is_lost() -> None:
+def test_costs_far_from_the_origin_are_equally_accurate() -> None:
+    shift = 2.0**20
+    cells = partition(np.array([[1.0, 1.0]]), Region(PENTAGON.vertices))
+    shifted_cells = partition(np.array([[1.0, 1.0]]) + shift, Region(PENTAGON.vertices + shift))
+    offsets = np.full((1, 2), 0.25)
     for f in FUNCTIONS:
-        near, far = (
-            partition(np.array([[1.0, 1.0]]) + shift, Region(PENTAGON.vertices + shift))
-            for shift in (0.0, 2.0**20)
-        )
-        here = compute_locational_costs(near.edges, np.full((1, 2), 0.25), f)
-        np.testing.assert_allclose(
-            compute_locational_costs(far.edges, np.full((1, 2), 0.25), f), here, rtol=1e-9
-        )
+        costs = compute_locational_costs(cells.edges, offsets, f)
+        shifted_costs = compute_locational_costs(shifted_cells.edges, offsets, f)
+        np.testing.assert_allclose(shifted_costs, costs, rtol=1e-9)
 
 
-def test_an_edge_of_rounding_does_not_say_where_the_inside_is() -> None:
-    corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0 + 2e-16, 1.0 - 2e-16], [0.0, 1.0]])
-    assert compute_derivatives(build_cell_edges(corner), np.full((1, 2), 0.4), Distance()).clearance[
-        0
-    ] == pytest.approx(0.4)
+def test_edges_as_short_as_rounding_errors_do_not_affect_the_clearance() -> None:
+    ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0 + 2e-16, 1.0 - 2e-16], [0.0, 1.0]])
+    derivatives = compute_derivatives(build_cell_edges(ring), np.full((1, 2), 0.4), Distance())
+    assert derivatives.clearance[0] == pytest.approx(0.4)
 
 
 def test_cells_without_area_cost_nothing() -> None:
@@ -279,12 +283,14 @@ def test_cells_without_area_cost_nothing() -> None:
         for edges in (build_cell_edges(flat), build_cell_edges(np.zeros((3, 2)))):
             assert compute_locational_costs(edges, np.zeros((1, 2)), f)[0] == pytest.approx(0.0, abs=1e-15)
             assert compute_gradients(edges, np.zeros((1, 2)), f)[0] == pytest.approx([0.0, 0.0], abs=1e-12)
-        none = CellEdges(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=int), np.empty(0, dtype=int))
-        assert compute_locational_costs(none, np.zeros((2, 2)), f).tolist() == [0.0, 0.0]
-        assert compute_hessians(none, np.zeros((2, 2)), f).shape == (2, 2, 2)
+        no_edges = CellEdges(
+            np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=int), np.empty(0, dtype=int)
+        )
+        assert compute_locational_costs(no_edges, np.zeros((2, 2)), f).tolist() == [0.0, 0.0]
+        assert compute_hessians(no_edges, np.zeros((2, 2)), f).shape == (2, 2, 2)
 
 
 @pytest.mark.parametrize("height", [0.0, -1.0, np.nan, np.inf])
-def test_a_height_is_a_positive_number(height: float) -> None:
+def test_heights_must_be_positive_numbers(height: float) -> None:
     with pytest.raises(ParameterError, match=r"height: expected a number above 0, got .* m"):
         Sensing(height)

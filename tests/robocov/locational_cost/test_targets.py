@@ -1,4 +1,4 @@
-"""What robots head for."""
+"""Targets of robots in their cells: centroid, median and optimum of a sensor."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from robocov.voronoi import partition
 POINTS = scatter_points(PENTAGON, 9, np.random.default_rng(2))
 
 
-def test_each_word_is_an_optimum() -> None:
+def test_each_target_is_the_optimum_of_its_performance_function() -> None:
     cells = partition(POINTS, PENTAGON)
     assert find_targets(cells, None, "centroid", 1.0) is cells.centroid
     np.testing.assert_array_equal(
@@ -32,17 +32,18 @@ def test_each_word_is_an_optimum() -> None:
     np.testing.assert_array_equal(
         find_targets(cells, None, "sensing", 0.4), find_best_points(cells, Sensing(0.4))
     )
-    found = [find_targets(cells, None, word, 0.4) for word in TARGETS]
-    assert min(np.abs(found[0] - found[1]).max(), np.abs(found[1] - found[2]).max()) > 1e-3
+    points = [find_targets(cells, None, target, 0.4) for target in TARGETS]
+    assert np.abs(points[0] - points[1]).max() > 1e-3
+    assert np.abs(points[1] - points[2]).max() > 1e-3
 
 
-def test_a_density_that_is_the_same_everywhere_changes_nothing() -> None:
+def test_a_uniform_density_changes_nothing() -> None:
     for density in (Uniform(1.0), Uniform(3.0)):
         cells = partition(POINTS, PENTAGON, density=density)
-        for word in TARGETS:
+        for target in TARGETS:
             np.testing.assert_allclose(
-                find_targets(cells, density, word, 0.4),
-                find_targets(partition(POINTS, PENTAGON), None, word, 0.4),
+                find_targets(cells, density, target, 0.4),
+                find_targets(partition(POINTS, PENTAGON), None, target, 0.4),
                 atol=1e-9,
             )
 
@@ -55,61 +56,68 @@ def test_unknown_targets_are_rejected() -> None:
         find_targets(cells, None, "sensing", 0.0)
 
 
-@pytest.mark.parametrize("law", ["rapf", "lloyd"])
+@pytest.mark.parametrize("name", ["rapf", "lloyd"])
 @pytest.mark.parametrize("target", TARGETS)
-def test_laws_head_for_their_target(law: str, target: str) -> None:
+def test_controllers_pull_robots_toward_their_targets(name: str, target: str) -> None:
     n = len(POINTS)
-    seen = Observations(POINTS, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), PENTAGON)
-    controller = make_controller(law, {"target": target, "height": 0.7})
-    decision = controller.decide(seen, controller.begin(PENTAGON, Team.homogeneous(n)))
+    observations = Observations(POINTS, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), PENTAGON)
+    controller = make_controller(name, {"target": target, "height": 0.7})
+    decision = controller.decide(observations, controller.begin(PENTAGON, Team.homogeneous(n)))
     expected = find_targets(partition(POINTS, PENTAGON), None, target, 0.7)
     assert decision.goals is not None
     np.testing.assert_allclose(decision.goals, expected, atol=1e-12)
-    pull = decision.terms["attraction"]
-    along = expected - POINTS
-    np.testing.assert_allclose(pull[:, 0] * along[:, 1], pull[:, 1] * along[:, 0], atol=1e-9)
+    force = decision.terms["attraction"]
+    direction = expected - POINTS
+    np.testing.assert_allclose(force[:, 0] * direction[:, 1], force[:, 1] * direction[:, 0], atol=1e-9)
 
 
-def test_at_rest_a_team_is_where_its_targets_are(empty: Environment) -> None:
-    """In a convex region; and the three partitions are three."""
+def test_a_team_in_a_convex_region_comes_to_rest_at_its_targets(empty: Environment) -> None:
+    """The final positions for the three targets are different."""
     starts = scatter_points(Region(np.array(empty.boundary)), 5, np.random.default_rng(4))
-    ends = []
+    final_positions = []
     for target in TARGETS:
         controller = make_controller("lloyd", {"target": target, "height": 0.5})
-        last = Simulation(empty, controller, starts=starts, dt=1 / 30).run(12.0).positions[-1]
-        assert np.abs(last - find_targets(partition(last, empty.region), None, target, 0.5)).max() < 0.1
-        ends.append(last)
-    assert np.abs(ends[0] - ends[2]).max() > 1e-3
-    assert np.abs(ends[0] - ends[1]).max() > 1e-3
+        positions = Simulation(empty, controller, starts=starts, dt=1 / 30).run(12.0).positions[-1]
+        goals = find_targets(partition(positions, empty.region), None, target, 0.5)
+        assert np.abs(positions - goals).max() < 0.1
+        final_positions.append(positions)
+    assert np.abs(final_positions[0] - final_positions[2]).max() > 1e-3
+    assert np.abs(final_positions[0] - final_positions[1]).max() > 1e-3
 
 
-def test_a_sensor_sees_more_from_its_own_target_and_without_walls_the_cost_is_the_same() -> None:
+def test_the_target_of_a_sensor_increases_its_information_at_equal_coverage_cost() -> None:
     box = Environment("box", ((0, 0), (12, 0), (12, 7), (0, 7)))
     starts = np.random.default_rng(0).uniform([0.5, 0.5], [11.5, 6.5], (5, 2))
-    height, seen, costs = 0.5, [], []
+    height = 0.5
+    information = []
+    costs = []
     for target in ("centroid", "sensing"):
-        law = Lloyd(target=target, height=height)
-        last = Simulation(box, law, starts=starts, dt=1 / 30).run(20.0).positions[-1]
-        cells = partition(last, box.region)
-        seen.append(compute_locational_costs(cells.edges, np.zeros((5, 2)), Sensing(height)).sum())
-        costs.append(CoverageCost(box, 48)(last).mean_distance)
-    assert 1.0002 < seen[1] / seen[0] < 1.01
+        controller = Lloyd(target=target, height=height)
+        positions = Simulation(box, controller, starts=starts, dt=1 / 30).run(20.0).positions[-1]
+        cells = partition(positions, box.region)
+        information.append(compute_locational_costs(cells.edges, np.zeros((5, 2)), Sensing(height)).sum())
+        costs.append(CoverageCost(box, 48)(positions).mean_distance)
+    assert 1.0002 < information[1] / information[0] < 1.01
     assert costs[1] / costs[0] == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("held", ["centroid", "sensing"])
-def test_a_wall_holds_a_robot_whose_goal_has_its_foot_on_it(held: str) -> None:
-    """The targets are 1 m apart behind a wall that ends between them; either may be the one that is held."""
+@pytest.mark.parametrize("blocked_target", ["centroid", "sensing"])
+def test_a_wall_stops_a_robot_only_if_its_goal_is_straight_behind_the_wall(blocked_target: str) -> None:
+    """The two targets are 1 m apart behind a wall that ends between them, so it blocks only one of them."""
     corners = ((0.0, 0.0), (12.0, 0.0), (0.0, 6.0))
-    whole = partition(np.array([[3.5, 0.5]]), Region(np.array(corners)))
-    goals = {word: find_targets(whole, None, word, 1.0)[0] for word in ("centroid", "sensing")}
-    end = 3.5
-    assert goals["sensing"][0] + 0.4 < end < goals["centroid"][0] - 0.4
-    wall = WallObstacle(((end, 1.2), (8.0 if held == "centroid" else 0.8, 1.2)), 0.1)
+    cell = partition(np.array([[3.5, 0.5]]), Region(np.array(corners)))
+    goals = {target: find_targets(cell, None, target, 1.0)[0] for target in ("centroid", "sensing")}
+    wall_end_x = 3.5
+    assert goals["sensing"][0] + 0.4 < wall_end_x < goals["centroid"][0] - 0.4
+    other_end_x = 8.0 if blocked_target == "centroid" else 0.8
+    wall = WallObstacle(((wall_end_x, 1.2), (other_end_x, 1.2)), 0.1)
     room = Environment("room", corners, (wall,))
-    for word, goal in goals.items():
-        last = Simulation(room, Rapf(target=word), [[end, 0.5]], dt=1 / 30).run(30.0).positions[-1][0]
-        if word == held:
-            assert last[1] < 1.0 and last[0] == pytest.approx(goal[0], abs=0.05)
+    for target, goal in goals.items():
+        simulation = Simulation(room, Rapf(target=target), [[wall_end_x, 0.5]], dt=1 / 30)
+        position = simulation.run(30.0).positions[-1][0]
+        if target == blocked_target:
+            assert position[1] < 1.0
+            assert position[0] == pytest.approx(goal[0], abs=0.05)
         else:
-            assert last[1] > 1.5 and np.hypot(*(last - goal)) < 0.4
+            assert position[1] > 1.5
+            assert np.hypot(*(position - goal)) < 0.4

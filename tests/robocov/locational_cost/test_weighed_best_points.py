@@ -1,4 +1,4 @@
-"""The best points of cells by φ: against a search over a fine lattice, and against the closed forms."""
+"""The best points of cells with a density φ: sums over a fine lattice, and closed forms."""
 
 from __future__ import annotations
 
@@ -20,43 +20,58 @@ SQUARE = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]))
 FUNCTIONS = {"median": Distance(), "low": Sensing(0.3), "high": Sensing(3.0)}
 
 
+def sample_ring(ring, side):
+    """Return the points inside a ring of a lattice with `side` points on each side, (n, 2) m."""
+    low = ring.min(axis=0)
+    high = ring.max(axis=0)
+    fractions = (np.arange(side) + 0.5) / side
+    x = low[0] + fractions * (high[0] - low[0])
+    y = low[1] + fractions * (high[1] - low[1])
+    points = np.column_stack([np.tile(x, side), np.repeat(y, side)])
+    return points[shapely.contains_xy(shapely.Polygon(ring), *points.T)]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("f", FUNCTIONS.values(), ids=FUNCTIONS)
 @pytest.mark.parametrize(
-    ("density", "within"),
+    ("density", "tolerance"),
     [(GAUSSIANS["two"], 3e-3), (RASTERS["bilinear"], 1e-2), (POLYGONS["rooms"], 4e-2)],
     ids=["Gaussians", "raster", "polygons"],
 )
-def test_sums_over_a_fine_lattice_find_nothing_better(density, within, f):
-    """The slope there is nearly nothing of what all places pull, and no other place is better."""
-    points, side = np.array([[2.5, 3.0], [6.5, 6.5]]), 500
+def test_sums_over_a_fine_lattice_find_nothing_better(density, tolerance, f):
+    """The gradient is small against the sum of its absolute terms, and no other point is better."""
+    points = np.array([[2.5, 3.0], [6.5, 6.5]])
+    side = 500
     cells = partition(points, SQUARE, density=density)
     for point, ring in zip(find_best_points(cells, f, density), cells.polygons, strict=True):
-        low, high = ring.min(axis=0), ring.max(axis=0)
-        x, y = (low[k] + (np.arange(side) + 0.5) * (high[k] - low[k]) / side for k in (0, 1))
-        places = np.column_stack([np.tile(x, side), np.repeat(y, side)])
-        places = places[shapely.contains_xy(shapely.Polygon(ring), *places.T)]
-        weights = density.evaluate(places)
-        off = places - point
-        r = np.hypot(*off.T)
-        pull = weights * (1.0 if isinstance(f, Distance) else 2.0 * r / (r**2 + f.height**2) ** 2)
-        slope = (pull / np.maximum(r, 1e-12)) @ off
-        assert np.hypot(*slope) < within * pull.sum()
+        samples = sample_ring(ring, side)
+        weights = density.evaluate(samples)
+        offsets = samples - point
+        r = np.hypot(*offsets.T)
+        slopes = weights
+        if isinstance(f, Sensing):
+            slopes = weights * (2.0 * r / (r**2 + f.height**2) ** 2)
+        gradient = (slopes / np.maximum(r, 1e-12)) @ offsets
+        assert np.hypot(*gradient) < tolerance * slopes.sum()
         if isinstance(f, Sensing) and f.height < 1.0:
-            continue  # where the density has several tops, so has what such a sensor sees
+            # A low sensor has several optima if the density has several maxima.
+            continue
         best = f.sign * float(weights @ evaluate_performance(f, r))
-        for other in places[:: len(places) // 9]:
-            assert f.sign * float(weights @ evaluate_performance(f, np.hypot(*(places - other).T))) > best
+        for other in samples[:: len(samples) // 9]:
+            distances = np.hypot(*(samples - other).T)
+            assert f.sign * float(weights @ evaluate_performance(f, distances)) > best
 
 
 @pytest.mark.parametrize("f", FUNCTIONS.values(), ids=FUNCTIONS)
-def test_with_a_density_that_hardly_varies_it_is_the_closed_form(f):
+def test_with_a_nearly_uniform_density_best_points_agree_with_the_closed_form(f):
     points = np.random.default_rng(2).uniform(0.5, 7.5, (12, 2))
-    nearly = Gaussians((Gaussian((4.0, 4.0), 1e-9, sigma=2.0),), 1.0)
-    cells = partition(points, SQUARE, density=nearly)
-    plain = find_best_points(partition(points, SQUARE), f)
-    within = 3e-2 if isinstance(f, Sensing) and f.height < 1.0 else 2e-3
-    assert_allclose(find_best_points(cells, f, nearly), plain, atol=within)
+    density = Gaussians((Gaussian((4.0, 4.0), 1e-9, sigma=2.0),), 1.0)
+    cells = partition(points, SQUARE, density=density)
+    expected = find_best_points(partition(points, SQUARE), f)
+    tolerance = 2e-3
+    if isinstance(f, Sensing) and f.height < 1.0:
+        tolerance = 3e-2
+    assert_allclose(find_best_points(cells, f, density), expected, atol=tolerance)
 
 
 @pytest.mark.parametrize("target", ["median", "sensing"])
@@ -69,21 +84,22 @@ def test_targets_lie_in_their_cells(density, target):
         assert shapely.Polygon(ring).buffer(1e-6).contains(shapely.Point(goal))
 
 
-def test_a_heavy_room_holds_the_median():
+def test_the_median_is_in_the_room_with_most_of_the_mass():
     room = WeightedArea(((6.0, 6.0), (8.0, 6.0), (8.0, 8.0), (6.0, 8.0)), 100.0)
     density = WeightedPolygons((room,))
     cells = partition(np.array([[2.0, 2.0]]), SQUARE, density=density)
     x, y = find_best_points(cells, Distance(), density)[0]
-    assert 6.0 < x < 8.0 and 6.0 < y < 8.0
+    assert 6.0 < x < 8.0
+    assert 6.0 < y < 8.0
 
 
-def test_where_nothing_counts_the_centroid_stays():
+def test_a_cell_without_mass_keeps_its_centroid():
     room = WeightedArea(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), 1.0)
     density = WeightedPolygons((room,), 0.0)
     cells = partition(np.array([[1.0, 4.0], [7.0, 4.0]]), SQUARE, density=density)
-    found = find_best_points(cells, Distance(), density)
-    assert np.array_equal(found[1], cells.centroid[1])
-    assert found[0] == pytest.approx([0.5, 0.5], abs=0.2)
+    points = find_best_points(cells, Distance(), density)
+    assert np.array_equal(points[1], cells.centroid[1])
+    assert points[0] == pytest.approx([0.5, 0.5], abs=0.2)
 
 
 @pytest.mark.parametrize("target", ["median", "sensing"])
@@ -92,10 +108,10 @@ def test_a_target_depends_only_on_robots_within_range(target):
     points = np.random.default_rng(5).uniform(0.5, 7.5, (30, 2))
     ranges = np.full(len(points), 1.6)
 
-    def find_first_target(places):
-        neighbors = Neighbors.from_ranges(places, ranges[: len(places)])
-        cells = partition(places, SQUARE, neighbors, density=density)
+    def find_first_target(positions):
+        neighbors = Neighbors.from_ranges(positions, ranges[: len(positions)])
+        cells = partition(positions, SQUARE, neighbors, density=density)
         return find_targets(cells, density, target, 1.0)[0].tolist()
 
-    near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
-    assert find_first_target(points) == find_first_target(points[near])
+    in_range = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
+    assert find_first_target(points) == find_first_target(points[in_range])

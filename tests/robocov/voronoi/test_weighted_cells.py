@@ -295,8 +295,7 @@ def test_mass_and_moments_are_weighted_by_a_density(name: str) -> None:
         mass = weight[is_owned].sum()
         assert cells.mass[i] == pytest.approx(mass, rel=1e-2, abs=1e-3)
         if mass > 0.1:
-            np.testing.assert_allclose(
-                cells.centroid[i], weight[is_owned] @ samples[is_owned] / mass, atol=0.02
-            )
+            centroid = weight[is_owned] @ samples[is_owned] / mass
+            np.testing.assert_allclose(cells.centroid[i], centroid, atol=0.02)
         polar = weight[is_owned] @ ((samples[is_owned] - points[i]) ** 2).sum(axis=1)
         assert cells.polar_moment[i] == pytest.approx(polar, rel=2e-2, abs=1e-3)
