@@ -50,11 +50,12 @@ def test_maps_lists_every_bundled_map(capsys: pytest.CaptureFixture[str]) -> Non
     assert all(name in out for name in list_bundled_maps())
 
 
-def test_controllers_lists_gains_with_units_and_marks_the_flagship(
+def test_controllers_lists_gains_with_units_and_recommends_some(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     rows = {row["name"]: row for row in answer(capsys, "controllers")["controllers"]}
     assert [name for name, row in rows.items() if row["flagship"]] == ["rapf"]
+    assert [name for name, row in rows.items() if row["recommended"]] == ["atlas", "atlas-shared"]
     for name, kind in CONTROLLERS.items():
         assert [gain["name"] for gain in rows[name]["gains"]] == list(get_gains(kind))
     assert rows["rapf"]["gains"][0]["unit"] == "N m³"
@@ -63,7 +64,8 @@ def test_controllers_lists_gains_with_units_and_marks_the_flagship(
     out = capsys.readouterr().out
     assert "Geodesic Lloyd   (informed: whole map)" in out
     assert "attraction_limit" in out
-    assert "(recommended)" in out
+    assert "rapf   RAPF   (the paper's controller)" in out
+    assert "atlas   Atlas   (recommended)" in out
 
 
 def test_schema_is_a_json_schema(capsys: pytest.CaptureFixture[str]) -> None:

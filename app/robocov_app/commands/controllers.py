@@ -8,8 +8,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from robocov.controllers import RECOMMENDED_CONTROLLER, get_gains, get_information, list_controller_classes
+from robocov.controllers import RECOMMENDED_CONTROLLERS, get_gains, get_information, list_controller_classes
 from robocov.controllers.gains import Gain, Option, format_value
+from robocov.defaults import DEFAULT_CONTROLLER
 from robocov.text import escape_controls
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import create_console, print_answer
@@ -23,7 +24,8 @@ _HINT = (
 class Arguments(JsonOption):
     """List the controllers, with units, defaults and ranges of their gains.
 
-    In JSON the recommended controller has "flagship": true.
+    The paper's controller has "flagship": true in JSON, and those with the best results on the benchmark, given
+    what their robots may know, have "recommended": true.
 
     Example: robocov controllers --json
     """
@@ -39,7 +41,8 @@ def command(options: Arguments) -> None:
             "name": name,
             "label": str(getattr(controller_class, "label", name)),
             "summary": str(getattr(controller_class, "summary", "")),
-            "flagship": name == RECOMMENDED_CONTROLLER,
+            "flagship": name == DEFAULT_CONTROLLER,
+            "recommended": name in RECOMMENDED_CONTROLLERS.values(),
             "information": get_information(controller_class),
             "gains": [_build_gain_row(gain) for gain in gains],
         }
@@ -53,6 +56,8 @@ def _print_controller(console: Console, row: dict[str, Any], gains: Iterable[Gai
     """Print a controller with the table of its gains."""
     notes = ""
     if row["flagship"]:
+        notes += "   (the paper's controller)"
+    if row["recommended"]:
         notes += "   (recommended)"
     if row["information"] != "own":
         notes += f"   (informed: {row['information']})"

@@ -28,7 +28,7 @@ from robocov.controllers.individual import IndividualController, IndividualContr
 from robocov.controllers.lloyd import Lloyd, RangeLimited
 from robocov.controllers.registry import (
     CONTROLLERS,
-    RECOMMENDED_CONTROLLER,
+    RECOMMENDED_CONTROLLERS,
     get_controller_label,
     has_memory,
     list_controller_classes,
@@ -42,7 +42,7 @@ from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
 
 __all__ = [
     "CONTROLLERS",
-    "RECOMMENDED_CONTROLLER",
+    "RECOMMENDED_CONTROLLERS",
     "Adaptive",
     "Atlas",
     "AtlasShared",

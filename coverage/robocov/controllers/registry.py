@@ -16,7 +16,7 @@ from typing import Any
 from robocov.controllers.adaptive import Adaptive
 from robocov.controllers.atlas import Atlas, AtlasShared
 from robocov.controllers.barrier import Barrier
-from robocov.controllers.base import Controller
+from robocov.controllers.base import Controller, Information
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
 from robocov.controllers.frontier_median import FrontierMedian
@@ -44,8 +44,8 @@ CONTROLLERS: dict[str, type[Any]] = {
 }
 """The built-in controllers by name."""
 
-RECOMMENDED_CONTROLLER = "rapf"
-"""The controller that the project recommends."""
+RECOMMENDED_CONTROLLERS: dict[Information, str] = {"own": "atlas", "shared map": "atlas-shared"}
+"""The best controller on the benchmark of those that use only this information."""
 
 _ENTRY_POINT_GROUP = "robocov.controllers"
 _MEMORYLESS: tuple[type[Any], ...] = (Rapf, Rpf, Lloyd, RangeLimited)

@@ -9,7 +9,7 @@ import pytest
 
 from robocov.controllers import (
     CONTROLLERS,
-    RECOMMENDED_CONTROLLER,
+    RECOMMENDED_CONTROLLERS,
     Controller,
     GeodesicLloyd,
     Lloyd,
@@ -18,6 +18,7 @@ from robocov.controllers import (
     has_memory,
     make_controller,
 )
+from robocov.controllers.base import get_information
 from robocov.controllers.individual import to_team_controller
 from robocov.errors import ParameterError
 from robocov.observation import Observations
@@ -27,8 +28,9 @@ from robocov.observation.region import Region
 REGION = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0]]))
 
 
-def test_the_recommended_controller_is_built_in() -> None:
-    assert RECOMMENDED_CONTROLLER in CONTROLLERS
+def test_recommended_controllers_use_the_information_for_which_they_are_recommended() -> None:
+    for information, name in RECOMMENDED_CONTROLLERS.items():
+        assert get_information(CONTROLLERS[name]) == information
 
 
 def test_an_unknown_name_is_rejected_with_the_most_similar_one() -> None:

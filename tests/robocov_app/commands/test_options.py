@@ -61,12 +61,12 @@ def test_films_out_of_range_are_refused(wrong: dict[str, object]) -> None:
 
 
 def test_options_have_the_defaults_of_the_library() -> None:
-    from robocov.controllers import RECOMMENDED_CONTROLLER
+    from robocov.defaults import DEFAULT_CONTROLLER
     from robocov.team import Team
     from robocov_app.commands.compare import Arguments as Compare
     from robocov_app.commands.run import Arguments as Run
 
-    assert Run().controller == Compare().controllers[0] == RECOMMENDED_CONTROLLER
+    assert Run().controller == Compare().controllers[0] == DEFAULT_CONTROLLER
     assert RunOptions().build_team().to_dict() == Team.homogeneous(6).to_dict()
 
 
