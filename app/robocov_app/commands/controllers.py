@@ -24,8 +24,8 @@ _HINT = (
 class Arguments(JsonOption):
     """List the controllers, with units, defaults and ranges of their gains.
 
-    The paper's controller has "flagship": true in JSON, and those with the best results on the benchmark, given
-    what their robots may know, have "recommended": true.
+    In JSON, the paper's controller has "flagship": true. Controllers with the best results on the benchmark,
+    given what their robots may know, have "recommended": true.
 
     Example: robocov controllers --json
     """
