@@ -145,8 +145,8 @@ def parse_color(text: str, option: str) -> Color:
     ParameterError
         If the text is neither; the message begins with `option`.
     """
-    color = None if text.strip().casefold() == "transparent" else parse_css_color_on_white(text)
-    if color is None:
+    color = parse_css_color_on_white(text)
+    if color is None or text.strip().casefold() == "transparent":
         expected = "a color name or #rrggbb, as in lightblue or '#add8e6'"
         raise ParameterError(f"{option}: expected {expected}, got {quote(text)}")
     return color
@@ -177,8 +177,9 @@ def parse_css_color(text: str) -> tuple[Color, float] | None:
         red, green, blue, *alpha = ImageColor.getrgb(text)
     except (ValueError, TypeError):
         return None
-    opacity = alpha[0] / 255 if alpha else 1.0
-    return (red, green, blue), opacity
+    if not alpha:
+        return (red, green, blue), 1.0
+    return (red, green, blue), alpha[0] / 255
 
 
 def _parse_rgb_arguments(arguments: str) -> tuple[Color, float] | None:
@@ -188,19 +189,24 @@ def _parse_rgb_arguments(arguments: str) -> tuple[Color, float] | None:
         number = _NUMBER.fullmatch(word)
         if number is None:
             return None
-        maximum = 1.0 if len(levels) == 3 else 255.0
-        unit = maximum / 100 if number[2] else 1.0
-        levels.append(min(float(number[1]) * unit, maximum))
-    if len(levels) not in (3, 4):
+        maximum = 255.0
+        if len(levels) == 3:
+            maximum = 1.0  # of the opacity
+        level = float(number[1])
+        if number[2] == "%":
+            level *= maximum / 100
+        levels.append(min(level, maximum))
+    if len(levels) == 3:
+        levels.append(1.0)
+    if len(levels) != 4:
         return None
-    red, green, blue = (round(level) for level in levels[:3])
-    opacity = levels[3] if len(levels) == 4 else 1.0
-    return (red, green, blue), opacity
+    red, green, blue, opacity = levels
+    return (round(red), round(green), round(blue)), opacity
 
 
 def mix_with_white(color: Color, opacity: float) -> Color:
     """Return a color as it appears on white with an opacity from 0 to 1."""
-    red, green, blue = (round(255 + (level - 255) * opacity) for level in color)
+    red, green, blue = [round(255 + (level - 255) * opacity) for level in color]
     return red, green, blue
 
 

@@ -72,25 +72,21 @@ def describe_unsupported_file(path: Path, head: bytes) -> str | None:
         None if the kind is not in the table, so that an importer may read the file.
     """
     name = shlex.quote(path.name)
-    kind, advice = _find_kind(head)
     suffix = path.suffix.lower()
-    if not kind and suffix == ".stl" and len(head) > _STL_HEADER_BYTES:
-        kind, advice = "a mesh (STL)", _SLICE
-    elif not kind and suffix in _SHAPEFILE_SUFFIXES:
-        kind, advice = "a part of a shapefile", _OGR
-        name = shlex.quote(path.with_suffix(".shp").name)
-    if not kind:
-        return None
-    remark = "" if "robocov" in kind else ", which cannot be imported"
-    return f"{kind}{remark}: {advice.format(name=name)}"
-
-
-def _find_kind(head: bytes) -> tuple[str, str]:
-    """Return the kind of a file and the advice for it, empty if it is not in the table."""
     for start, kind, advice in _TABLE:
         if start.match(head):
-            return kind, advice
-    return "", ""
+            return _format_advice(kind, advice, name)
+    if suffix == ".stl" and len(head) > _STL_HEADER_BYTES:
+        return _format_advice("a mesh (STL)", _SLICE, name)
+    if suffix in _SHAPEFILE_SUFFIXES:
+        return _format_advice("a part of a shapefile", _OGR, shlex.quote(path.with_suffix(".shp").name))
+    return None
+
+
+def _format_advice(kind: str, advice: str, name: str) -> str:
+    """Return the kind of a file, and how to convert the file of a name."""
+    remark = "" if "robocov" in kind else ", which cannot be imported"
+    return f"{kind}{remark}: {advice.format(name=name)}"
 
 
 def describe_head(head: bytes) -> str:

@@ -84,8 +84,10 @@ def _remove_small_holes(area: MultiPolygon) -> tuple[MultiPolygon, tuple[str, ..
         large_holes: list[Polygon] = []
         for ring in polygon.interiors:
             hole = Polygon(ring)
-            holes = small_holes if hole.area < _MIN_HOLE_M2 else large_holes
-            holes.append(hole)
+            if hole.area < _MIN_HOLE_M2:
+                small_holes.append(hole)
+            else:
+                large_holes.append(hole)
         polygons.append(Polygon(polygon.exterior, [hole.exterior for hole in large_holes]))
     dropped: tuple[str, ...] = ()
     if small_holes:
@@ -105,10 +107,13 @@ def _describe_repairs(repeated_vertices: int, enclosed: EnclosedArea) -> tuple[s
 
 def _get_name(document: dict[str, Any], path: Path) -> str:
     identifier = document.get("id")
-    is_named = isinstance(identifier, str) and bool(identifier)
-    return to_one_line(identifier if is_named else path.stem)[:_MAX_NAME_CHARACTERS]
+    if not isinstance(identifier, str) or not identifier:
+        identifier = path.stem
+    return to_one_line(identifier)[:_MAX_NAME_CHARACTERS]
 
 
 def _describe_rooms(document: dict[str, Any]) -> str:
     rooms = document.get("room_num")
-    return f" of {rooms} rooms" if type(rooms) is int and rooms > 1 else ""
+    if type(rooms) is not int or rooms < 2:
+        return ""
+    return f" of {rooms} rooms"

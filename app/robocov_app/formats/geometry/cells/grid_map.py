@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,22 +94,20 @@ def build_grid_map(
     Raises
     ------
     MapError
-        If no cell is free, if the outline has too many vertices, or if a coordinate is out of range.
+        If no cell is free, the outline has too many vertices, or a coordinate is out of range.
     """
     _require_coordinates(cells, frame, where)
     # Rows from the bottom, as the y axis.
-    upward = cells[::-1]
-    free = upward == FREE
+    is_unknown = cells[::-1] == UNKNOWN
+    free = cells[::-1] == FREE
     if unknown == "free":
-        free |= upward == UNKNOWN
-    has_unknown_cells = bool((cells == UNKNOWN).any())
+        free |= is_unknown
     if not free.any():
-        hint = f" (--unknown free takes {unknown_name} cells as free)" if has_unknown_cells else ""
-        raise MapError(f"{where}: no cell is free{hint}")
+        _refuse_no_free_cell(where, unknown_name if is_unknown.any() else "")
     boundary = None
     dropped: tuple[str, ...] = ()
-    if unknown == "cut" and has_unknown_cells:
-        main = _find_main_island(upward != UNKNOWN, free)
+    if unknown == "cut" and is_unknown.any():
+        main = _find_main_island(~is_unknown, free)
         dropped = _describe_lost_cells(free & ~main, frame.cell)
         free &= main
         boundary = _build_rim(main, frame, where)
@@ -126,6 +124,12 @@ def build_grid_map(
         dropped=dropped,
         notes=(*notes, _describe_cells(cells, frame.cell, unknown, unknown_name)),
     )
+
+
+def _refuse_no_free_cell(where: str, unknown_name: str) -> NoReturn:
+    """Raise the MapError of a grid without free cells; without unknown ones, their name is empty."""
+    hint = f" (--unknown free takes {unknown_name} cells as free)" if unknown_name else ""
+    raise MapError(f"{where}: no cell is free{hint}")
 
 
 def _require_coordinates(cells: Cells, frame: GridFrame, where: str) -> None:

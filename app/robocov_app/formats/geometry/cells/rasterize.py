@@ -74,7 +74,7 @@ class CellGrid:
         changes &= 1
         return np.bitwise_xor.accumulate(changes, axis=1)[:, :-1].astype(bool)
 
-    def find_cells_of_thin_walls(self, geometry: BaseGeometry) -> BoolArray:
+    def find_thin_walls(self, geometry: BaseGeometry) -> BoolArray:
         """Find cells for walls between polygons that are too thin to contain the center of one.
 
         Parameters
@@ -179,7 +179,7 @@ def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
     ParameterError
         If no cell is free.
     """
-    free = grid.find_covered_cells(environment.free) & ~grid.find_cells_of_thin_walls(environment.free)
+    free = grid.find_covered_cells(environment.free) & ~grid.find_thin_walls(environment.free)
     # Obstacles smaller than a cell may lie between all lines of centers.
     rings = [ring for part in environment.free.geoms for ring in part.interiors]
     holes = np.array([shapely.polygons(ring) for ring in rings])

@@ -113,7 +113,10 @@ def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
         stays = area >= max(max_crumb, min_area)
         tiny_count += int(np.count_nonzero(stays & (area < _TINY_AREA_M2)))
         rings = shapely.get_exterior_ring(holes[stays]).tolist()
-        result.append(part if stays.all() else Polygon(part.exterior, rings))
+        if stays.all():
+            result.append(part)
+        else:
+            result.append(Polygon(part.exterior, rings))
     if specks:
         count = f"{format_count(len(specks), 'obstacle')} smaller than {min_area:.3g} m²"
         conversion.dropped.append(f"{count}, {_format_total_area(specks)} (--specks 0 keeps them)")

@@ -328,7 +328,7 @@ class Shapes:
             dropped=self.tally.describe_omissions(),
             notes=(*self.notes, *result.notes),
             page=result.page,
-            painted=_list_painted(self),
+            painted=_list_paint(self),
         )
 
     def find_surrounding(self) -> Boundary:
@@ -367,7 +367,7 @@ def _list_edges(shapes: Shapes) -> list[WallLine]:
     return [edge for outline in shapes.outlines for edge in outline.edges]
 
 
-def _list_painted(shapes: Shapes) -> tuple[Painted, ...]:
+def _list_paint(shapes: Shapes) -> tuple[Painted, ...]:
     """Return everything that has a color, the lowest first."""
     layers = [outline.paint_layer for outline in shapes.outlines if outline.color is not None]
     lines = [*shapes.lines, *_list_edges(shapes)]

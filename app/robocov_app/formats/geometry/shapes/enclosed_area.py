@@ -115,7 +115,7 @@ def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
     chunk = max(_MAX_RAY_PAIRS // len(edges), 1)
     is_filled = [
-        _find_filled(inside[start : start + chunk], edges, tree, rule)
+        _test_winding(inside[start : start + chunk], edges, tree, rule)
         for start in range(0, len(inside), chunk)
     ]
     faces = faces[np.concatenate(is_filled)]
@@ -125,8 +125,8 @@ def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
         return to_multipolygon(shapely.union_all(faces, grid_size=GRID_M))
 
 
-def _find_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
-    """Return which points, (m, 2), are filled.
+def _test_winding(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
+    """Return which points, (m, 2), are inside, by a fill rule.
 
     These are the points that the edges wind around, or, by evenodd, from which a ray to the right crosses
     an odd number of edges.
@@ -141,7 +141,9 @@ def _find_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule)
     is_downward = (end[:, 1] <= point[:, 1]) & (point[:, 1] < start[:, 1])
     left = (end[:, 0] - start[:, 0]) * (point[:, 1] - start[:, 1])
     left = left - (point[:, 0] - start[:, 0]) * (end[:, 1] - start[:, 1])
-    sign = np.where(is_upward & (left > 0), 1, np.where(is_downward & (left < 0), -1, 0))
+    sign = np.zeros(len(ray), dtype=int)
+    sign[is_upward & (left > 0)] = 1
+    sign[is_downward & (left < 0)] = -1
     if rule == "evenodd":
         return np.asarray(np.bincount(ray, np.abs(sign), len(points)) % 2 == 1)
     return np.asarray(np.bincount(ray, sign, len(points)) != 0)

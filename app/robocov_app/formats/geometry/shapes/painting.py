@@ -64,7 +64,7 @@ def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]
     list of bool
         One for each fill.
     """
-    is_marked = _find_marked(fills, marks)
+    is_marked = _find_fills_with_marks(fills, marks)
     if not is_marked.any():
         return [False] * len(fills)
     colors = {fills[k].color for k in np.flatnonzero(is_marked).tolist()}
@@ -76,7 +76,7 @@ def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]
     ]
 
 
-def _find_marked(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
+def _find_fills_with_marks(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
     """Return which fills are pale and have something on them that is not."""
     is_marked = np.zeros(len(fills), dtype=bool)
     darker = [mark for mark in marks if mark.color is not None and not is_pale(mark.color)]

@@ -50,11 +50,11 @@ def parse_object(element: Element) -> ObjectShape:
     children = {child.tag: child for child in element.children}
     if "template" in element.attributes or children.keys() & {"text", "capsule"}:
         return ObjectShape("", np.empty((0, 2)))
-    shape = _parse_unplaced(element, children, width, height)
+    shape = _parse_outline(element, children, width, height)
     return shape._replace(points=transform_points(build_frame(x, y, rotation), shape.points))
 
 
-def _parse_unplaced(
+def _parse_outline(
     element: Element, children: dict[str, Element], width: float, height: float
 ) -> ObjectShape:
     """Return the shape of an object relative to its position, without its rotation."""

@@ -69,7 +69,9 @@ class BitmapReader:
         if transparency:
             self._notes.append(f"{to_one_line(file.name)}: {transparency}")
         if not is_dark.any() or (transparency and is_dark.all()):
-            shade = "dark" if is_dark.any() else "light"
+            shade = "light"
+            if is_dark.any():
+                shade = "dark"
             cause = f": {transparency}" if transparency else ""
             raise MapError(f"{where}: all is {shade}, expected a picture with dark walls{cause}")
         row = np.flatnonzero(is_dark.any(axis=1))

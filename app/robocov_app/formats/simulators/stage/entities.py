@@ -139,7 +139,9 @@ class _EntityParser:
 
     def _peek_kind(self, index: int) -> str:
         """Return the kind of a following token, or an empty text beyond the end."""
-        return self._tokens[index].kind if index < len(self._tokens) else ""
+        if index >= len(self._tokens):
+            return ""
+        return self._tokens[index].kind
 
     def _is_at_macro(self) -> bool:
         """Return whether a name, a type and a bracket follow."""

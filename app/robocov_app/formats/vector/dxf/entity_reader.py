@@ -142,7 +142,9 @@ class EntityReader:
         if block is None or block.block.is_xref:
             self._shapes.leave_out("block", "missing from the file")
             return
-        inserts = insert.multi_insert() if insert.mcount > 1 else (insert,)
+        inserts = [insert]
+        if insert.mcount > 1:
+            inserts = insert.multi_insert()
         for single in inserts:
             self._add_entities(single.virtual_entities(), layer, (*blocks, str(insert.dxf.name)))
 

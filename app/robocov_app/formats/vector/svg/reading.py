@@ -97,10 +97,10 @@ def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[Arra
         raise ValueError(f"expected a size, got {width:g} x {height:g} px")
     if scale is None:
         inside = fit_view_box(box, width, height, attributes.get("preserveAspectRatio", ""))
-        fit = compose(build_affine(METERS_PER_UNIT, d=METERS_PER_UNIT), inside)
+        fit = compose(build_affine(a=METERS_PER_UNIT, d=METERS_PER_UNIT), inside)
         bottom = METERS_PER_UNIT * height
     else:
-        fit = compose(build_affine(scale, d=scale), build_affine(e=-box[0], f=-box[1]))
+        fit = compose(build_affine(a=scale, d=scale), build_affine(e=-box[0], f=-box[1]))
         bottom = scale * box[3]
     origin = parse_numbers(attributes.get("data-origin", "0 0"))
     if len(origin) != 2:

@@ -133,7 +133,7 @@ class StyleSheet:
             # Other media and fonts do not change shapes.
             if not _HARMLESS.match(text, start):
                 self.unsupported += 1
-            position = _find_end_of_at_rule(text, start)
+            position = _skip_at_rule(text, start)
         return "".join([*kept, text[position:]])
 
     def _add_rule(self, selector: str, declarations: _Declarations) -> None:
@@ -147,11 +147,13 @@ class StyleSheet:
         self._rule_count += 1
         weight = (id_count, len(marks) - id_count, len(tags), self._rule_count)
         rule = _StyleRule(frozenset([*tags, *marks]), weight, declarations)
-        key = [*tags, *marks][-1] if tags or marks else ""
+        key = ""
+        if tags or marks:
+            key = [*tags, *marks][-1]
         self._rules_by_mark.setdefault(key, []).append(rule)
 
 
-def _find_end_of_at_rule(text: str, start: int) -> int:
+def _skip_at_rule(text: str, start: int) -> int:
     """Return the position after an @ rule, which ends with a semicolon or its last brace."""
     depth = 0
     for part in _AT_RULE_PARTS.finditer(text, start):

@@ -16,7 +16,7 @@ _ALIGNMENTS = {"xmin": 0.0, "xmid": 0.5, "xmax": 1.0, "ymin": 0.0, "ymid": 0.5, 
 
 
 def build_affine(
-    a: float = 1.0, b: float = 0.0, c: float = 0.0, d: float = 1.0, e: float = 0.0, f: float = 0.0
+    *, a: float = 1.0, b: float = 0.0, c: float = 0.0, d: float = 1.0, e: float = 0.0, f: float = 0.0
 ) -> Array:
     """Return the (3, 3) matrix that transforms (x, y, 1) to (a x + c y + e, b x + d y + f, 1)."""
     return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
@@ -89,16 +89,20 @@ def fit_view_box(
     y_scale = height / box[3]
     to_origin = build_affine(e=-box[0], f=-box[1])
     if align.lower() == "none":
-        return build_affine(x_scale, d=y_scale) @ to_origin
-    scale = max(x_scale, y_scale) if rule.strip() == "slice" else min(x_scale, y_scale)
+        return build_affine(a=x_scale, d=y_scale) @ to_origin
+    scale = min(x_scale, y_scale)
+    if rule.strip() == "slice":
+        scale = max(x_scale, y_scale)
     align = align or "xMidYMid"
     left = (width - scale * box[2]) * _ALIGNMENTS.get(align[:4].lower(), 0.5)
     top = (height - scale * box[3]) * _ALIGNMENTS.get(align[4:].lower(), 0.5)
-    return build_affine(scale, d=scale, e=left, f=top) @ to_origin
+    return build_affine(a=scale, d=scale, e=left, f=top) @ to_origin
 
 
 def _build_scale(x: float, y: float | None = None) -> Array:
-    return build_affine(x, d=x if y is None else y)
+    if y is None:
+        y = x
+    return build_affine(a=x, d=y)
 
 
 def _build_rotation(degrees: float, x: float = 0.0, y: float = 0.0) -> Array:
@@ -106,7 +110,7 @@ def _build_rotation(degrees: float, x: float = 0.0, y: float = 0.0) -> Array:
 
 
 _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
-    "matrix": ((6,), build_affine),
+    "matrix": ((6,), lambda a, b, c, d, e, f: build_affine(a=a, b=b, c=c, d=d, e=e, f=f)),
     "translate": ((1, 2), lambda x, y=0.0: build_affine(e=x, f=y)),
     "translatex": ((1,), lambda x: build_affine(e=x)),
     "translatey": ((1,), lambda y: build_affine(f=y)),
