@@ -159,7 +159,7 @@ def test_transforms_that_grow_without_end_are_refused() -> None:
     with pytest.raises(ValueError, match="beyond 1e"):
         parse_transform("scale(1e20) scale(1e20)")
     with pytest.raises(ValueError, match="beyond"):
-        compose(build_affine(1e29, d=1e29), build_affine(1e29, d=1e29))
+        compose(build_affine(a=1e29, d=1e29), build_affine(a=1e29, d=1e29))
 
 
 def test_stretch_is_what_happens_to_a_circle() -> None:
