@@ -1,4 +1,4 @@
-"""The coverage cost (22) with a density: exact weights, its value, its gradient, the optimum."""
+"""The coverage cost (22) with a density: weights, value, gradient and optimum."""
 
 from __future__ import annotations
 
@@ -38,35 +38,39 @@ def test_the_mean_distance_is_weighted_by_the_density(density):
 
 
 def test_a_density_of_one_changes_nothing_to_the_last_bit():
-    plain, one = CoverageCost(ROOMS, 32)(ROBOTS), CoverageCost(ROOMS.with_density(Uniform()), 32)(ROBOTS)
-    assert (plain.mean_distance, plain.value) == (one.mean_distance, one.value)
-    assert np.array_equal(plain.gradient, one.gradient)
-    three = CoverageCost(ROOMS.with_density(Uniform(3.0)), 32)(ROBOTS)
-    assert three.mean_distance == plain.mean_distance
-    assert three.value == pytest.approx(3.0 * plain.value, rel=1e-14)
+    plain = CoverageCost(ROOMS, 32)(ROBOTS)
+    uniform = CoverageCost(ROOMS.with_density(Uniform()), 32)(ROBOTS)
+    assert (plain.mean_distance, plain.value) == (uniform.mean_distance, uniform.value)
+    assert np.array_equal(plain.gradient, uniform.gradient)
+    tripled = CoverageCost(ROOMS.with_density(Uniform(3.0)), 32)(ROBOTS)
+    assert tripled.mean_distance == plain.mean_distance
+    assert tripled.value == pytest.approx(3.0 * plain.value, rel=1e-14)
 
 
 @pytest.mark.parametrize("density", [GAUSSIANS["two"], POLYGONS["rooms"]])
 def test_the_gradient_agrees_with_finite_differences(density):
-    cost, step = CoverageCost(ROOMS.with_density(density), 24), 1e-6
-    slope = cost(ROBOTS).gradient
+    cost = CoverageCost(ROOMS.with_density(density), 24)
+    step = 1e-6
+    gradient = cost(ROBOTS).gradient
     for i in range(len(ROBOTS)):
         for axis in (0, 1):
-            ends = []
+            values = []
             for sign in (1.0, -1.0):
                 moved = ROBOTS.copy()
                 moved[i, axis] += sign * step
-                ends.append(cost(moved).value)
-            assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slope[i, axis], rel=1e-4, abs=1e-4)
+                values.append(cost(moved).value)
+            difference_quotient = (values[0] - values[1]) / (2 * step)
+            assert difference_quotient == pytest.approx(gradient[i, axis], rel=1e-4, abs=1e-4)
 
 
 def test_another_density_shares_the_geodesics():
     cost = CoverageCost(ROOMS, 24)
-    other = ROOMS.with_density(GAUSSIANS["two"])
-    quick, slow = cost.with_density(other), CoverageCost(other, 24)
-    assert quick.geodesics is cost.geodesics
-    assert quick(ROBOTS).value == slow(ROBOTS).value and cost.weights is None
-    assert quick.with_density(ROOMS)(ROBOTS).value == cost(ROBOTS).value
+    weighted_rooms = ROOMS.with_density(GAUSSIANS["two"])
+    weighted_cost = cost.with_density(weighted_rooms)
+    assert weighted_cost.geodesics is cost.geodesics
+    assert weighted_cost(ROBOTS).value == CoverageCost(weighted_rooms, 24)(ROBOTS).value
+    assert cost.weights is None
+    assert weighted_cost.with_density(ROOMS)(ROBOTS).value == cost(ROBOTS).value
 
 
 def test_only_covered_components_count():
@@ -87,39 +91,44 @@ def test_there_is_no_mean_distance_if_the_covered_components_have_no_mass():
 
 
 def test_the_optimum_is_where_the_density_is_high():
-    spot = (6.2, 2.0)
-    heavy = ROOMS.with_density(Gaussians((Gaussian(spot, 50.0, sigma=0.6),), 0.1))
-    best = find_optimum(heavy, 1, lattice=32, restarts=4)
-    assert np.hypot(*(best.positions[0] - spot)) < 0.3
-    both = find_optimum(heavy, 3, lattice=32, restarts=4)
+    center = (6.2, 2.0)
+    weighted = ROOMS.with_density(Gaussians((Gaussian(center, 50.0, sigma=0.6),), 0.1))
+    single = find_optimum(weighted, 1, lattice=32, restarts=4)
+    assert np.hypot(*(single.positions[0] - center)) < 0.3
+    best = find_optimum(weighted, 3, lattice=32, restarts=4)
     plain = find_optimum(ROOMS, 3, lattice=32, restarts=4)
-    cost = CoverageCost(heavy, 32)
-    assert both.mean_distance == pytest.approx(cost(both.positions).mean_distance)
-    assert both.mean_distance < 0.8 * cost(plain.positions).mean_distance
+    cost = CoverageCost(weighted, 32)
+    assert best.mean_distance == pytest.approx(cost(best.positions).mean_distance)
+    assert best.mean_distance < 0.8 * cost(plain.positions).mean_distance
 
 
 @pytest.mark.parametrize("controller", [Rapf(), Lloyd()])
 def test_robots_move_to_where_the_density_is_high(controller):
     square = Environment("square", RING)
-    heavy = square.with_density(Gaussians((Gaussian((6.5, 6.5), 20.0, sigma=0.8),), 0.1))
+    weighted = square.with_density(Gaussians((Gaussian((6.5, 6.5), 20.0, sigma=0.8),), 0.1))
     starts = np.array([[1.0, 1.0], [1.5, 1.0], [1.0, 1.5], [2.0, 2.0]])
-    ends = [Simulation(each, controller, starts, dt=0.05).run(20.0).positions[-1] for each in (heavy, square)]
-    near = [np.sort(np.hypot(*(end - (6.5, 6.5)).T)) for end in ends]
-    assert near[0][1] < 0.7 * near[1][1]
-    again = Simulation(heavy, controller, starts, dt=0.05).run(20.0).positions[-1]
-    assert np.array_equal(again, ends[0])
+    final_positions = [
+        Simulation(environment, controller, starts, dt=0.05).run(20.0).positions[-1]
+        for environment in (weighted, square)
+    ]
+    distances = [np.sort(np.hypot(*(positions - (6.5, 6.5)).T)) for positions in final_positions]
+    assert distances[0][1] < 0.7 * distances[1][1]
+    repeated = Simulation(weighted, controller, starts, dt=0.05).run(20.0).positions[-1]
+    assert np.array_equal(repeated, final_positions[0])
 
 
 def test_a_simulation_continues_with_another_density():
     square = Environment("square", RING)
-    heavy = square.with_density(GAUSSIANS["two"])
+    weighted = square.with_density(GAUSSIANS["two"])
     simulation = Simulation(square, Rapf(), ROBOTS)
     for _ in range(30):
         simulation.step()
-    twin, anew = simulation.with_density(heavy), simulation.with_changes(environment=heavy)
-    assert simulation.environment is square and twin.environment is heavy
-    assert twin.observe_and_decide().seen.density is heavy.density
+    continued = simulation.with_density(weighted)
+    rebuilt = simulation.with_changes(environment=weighted)
+    assert simulation.environment is square
+    assert continued.environment is weighted
+    assert continued.observe_and_decide().seen.density is weighted.density
     for _ in range(30):
-        twin.step()
-        anew.step()
-    assert np.array_equal(twin.positions, anew.positions)
+        continued.step()
+        rebuilt.step()
+    assert np.array_equal(continued.positions, rebuilt.positions)

@@ -1,4 +1,4 @@
-"""The density φ: values, and exact integrals over cells, against quadrature and against identities."""
+"""The density φ: values and exact integrals over cells, checked by quadrature and by identities."""
 
 from __future__ import annotations
 
@@ -26,102 +26,108 @@ from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
-SHAPE = Region(np.array([[0.0, 0.0], [10.0, 0.0], [11.0, 7.0], [3.0, 9.0]]))
+QUADRILATERAL = Region(np.array([[0.0, 0.0], [10.0, 0.0], [11.0, 7.0], [3.0, 9.0]]))
 SQUARE = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]))
-ROW = [[1.0, 1.0], [7.0, 2.0], [6.0, 6.0], [3.5, 4.0], [4.0, 7.0], [2.0, 3.0]]
+ROBOTS = [[1.0, 1.0], [7.0, 2.0], [6.0, 6.0], [3.5, 4.0], [4.0, 7.0], [2.0, 3.0]]
 
 
-def build_cells(density, points=ROW, region=SHAPE):
+def build_cells(density, points=ROBOTS, region=QUADRILATERAL):
     return partition(np.array(points), region, density=density)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
-def test_mass_centroid_and_polar_moment_are_those_of_quadrature(density):
+def test_mass_centroid_and_polar_moment_agree_with_quadrature(density):
     cells = build_cells(density)
     for k, ring in enumerate(cells.polygons):
         mass, centroid, polar = integrate_on_fine_lattice(density, ring, cells.generators[k])
-        smooth = isinstance(density, Uniform | Gaussians)
-        within = 2e-4 if smooth else 8e-3
-        assert cells.mass[k] == pytest.approx(mass, rel=within)
-        assert_allclose(cells.centroid[k], centroid, atol=within)
-        assert cells.polar_moment[k] == pytest.approx(polar, rel=2 * within)
+        is_smooth = isinstance(density, Uniform | Gaussians)
+        tolerance = 2e-4 if is_smooth else 8e-3
+        assert cells.mass[k] == pytest.approx(mass, rel=tolerance)
+        assert_allclose(cells.centroid[k], centroid, atol=tolerance)
+        assert cells.polar_moment[k] == pytest.approx(polar, rel=2 * tolerance)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 12))
 @settings(max_examples=5, deadline=None)
-def test_cells_share_the_whole_among_them(density, seed, count):
-    """Masses, first and polar moments about one point add up to those of the region in one piece."""
+def test_moments_of_cells_add_up_to_those_of_the_region(density, seed, count):
+    """Check masses, first moments and polar moments about one point."""
     points = np.random.default_rng(seed).uniform((0.0, 0.0), (8.0, 8.0), (count, 2))
-    cells, whole = build_cells(density, points, SQUARE), build_cells(density, [[4.0, 4.0]], SQUARE)
-    assert cells.mass.sum() == pytest.approx(whole.mass[0], rel=1e-11)
-    assert_allclose(cells.mass @ cells.centroid, whole.mass[0] * whole.centroid[0], rtol=1e-10)
+    cells = build_cells(density, points, SQUARE)
+    region_cell = build_cells(density, [[4.0, 4.0]], SQUARE)
+    assert cells.mass.sum() == pytest.approx(region_cell.mass[0], rel=1e-11)
+    first_moment = region_cell.mass[0] * region_cell.centroid[0]
+    assert_allclose(cells.mass @ cells.centroid, first_moment, rtol=1e-10)
     lever = np.square(cells.centroid - [4.0, 4.0]).sum(axis=1)
-    about = compute_moment_about_centroid(cells) + cells.mass * lever
-    assert about.sum() == pytest.approx(whole.polar_moment[0], rel=1e-10)
+    polar_moments = compute_moment_about_centroid(cells) + cells.mass * lever
+    assert polar_moments.sum() == pytest.approx(region_cell.polar_moment[0], rel=1e-10)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=4, deadline=None)
-def test_the_parallel_axis_identity(density, seed):
-    """Equation (3), with the moment about the centroid from cells that have it as their generator."""
+def test_moments_obey_the_parallel_axis_theorem(density, seed):
+    """Check equation (3) with moments of cells whose generator is the centroid."""
     points = np.random.default_rng(seed).uniform(1.0, 7.0, (4, 2))
     cells = build_cells(density, points, SQUARE)
     for k, ring in enumerate(cells.polygons):
-        alone = build_cells(density, cells.centroid[[k]], Region(ring))
-        assert compute_moment_about_centroid(cells)[k] == pytest.approx(alone.polar_moment[0], rel=1e-9)
+        centered = build_cells(density, cells.centroid[[k]], Region(ring))
+        assert compute_moment_about_centroid(cells)[k] == pytest.approx(centered.polar_moment[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("density", [*GAUSSIANS.values(), RASTERS["bilinear"], POLYGONS["rooms"]])
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=4, deadline=None)
-def test_the_gradient_of_the_locational_cost(density, seed):
-    """(13) with φ: the sum of the polar moments falls by 2 M (p - C) as a robot moves."""
+def test_the_gradient_of_the_locational_cost_agrees_with_finite_differences(density, seed):
+    """Check (13) with φ: the gradient of the sum of polar moments is 2 M (p - C)."""
     rng = np.random.default_rng(seed)
-    points, i = rng.uniform(1.0, 7.0, (5, 2)), int(rng.integers(5))
-    cells, step = build_cells(density, points, SQUARE), 1e-5
+    points = rng.uniform(1.0, 7.0, (5, 2))
+    i = int(rng.integers(5))
+    cells = build_cells(density, points, SQUARE)
+    step = 1e-5
     slope = 2.0 * cells.mass[i] * (points[i] - cells.centroid[i])
     for axis in (0, 1):
-        ends = []
+        costs = []
         for sign in (1.0, -1.0):
             moved = points.copy()
             moved[i, axis] += sign * step
-            ends.append(build_cells(density, moved, SQUARE).polar_moment.sum())
-        assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slope[axis], abs=1e-4 * cells.mass.sum())
+            costs.append(build_cells(density, moved, SQUARE).polar_moment.sum())
+        difference_quotient = (costs[0] - costs[1]) / (2 * step)
+        assert difference_quotient == pytest.approx(slope[axis], abs=1e-4 * cells.mass.sum())
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 def test_voronoi_cells_are_the_best_partition(density):
-    """(5): with any other assignment of places the locational cost is larger."""
-    points = np.array(ROW)
+    """Check (5): the cells of other generators have a larger locational cost."""
+    points = np.array(ROBOTS)
     best = build_cells(density, points, SQUARE).polar_moment.sum()
     rng = np.random.default_rng(1)
     for _ in range(5):
-        other = build_cells(density, points + rng.normal(0.0, 0.3, points.shape), SQUARE)
-        off = np.square(points - other.centroid).sum(axis=1)
-        assert (compute_moment_about_centroid(other) + other.mass * off).sum() > best
+        cells = build_cells(density, points + rng.normal(0.0, 0.3, points.shape), SQUARE)
+        squared_lever = np.square(points - cells.centroid).sum(axis=1)
+        assert (compute_moment_about_centroid(cells) + cells.mass * squared_lever).sum() > best
 
 
 @pytest.mark.parametrize("count", [5, 30])
-def test_one_everywhere_is_as_no_density_to_the_last_bit(count):
+def test_a_density_of_one_equals_no_density_to_the_last_bit(count):
     points = np.random.default_rng(3).uniform(1.0, 6.0, (count, 2))
-    plain, one = build_cells(None, points), build_cells(Uniform(), points)
-    assert np.array_equal(plain.mass, one.mass)
-    assert np.array_equal(plain.centroid, one.centroid)
-    assert np.array_equal(plain.polar_moment, one.polar_moment)
+    plain = build_cells(None, points)
+    uniform = build_cells(Uniform(), points)
+    assert np.array_equal(plain.mass, uniform.mass)
+    assert np.array_equal(plain.centroid, uniform.centroid)
+    assert np.array_equal(plain.polar_moment, uniform.polar_moment)
     assert_allclose(build_cells(Uniform(3.0), points).mass, 3.0 * plain.mass, rtol=1e-15)
     assert np.array_equal(build_cells(Uniform(3.0), points).centroid, plain.centroid)
     assert np.array_equal(build_cells(Gaussians((), 2.0), points).centroid, plain.centroid)
 
 
-def test_values_of_all_kinds():
+def test_densities_of_each_kind_have_the_expected_values():
     points = np.array([[3.0, 3.0], [0.5, 0.5]])
     peak = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.5), (0.5, 1.0)))
     assert Gaussians((peak, peak), 0.25).evaluate(points)[0] == pytest.approx(4.25)
-    away = np.array([[-2.5, -2.5]])
-    square = float((away @ np.linalg.inv(np.array(peak.matrix)) @ away.T)[0, 0])
-    assert Gaussians((peak,)).evaluate(points)[1] == pytest.approx(2.0 * np.exp(-0.5 * square))
+    offset = np.array([-2.5, -2.5])
+    squared_distance = float(offset @ np.linalg.inv(np.array(peak.matrix)) @ offset)
+    assert Gaussians((peak,)).evaluate(points)[1] == pytest.approx(2.0 * np.exp(-0.5 * squared_distance))
     assert Uniform(2.0).evaluate(points).tolist() == [2.0, 2.0]
     room = WeightedArea(((2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)), 5.0)
     on_top = WeightedArea(((2.5, 2.5), (3.5, 2.5), (3.5, 3.5), (2.5, 3.5)), 0.5)
@@ -139,7 +145,7 @@ def test_a_raster_has_its_lowest_row_first_and_extends_beyond_its_border():
     assert smooth.evaluate(np.array([[2.0, 1.0]])).tolist() == [2.5]
 
 
-def test_sampling_keeps_linear_densities():
+def test_sampling_preserves_linear_densities():
     values = np.arange(6.0)[None, :] + 2.0 * np.arange(4.0)[:, None] + 1.0
     raster = Raster(values, (0.0, 0.0, 6.0, 4.0))
     finer = sample_density(raster, (0.5, 0.5, 5.5, 3.5), 50, 30)
@@ -148,7 +154,7 @@ def test_sampling_keeps_linear_densities():
     assert sample_density(None, (0.0, 0.0, 1.0, 1.0), 3, 3).values.tolist() == [[1.0] * 3] * 3
 
 
-def test_where_nothing_counts_the_centroid_is_that_of_the_area():
+def test_cells_without_mass_have_the_centroid_of_their_area():
     corner = WeightedArea(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), 1.0)
     points = [[0.5, 0.5], [6.0, 6.0], [7.0, 1.0]]
     cells = build_cells(WeightedPolygons((corner,), 0.0), points, SQUARE)
@@ -160,34 +166,35 @@ def test_where_nothing_counts_the_centroid_is_that_of_the_area():
 
 @given(x=st.floats(4.0, 60.0))
 @settings(max_examples=12, deadline=None)
-def test_far_from_a_hot_spot_the_centroid_goes_over_smoothly(x):
-    """Where the closed form has lost all its digits, targets neither jump nor leave their cells."""
+def test_centroids_far_from_a_peak_are_continuous(x):
+    """Where the closed form loses all digits, centroids do not jump and stay in their cells."""
     peak = Gaussians((Gaussian((0.0, 0.0), 1.0, sigma=1.0),))
     cell = Region(np.array([[x, -0.5], [x + 1.0, -0.5], [x + 1.0, 0.5], [x, 0.5]]))
-    near, far = (build_cells(peak, [[x + 0.5, 0.1 + shift]], cell) for shift in (0.0, 1e-9))
-    assert (cell.contains(near.centroid, 1e-6)).all()
-    assert_allclose(near.centroid, far.centroid, atol=1e-3)
+    cells = build_cells(peak, [[x + 0.5, 0.1]], cell)
+    shifted_cells = build_cells(peak, [[x + 0.5, 0.1 + 1e-9]], cell)
+    assert cell.contains(cells.centroid, 1e-6).all()
+    assert_allclose(cells.centroid, shifted_cells.centroid, atol=1e-3)
 
 
-def test_cells_that_touch_and_coincide_with_areas():
-    """Edges of areas that lie on borders of cells, exactly or nearly, count once."""
-    halves = [[2.0, 4.0], [6.0, 4.0]]
+def test_edges_of_areas_on_borders_of_cells_count_once():
+    """The edges lie on the borders exactly or up to rounding."""
+    centers = [[2.0, 4.0], [6.0, 4.0]]
     for shift in (0.0, 1e-16, 1e-15, -1e-13, 1e-9):
         area = WeightedArea(((4.0 + shift, 0.0), (8.0, 0.0), (8.0, 8.0), (4.0 + shift, 8.0)), 3.0)
-        cells = build_cells(WeightedPolygons((area,), 0.0), halves, SQUARE)
+        cells = build_cells(WeightedPolygons((area,), 0.0), centers, SQUARE)
         assert_allclose(cells.mass, [0.0, 96.0], atol=1e-6)
     ring = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
     hole = ((2.0, 2.0), (2.0, 6.0), (6.0, 6.0), (6.0, 2.0))
-    cells = build_cells(WeightedPolygons((WeightedArea(ring, 2.0, (hole,)),), 1.0), halves, SQUARE)
+    cells = build_cells(WeightedPolygons((WeightedArea(ring, 2.0, (hole,)),), 1.0), centers, SQUARE)
     assert_allclose(cells.mass, [32.0 + 24.0] * 2, rtol=1e-14)
 
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=12, deadline=None)
 def test_weighted_polygons_agree_with_intersections_by_shapely(seed):
-    """An independent second way: the cells cut by the areas, the later ones on top."""
+    """The cells are cut by the areas, and later areas are on top."""
     rng = np.random.default_rng(seed)
-    areas, above = [], shapely.MultiPolygon()
+    areas = []
     for _ in range(4):
         ring = shapely.MultiPoint(rng.uniform(-1.0, 9.0, (7, 2))).convex_hull.exterior.coords[:-1]
         areas.append(WeightedArea(tuple(ring), float(rng.uniform(0.0, 5.0))))
@@ -195,20 +202,22 @@ def test_weighted_polygons_agree_with_intersections_by_shapely(seed):
     cells = build_cells(density, rng.uniform(0.5, 7.5, (5, 2)), SQUARE)
     rings = [shapely.Polygon(ring) for ring in cells.polygons]
     mass = np.zeros(len(rings))
+    above = shapely.MultiPolygon()
     for area in reversed(areas):
-        part = area.polygon - above
+        visible_part = area.polygon - above
         above = above | area.polygon
-        mass += [area.weight * (ring & part).area for ring in rings]
+        mass += [area.weight * (ring & visible_part).area for ring in rings]
     mass += [0.5 * (ring - above).area for ring in rings]
     assert_allclose(cells.mass, mass, rtol=1e-9)
 
 
 @given(seed=st.integers(0, 10_000), rows=st.integers(1, 9), columns=st.integers(1, 9))
 @settings(max_examples=12, deadline=None)
-def test_a_raster_of_cells_is_that_many_polygons(seed, rows, columns):
+def test_a_raster_of_cells_equals_polygons(seed, rows, columns):
     rng = np.random.default_rng(seed)
     values = rng.uniform(0.0, 3.0, (rows, columns))
-    x, y = np.linspace(1.0, 7.0, columns + 1), np.linspace(0.0, 8.0, rows + 1)
+    x = np.linspace(1.0, 7.0, columns + 1)
+    y = np.linspace(0.0, 8.0, rows + 1)
     areas = [
         WeightedArea(((x[i], y[j]), (x[i + 1], y[j]), (x[i + 1], y[j + 1]), (x[i], y[j + 1])), values[j, i])
         for j in range(rows)
@@ -224,41 +233,47 @@ def test_a_raster_of_cells_is_that_many_polygons(seed, rows, columns):
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 def test_a_cell_depends_only_on_robots_within_range(density):
-    """To the last bit, however many others there are, and wherever they are."""
+    """Other robots do not change a bit of it."""
     rng = np.random.default_rng(5)
     points = rng.uniform(0.5, 7.5, (40, 2))
     ranges = np.full(len(points), 1.6)
 
-    def list_cell_values(places, i):
-        heard = Neighbors.from_ranges(places, ranges[: len(places)])
-        cells = partition(places, SQUARE, heard, density=density)
+    def list_cell_values(positions, i):
+        neighbors = Neighbors.from_ranges(positions, ranges[: len(positions)])
+        cells = partition(positions, SQUARE, neighbors, density=density)
         return cells.mass[i], *cells.centroid[i], cells.polar_moment[i]
 
     moved = points.copy()
-    away = np.flatnonzero(np.hypot(*(points - points[0]).T) > 3.4)
-    moved[away] = rng.uniform(0.5, 7.5, (len(away), 2))
-    still_away = np.hypot(*(moved[away] - points[0]).T) > 1.7
-    moved[away[~still_away]] = points[away[~still_away]]
+    distant = np.flatnonzero(np.hypot(*(points - points[0]).T) > 3.4)
+    moved[distant] = rng.uniform(0.5, 7.5, (len(distant), 2))
+    has_come_near = np.hypot(*(moved[distant] - points[0]).T) <= 1.7
+    moved[distant[has_come_near]] = points[distant[has_come_near]]
     assert list_cell_values(points, 0) == list_cell_values(moved, 0)
-    near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
-    assert list_cell_values(points, 0) == list_cell_values(points[near], 0)
+    in_range = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
+    assert list_cell_values(points, 0) == list_cell_values(points[in_range], 0)
 
 
-def test_densities_are_values():
+def test_densities_are_immutable_and_compare_by_value():
     values = np.ones((3, 4))
-    a, b = Raster(values, (0.0, 0.0, 1.0, 1.0)), Raster(values.copy(), (0.0, 0.0, 1.0, 1.0))
-    assert a == b and hash(a) == hash(b) and a != Raster(2 * values, (0.0, 0.0, 1.0, 1.0))
-    assert a != Uniform()
+    bounds = (0.0, 0.0, 1.0, 1.0)
+    raster = Raster(values, bounds)
+    equal_raster = Raster(values.copy(), bounds)
+    assert raster == equal_raster
+    assert hash(raster) == hash(equal_raster)
+    assert raster != Raster(2 * values, bounds)
+    assert raster != Uniform()
     values[0, 0] = 7.0
-    assert a == b
+    assert raster == equal_raster
     with pytest.raises(ValueError, match="read-only"):
-        a.values[0, 0] = 2.0
-    assert a.is_uniform and Uniform().is_uniform and not GAUSSIANS["two"].is_uniform
-    assert (a.min_value, a.max_value) == (1.0, 1.0)
+        raster.values[0, 0] = 2.0
+    assert raster.is_uniform
+    assert Uniform().is_uniform
+    assert not GAUSSIANS["two"].is_uniform
+    assert (raster.min_value, raster.max_value) == (1.0, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("make", "words"),
+    ("build", "message"),
     [
         (lambda: Uniform(0.0), "weight: expected a number above 0 to 1000000, got 0.0"),
         (lambda: Uniform(float("nan")), "weight: expected .* got nan"),
@@ -280,6 +295,6 @@ def test_densities_are_values():
         (lambda: Raster(np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0), "cubic"), "bilinear or cells"),  # type: ignore[arg-type]
     ],
 )
-def test_what_is_no_density(make, words):
-    with pytest.raises(ParameterError, match=words):
-        make()
+def test_invalid_densities_are_rejected(build, message):
+    with pytest.raises(ParameterError, match=message):
+        build()
