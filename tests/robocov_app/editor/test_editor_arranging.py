@@ -70,7 +70,7 @@ def test_gaps_become_equal(sketch, axis):
 def test_starts_are_aligned_too_and_the_boundary_stays(sketch):
     change = align(sketch, Selection.of(0, "disc", "all"), "left")
     assert change.sketch.get_start("disc") == DiscStart((1.5, 7.0), 0.5)
-    assert change.description == "2 things aligned at the left"
+    assert change.description == "2 objects aligned at the left"
     change = align(sketch, Selection.of(1, BOUNDARY), "middle")
     assert change.sketch.get_item(1).shape.center == (5.0, 4.0)
     change = align(sketch, Selection.of(1, BOUNDARY), "right")

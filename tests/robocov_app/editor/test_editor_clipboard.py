@@ -52,7 +52,7 @@ def test_names_of_starts_stay_apart_and_a_second_boundary_is_left_out_unless_it_
     assert [name for name, _ in change.sketch.starts] == ["corner", "corner 2"]
     assert change.sketch.boundary == HALL
     assert [item.shape for item in change.sketch.obstacles] == [BOX, BOX]
-    assert change.description == "2 things pasted"
+    assert change.description == "2 objects pasted"
     alone = paste(sketch, copy_selection(sketch, Selection(boundary=True)))
     assert alone.sketch.obstacles[-1].shape == PolygonObstacle(HALL)
 

@@ -285,7 +285,7 @@ def test_deleting(sketch):
     assert change.sketch.get_item(2).shape.points == ((5.0, 0.0), (7.0, 2.4))
     assert [name for name, _ in change.sketch.starts] == ["corner", "all"]
     assert change.selection == Selection()
-    assert change.description == "3 things deleted"
+    assert change.description == "3 objects deleted"
     assert properties.delete(sketch, Selection(boundary=True)).sketch.boundary is None
 
 

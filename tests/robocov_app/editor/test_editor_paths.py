@@ -51,7 +51,7 @@ def test_way_points_move_and_go_and_with_the_last_but_one_the_path() -> None:
     fewer = paths.remove_waypoint(moved, 0, 0).sketch
     assert led(fewer).points == ((7.0, 3.0), (8.0, 6.0))
     assert paths.remove_waypoint(fewer, 0, 1).sketch.get_item(0).shape.path is None
-    with pytest.raises(MapError, match="no such way point"):
+    with pytest.raises(MapError, match="no longer exists"):
         paths.move_waypoint(sketch, 0, 3, (1.0, 1.0))
     with pytest.raises(MapError, match="in one place"):
         paths.move_waypoint(fewer, 0, 0, (8.0, 6.0))
@@ -87,7 +87,7 @@ def test_what_is_near() -> None:
     assert paths.find_waypoint(ROUND, (8.1, 2.1), 0.2) == 1
     assert paths.find_waypoint(ROUND, (5.0, 2.0), 0.2) is None
     assert paths.find_leg(ROUND, (5.0, 2.1), 0.2) == 1
-    # the leg back to the first way point is one of loops only
+    # the leg back to the first waypoint is one of loops only
     assert paths.find_leg(ROUND, (5.0, 4.0), 0.2) == 3
     assert paths.find_leg(replace(ROUND, repeat="back-and-forth"), (5.0, 4.0), 0.2) is None
 
@@ -148,7 +148,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         hands.click_all((6.0, 2.0), (6.0, 5.0))
         points = np.array(led(hands.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
-        # a click on a leg puts a way point into it
+        # a click on a leg puts a waypoint into it
         hands.click_all((4.0, 2.0))
         assert len(led(hands.sketch).points) == 4
         np.testing.assert_allclose(led(hands.sketch).points[1], (4.0, 2.0), atol=0.03)

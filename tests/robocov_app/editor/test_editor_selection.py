@@ -164,7 +164,7 @@ def test_selections_in_words(sketch):
         "boundary": Selection(boundary=True),
         "2 vertices": Selection(vertices=vertex),
         "vertex": Selection(vertices=frozenset({Vertex(0, 0, 0)})),
-        "3 things": Selection.of(0, 1, "disc"),
+        "3 objects": Selection.of(0, 1, "disc"),
     }
     for expected, selection in words.items():
         assert selection.describe(sketch) == expected

@@ -73,7 +73,7 @@ class DraggedObstacles:
         fill = mix(theme.obstacle, theme.final, DRAGGED_TINT)
         self._sheet.draw_items(page, items, fill, theme.final)
         for owner in selection.owners - selection.items:
-            draw_object_outline(page, self._sheet, scene.saved, owner, theme.final, 2.0)
+            draw_object_outline(page, self._sheet, scene.saved, owner, color=theme.final, width=2.0)
         return page.surface
 
 
@@ -186,7 +186,7 @@ class SelectedObjects:
         if Selection.of(hovered).restrict_to(scene.sketch):
             theme = scene.canvas.theme
             color = mix(theme.background, theme.final, 0.7)
-            draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, color, 1.5)
+            draw_object_outline(scene.canvas, self._sheet, scene.sketch, hovered, color=color, width=1.5)
 
     def _draw_outlines(self, scene: EditorScene, selection: Selection, owners: set[Owner]) -> None:
         if len(owners) <= MANY_OBJECTS:
@@ -204,7 +204,7 @@ class SelectedObjects:
 
     def _draw_all(self, canvas: Canvas, sketch: Sketch, owners: set[Owner]) -> None:
         for owner in owners:
-            draw_object_outline(canvas, self._sheet, sketch, owner, canvas.theme.final, 2.0)
+            draw_object_outline(canvas, self._sheet, sketch, owner, color=canvas.theme.final, width=2.0)
 
     def _draw_handles(self, scene: EditorScene, selection: Selection) -> None:
         canvas = scene.canvas
@@ -285,7 +285,7 @@ def build_layers(sheet: Sheet) -> tuple[OverlayLayer, ...]:
 
 
 def draw_object_outline(
-    canvas: Canvas, sheet: Sheet, sketch: Sketch, owner: Owner, color: Color, width: float
+    canvas: Canvas, sheet: Sheet, sketch: Sketch, owner: Owner, *, color: Color, width: float
 ) -> None:
     """Draw the outline of an obstacle, a start or the boundary; `width` in px at scale 1."""
     if isinstance(owner, str):

@@ -298,7 +298,9 @@ def _draw_density(canvas: Canvas, sketch: Sketch) -> None:
 def _draw_grid(page: Surface, view: View, box: Rect, *, has_fine_lines: bool) -> None:
     theme = view.theme
     fine_step, coarse_step = compute_grid_steps(view.grid, view.camera.zoom, view.scale)
-    fine_share, coarse_share = (0.32, 0.75) if theme is LIGHT else (0.2, 0.5)
+    is_light = theme is LIGHT
+    fine_share = 0.32 if is_light else 0.2
+    coarse_share = 0.75 if is_light else 0.5
     if has_fine_lines:
         _draw_grid_lines(page, view, box, fine_step, mix(theme.background, theme.grid, fine_share))
     _draw_grid_lines(page, view, box, coarse_step, mix(theme.background, theme.grid, coarse_share))
@@ -380,7 +382,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -
 
 
 def _merge_boxes(boxes: list[Rect]) -> list[Rect]:
-    """Return boxes that cover the same and do not overlap; of many, the box around all."""
+    """Return boxes that cover the same area without overlaps; of many boxes only the one around all."""
     if len(boxes) > MAX_BOXES:
         boxes = [boxes[0].unionall(boxes[1:])]
     merged: list[Rect] = []

@@ -147,7 +147,7 @@ def clean_text(text: str, label: str, maximum: int = MAX_TEXT_CHARACTERS) -> str
     Parameters
     ----------
     text : str
-        The text. Halves of characters, which no file can contain, are dropped.
+        The text. Surrogates, which no file can contain, are dropped.
     label : str
         Name of the text for the error message.
     maximum : int
@@ -161,7 +161,7 @@ def clean_text(text: str, label: str, maximum: int = MAX_TEXT_CHARACTERS) -> str
 def _build_outline(points: Sequence[Point], label: str) -> Ring:
     ring = drop_repeated_points(round_ring(points))
     if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < MIN_DRAWN_LENGTH_M**2:
-        raise MapError(f"{label} needs three corners that enclose something")
+        raise MapError(f"{label} needs three corners that enclose an area")
     return ring
 
 

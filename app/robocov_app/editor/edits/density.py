@@ -210,7 +210,7 @@ def _check_area(area: WeightedArea) -> WeightedArea:
     if len(area.vertices) >= 3:
         polygon = shapely.Polygon(area.vertices, area.holes)
     if not polygon.is_valid or polygon.area < create.MIN_DRAWN_LENGTH_M**2:
-        raise MapError("an area needs three corners that enclose something, and an outline without crossings")
+        raise MapError("an area needs three corners that enclose an area, and an outline without crossings")
     return replace(area, weight=_check_weight(area.weight, 0.0))
 
 

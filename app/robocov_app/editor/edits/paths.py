@@ -57,14 +57,14 @@ def add_waypoint(
     if index is None:
         index = len(path.points)
     points = (*path.points[:index], check_point(point), *path.points[index:])
-    return _set_path(sketch, key, replace(path, points=points), "way point added")
+    return _set_path(sketch, key, replace(path, points=points), "waypoint added")
 
 
 def move_waypoint(sketch: Sketch, key: int, number: int, point: Point) -> Change:
     """Move a waypoint; when the first one moves, the obstacle stays where it is at time zero."""
     path = _require_path(sketch, key, number)
     points = (*path.points[:number], check_point(point), *path.points[number + 1 :])
-    return _set_path(sketch, key, replace(path, points=points), "way point moved")
+    return _set_path(sketch, key, replace(path, points=points), "waypoint moved")
 
 
 def remove_waypoint(sketch: Sketch, key: int, number: int) -> Change:
@@ -73,7 +73,7 @@ def remove_waypoint(sketch: Sketch, key: int, number: int) -> Change:
     if len(path.points) <= 2:
         return remove_path(sketch, Selection.of(key))
     points = path.points[:number] + path.points[number + 1 :]
-    return _set_path(sketch, key, replace(path, points=points), "way point removed")
+    return _set_path(sketch, key, replace(path, points=points), "waypoint removed")
 
 
 def remove_path(sketch: Sketch, selection: Selection) -> Change:
@@ -144,7 +144,7 @@ def _require_path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
     """Return the path of an obstacle; raise MapError unless it has a waypoint of a number."""
     path = sketch.get_item(key).shape.path
     if path is None or not 0 <= number < len(path.points):
-        raise MapError("there is no such way point any more")
+        raise MapError("this waypoint no longer exists")
     return path
 
 
@@ -160,7 +160,7 @@ def _edit_paths(sketch: Sketch, selection: Selection, edit: PathEdit, descriptio
 
 def _set_path(sketch: Sketch, key: int, path: ObstaclePath, description: str) -> Change:
     extent = np.ptp(path.points, axis=0).max()
-    require(extent >= MIN_SIZE_M, "the way points lie in one place: click somewhere else")
+    require(extent >= MIN_SIZE_M, "the waypoints lie in one place: click somewhere else")
     shape = replace(sketch.get_item(key).shape, path=path)
     changed = sketch.with_objects({key: shape})
     return Change(changed, Selection.of(key), f"{sketch.display_name(key)}: {description}")

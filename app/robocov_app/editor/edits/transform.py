@@ -229,8 +229,8 @@ def place(sketch: Sketch, selection: Selection, x: float | None, y: float | None
 def mirror(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     """Mirror the selection about the center of its box: "x" swaps left and right, "y" up and down."""
     require(axis in ("x", "y"), "expected an axis x or y")
-    factor_x, factor_y = (-1.0, 1.0) if axis == "x" else (1.0, -1.0)
-    affine = Affine.stretch(factor_x, factor_y, _compute_center(sketch, selection))
+    factor_x = -1.0 if axis == "x" else 1.0
+    affine = Affine.stretch(factor_x, -factor_x, _compute_center(sketch, selection))
     return _transform(sketch, selection, affine, "mirrored")
 
 

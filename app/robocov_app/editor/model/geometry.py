@@ -122,5 +122,6 @@ def format_length(meters: float) -> str:
 
 def format_point(point: Point) -> str:
     """Format a position: "(1.00, 2.50) m"."""
-    x, y = (round(value, 2) + 0.0 for value in point)  # never minus zero
+    x = round(point[0], 2) + 0.0  # never minus zero
+    y = round(point[1], 2) + 0.0
     return f"({x:.2f}, {y:.2f}) m"

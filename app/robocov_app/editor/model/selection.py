@@ -128,7 +128,7 @@ class Selection:
         vertex_count = len(self.vertices)
         kinds = [self.items, self.starts, self.boundary, self.vertices]
         if sum(map(bool, kinds)) > 1:
-            return f"{len(owners) + vertex_count} things"
+            return f"{len(owners) + vertex_count} objects"
         if vertex_count:
             return f"{vertex_count} vertices" if vertex_count > 1 else "vertex"
         if len(owners) > 1:

@@ -38,7 +38,7 @@ class MotionPathTool(EditorTool):
     name = "path"
     title = "Path"
     key = "o"
-    hint = "click an obstacle, then where it goes; drag way points, Backspace takes one; type its speed"
+    hint = "click an obstacle, then where it goes; drag waypoints, Backspace removes one; type its speed"
 
     def __init__(self) -> None:
         super().__init__()

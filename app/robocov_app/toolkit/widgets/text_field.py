@@ -124,7 +124,7 @@ def _draw_field(page: Page, rect: Rect, *, is_edited: bool) -> None:
 
 
 def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placeholder: str) -> None:
-    """Draw a text with its selection, its cursor, and what an input method is composing."""
+    """Draw a text with its selection, its cursor, and the text that an input method is composing."""
     theme = page.theme
     size = page.px(TEXT_PX)
     clip = screen.get_clip()
