@@ -88,7 +88,7 @@ def test_boundary_and_starts_are_drawn(sketch):
     ("deed", "words"),
     [
         (lambda s: create.add_polygon(s, [(0, 0), (1, 1)]), "three corners"),
-        (lambda s: create.add_polygon(s, [(0, 0), (1, 1), (2, 2)]), "enclose something"),
+        (lambda s: create.add_polygon(s, [(0, 0), (1, 1), (2, 2)]), "enclose an area"),
         (lambda s: create.add_rectangle(s, [(0, 0), (0, 3)]), "a width and a height"),
         (lambda s: create.add_circle(s, (0, 0), 0.0), "needs a radius"),
         (lambda s: create.add_circle(s, (math.nan, 0), 1.0), "too far away"),

@@ -172,7 +172,7 @@ class TestDrawnShapes:
         ],
     )
     def test_a_polygon_encloses_something(self, corners):
-        with pytest.raises(MapError, match="three corners that enclose something"):
+        with pytest.raises(MapError, match="three corners that enclose an area"):
             build_polygon(corners)
 
     @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ def build_polygon(points: list[Point]) -> PolygonObstacle:
     if len(vertices) > 2 and vertices[0] == vertices[-1]:
         vertices = vertices[:-1]
     if len(vertices) < 3 or shapely.MultiPoint(vertices).convex_hull.area < MIN_SHAPE_SIZE_M**2:
-        raise MapError("a polygon needs three corners that enclose something")
+        raise MapError("a polygon needs three corners that enclose an area")
     if not shapely.Polygon(vertices).is_valid:
         raise MapError("the polygon's outline crosses itself")
     return PolygonObstacle(vertices)
