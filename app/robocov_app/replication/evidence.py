@@ -116,7 +116,7 @@ def load_profile(controller: str) -> ControllerProfile:
     entry = profiles.get(controller, {})
     source = entry.get("source", "")
     if not entry.get("read", True):
-        source = source.removesuffix(".") + "; made from what is generally known of it, not from its text."
+        source = source.removesuffix(".") + "; implemented from general knowledge, not from its text."
     behavior = entry.get("does") or f"{capitalize(controller_class.summary).rstrip('.')}."
     return ControllerProfile(
         controller=controller,
@@ -287,10 +287,10 @@ def describe_tuning(controller: str, outcomes: GainOutcomes) -> str:
         ratio = float(np.median(grid.excess[best] / grid.excess[row]))
         return f"median ratio {format_amount(ratio)}"
 
-    as_default = ", as by default" if default_row == best else ""
+    as_default = ", the default" if default_row == best else ""
     text = (
-        f"Gains: {values}{as_default}: of {len(grid.gains)} sets the best on "
-        f"{len(set(grid.maps))} maps of the tuning, mean J/J_ref {means[best]}"
+        f"Gains: {values}{as_default}: of {len(grid.gains)} sets, the best one on "
+        f"{len(set(grid.maps))} tuning maps, mean J/J_ref {means[best]}"
     )
     if default_row is not None and default_row != best:
         text += f"; with its defaults {means[default_row]}, {describe_ratio(default_row)}"

@@ -62,7 +62,7 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
 
 
 def draw_tool_state(canvas: Canvas, state: ViewerDrawState) -> None:
-    """Draw what a tool shows in a pane."""
+    """Draw the overlay of a tool in a pane."""
     if state.obstacle is not None:
         _draw_obstacle(canvas, state.obstacle)
     if not state.line:

@@ -167,12 +167,12 @@ def test_the_benefit_of_tuning_is_described():
         "range-limited", build_gain_outcomes((1.2, 1.2, 1.5), (1.5, 1.8, 2.1), (0.9, 1.2, 1.2))
     )
     assert better == (
-        "Gains: interaction_range 22: of 3 sets the best on 3 maps of the tuning, mean J/J_ref 1.100; "
+        "Gains: interaction_range 22: of 3 sets, the best one on 3 tuning maps, mean J/J_ref 1.100; "
         "with its defaults 1.3, median ratio 0.8; with the worst set 1.8, median ratio 0.6."
     )
     usual = describe_tuning("range-limited", build_gain_outcomes((1.2, 1.2, 1.2), (1.8, 2.4, np.nan)))
     assert usual.startswith(
-        f"Gains: interaction_range {DEFAULTS['interaction_range']:g}, as by default: of 2 sets "
+        f"Gains: interaction_range {DEFAULTS['interaction_range']:g}, the default: of 2 sets, "
     )
     assert usual.endswith("with the worst set 2.1, median ratio 0.583.")
 

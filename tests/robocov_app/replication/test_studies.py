@@ -138,7 +138,7 @@ class TestMaps:
             for others in range(6):
                 there = estimate_fraction(np.arange(count) >= others, range(count))
                 lows.append(there.low)
-                p_values.append(len(REGISTERED) * there.p_value(NEARLY_ALWAYS, np.inf))
+                p_values.append(len(REGISTERED) * there.compute_p_value(NEARLY_ALWAYS, np.inf))
             assert [low >= NEARLY_ALWAYS for low in lows] == [True] * 5 + [False]
             assert [p <= ALPHA for p in p_values] == [True] * 3 + [False] * 3
 

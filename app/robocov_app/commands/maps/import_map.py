@@ -18,7 +18,7 @@ from robocov_app.terminal.progress import show_progress
 
 @dataclass
 class Arguments(JsonOption):
-    """Convert a foreign map file to a map of robocov, and report what was dropped, repaired and changed.
+    """Convert a foreign map file to a map of robocov, and report dropped, repaired and changed parts.
 
     The format is detected from the content, otherwise from the suffix. Inapplicable options are rejected.
 

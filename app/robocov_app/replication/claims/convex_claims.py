@@ -42,7 +42,7 @@ def judge_convex_final(outcomes: Outcomes) -> Claim:
     highest = format_amount(pairs.ratios.max())
     explanation = (
         f"The ratio lies between {lowest} and {highest}; Lloyd ends in "
-        f"a centroidal tessellation, of which a region has several. {describe_other_gains(outcomes)}"
+        f"one of several centroidal tessellations of the region. {describe_other_gains(outcomes)}"
     )
     return claim.judge(criteria, explanation, pairs.outcomes, runs_per_instance=2)
 

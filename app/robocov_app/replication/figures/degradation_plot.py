@@ -46,8 +46,8 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
     panel_height = (height - 110) / rows
     bottom, top = _find_limits(degradations)
     page = FigurePage(_SIZE_PX, theme, scale=1.0)
-    page.write_title("Coverage when things go wrong", 26)
-    subtitle = "final mean distance, as a multiple of the same run's in which that does not go wrong"
+    page.write_title("Coverage under disturbances", 26)
+    subtitle = "final mean distance relative to the same run without the disturbance"
     page.write(subtitle, page.margin, 50, color=quiet, max_width=page.content_width)
     for number, name in enumerate(names):
         row, column = divmod(number, columns)

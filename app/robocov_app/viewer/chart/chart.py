@@ -121,7 +121,7 @@ class Chart:
             draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]))
 
     def _update_page_key(self, frame: ChartFrame) -> bool:
-        """Update the key of what the page shows; return whether the page has to be drawn again."""
+        """Update the key of the content of the page; return whether the page has to be drawn again."""
         timeline = frame.timeline
         samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in frame.list_curves()]
         key = (

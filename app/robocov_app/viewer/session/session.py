@@ -151,7 +151,7 @@ class Session:
         if timeline.is_live:
             timeline.run.apply(edit)
         else:
-            releases_robot = self._apply_in_past(edit)
+            releases_robot = _apply_in_past(timeline, edit)
         if self._gesture is not None and self._gesture.continues(gesture, kind, timeline):
             node = timeline.head
             _extend_node(node, replace(edit, step=timeline.step), kind, description)
@@ -164,26 +164,6 @@ class Session:
             self._gesture = _Gesture(gesture, timeline.end_time, timeline.past_version)
         timeline.document.revision += 1
         timeline.note_edit(node)
-
-    def _apply_in_past(self, edit: RunEdit) -> bool:
-        """Make the displayed step the present, and apply an edit there.
-
-        Returns
-        -------
-        bool
-            Whether a robot was released that was dragged at that step.
-        """
-        timeline = self.timeline
-        shown = timeline.history[timeline.displayed_index]
-        releases_robot = shown.drag is not None and not isinstance(edit, DragRobot | ReleaseRobot)
-
-        def apply_to(run: Lockstep) -> None:
-            if releases_robot:
-                run.drag = None
-            run.apply(edit)
-
-        timeline.seek(timeline.document.nodes[shown.node], shown.step, edit=apply_to)
-        return releases_robot
 
     def restart(
         self,
@@ -429,6 +409,26 @@ class Session:
     def revive_robot(self, number: int) -> None:
         """Let a failed robot work again."""
         self.apply(ReviveRobot(number), "robot", f"robot {number} works again")
+
+
+def _apply_in_past(timeline: Timeline, edit: RunEdit) -> bool:
+    """Make the displayed step of a timeline the present, and apply an edit there.
+
+    Returns
+    -------
+    bool
+        Whether a robot was released that was dragged at that step.
+    """
+    shown = timeline.history[timeline.displayed_index]
+    releases_robot = shown.drag is not None and not isinstance(edit, DragRobot | ReleaseRobot)
+
+    def apply_to(run: Lockstep) -> None:
+        if releases_robot:
+            run.drag = None
+        run.apply(edit)
+
+    timeline.seek(timeline.document.nodes[shown.node], shown.step, edit=apply_to)
+    return releases_robot
 
 
 def toggle_failure(session: Session, number: int) -> str:

@@ -1,4 +1,4 @@
-"""The brush: paints the density while the simulation goes on."""
+"""The brush: paints the density while the simulation runs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

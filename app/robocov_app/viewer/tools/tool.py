@@ -29,7 +29,7 @@ class ViewerPointerEvent(PointerEvent):
 
 @dataclass(frozen=True)
 class ViewerDrawState(DrawState):
-    """What a tool of the viewer shows in a pane.
+    """The overlay of a tool of the viewer in a pane.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
     is_painting = False
 
     def build_draw_state(self, session: Session) -> ViewerDrawState:
-        """Return what the tool shows in a pane."""
+        """Return the overlay of the tool in a pane."""
         return ViewerDrawState()
 
     def resize(self, session: Session, factor: float) -> str:
