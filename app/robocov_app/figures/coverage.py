@@ -60,7 +60,7 @@ class Moment:
     ----------
     environment : Environment
     team : Team
-    field : Field
+    field : DistanceField
         Distances to the nearest robot.
     title, facts : str
         Lines above the map.
@@ -91,7 +91,7 @@ class Moment:
         Parameters
         ----------
         record : Record
-        field : Field
+        field : DistanceField
             Distances at the end.
         mean_distance : float, m
         counted : int array, optional

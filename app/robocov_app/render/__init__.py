@@ -1,6 +1,24 @@
-"""Drawing: theme, camera and layers that show an environment, a team and one moment of a run."""
+"""Drawing with pygame: pictures of an environment and a team at one time of a run.
+
+Modules
+-------
+painter, layer_catalog, layers
+    `Painter`, which draws a scene, and the layers that it can show.
+scene, record_scene, moving_obstacles, sensed_points
+    The content of a picture.
+annotations, legend_strip, color_bar
+    Texts and scales around the arena.
+camera, canvas, clipping, sprites, fonts, pixel_arrays, surface_cache
+    The means of drawing.
+field_lattice, distance_field, distance_colors
+    Distances to the nearest robot.
+density_shading, density_text
+    The density as colors and as text.
+crowding, panel_grid
+    Sizes of marks in a crowd, and grids of several pictures.
+"""
 
 import os
 
-# pygame greets on stdout, which belongs to the answers of commands
+# pygame prints a greeting to stdout, which belongs to the answers of commands.
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")

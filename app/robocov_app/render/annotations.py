@@ -5,7 +5,7 @@ from collections.abc import Set
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import measure_text, shorten_to_width
-from robocov_app.render.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, TOP_PX
+from robocov_app.render.legend_strip import MARGIN_PX, PADDING_PX, ROW_HEIGHT_PX
 from robocov_app.render.scene import Scene
 
 # Lengths in pixels at scale 1.
@@ -85,7 +85,7 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
     scale = canvas.scale
     left = EDGE_PX * scale
     right = canvas.surface.get_width() - EDGE_PX * scale
-    y = (TOP_PX + 0.5 * ROW_HEIGHT_PX) * scale
+    y = (PADDING_PX + 0.5 * ROW_HEIGHT_PX) * scale
     name_size = _CAPTION_SIZE_FACTOR * canvas.theme.text
     gap = _CAPTION_GAP_PX * scale
     costs = _list_shorter_costs(scene.cost)

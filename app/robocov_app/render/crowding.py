@@ -10,7 +10,7 @@ from robocov.arrays import Array
 _MAX_POINTS_WITHOUT_TREE = 120
 """With at most this many points, comparing all pairs is faster than building a tree."""
 _MAX_SAMPLED_POINTS = 250
-"""Number of points of which the distances to neighbors are sampled for the size of marks."""
+"""About the maximum number of points that are sampled for the size of marks."""
 _MAX_LINES_AT_FULL_WIDTH = 20
 _MIN_WIDTH_FACTOR = 0.5
 
@@ -43,7 +43,7 @@ def compute_nearest_distances(points: Array, step: int = 1) -> Array:
 def fit_radii(centers: Array, true_radii: Array, low: float, high: float) -> Array:
     """Choose radii of discs so that they overlap as little as possible.
 
-    A disc has the largest radius, but reaches at most half of the way to its nearest neighbor.
+    A disc has the largest radius that reaches at most halfway to its nearest neighbor.
 
     Parameters
     ----------

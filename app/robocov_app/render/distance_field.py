@@ -228,21 +228,13 @@ class DistanceField:
             block_rows[has_candidates], block_columns[has_candidates], middle_x, middle_y
         )
         step = abs(x[1] - x[0]) if len(x) > 1 else self.lattice.spacing
-        # Half the diagonal of a block, and as much again because distances assume straight borders.
+        # Half the diagonal of a block, and as much again, since borders may be curved.
         is_near = blocks.distances <= max_distance + 1.5 * _BLOCK_PX * step
-        coarse_rows, coarse_columns, block_indices = _list_block_pixels(
-            blocks.rows, blocks.columns, len(y), len(x)
-        )
-        coarse = BorderPixels(
-            coarse_rows, coarse_columns, blocks.owners[block_indices], blocks.distances[block_indices]
-        )
-        fine_rows, fine_columns, _ = _list_block_pixels(
-            np.append(blocks.rows[is_near], block_rows[~has_candidates]),
-            np.append(blocks.columns[is_near], block_columns[~has_candidates]),
-            len(y),
-            len(x),
-        )
-        return coarse, self._evaluate_pixels(fine_rows, fine_columns, x, y)
+        fine_block_rows = np.append(blocks.rows[is_near], block_rows[~has_candidates])
+        fine_block_columns = np.append(blocks.columns[is_near], block_columns[~has_candidates])
+        fine_rows, fine_columns, _ = _list_block_pixels(fine_block_rows, fine_block_columns, len(y), len(x))
+        fine = self._evaluate_pixels(fine_rows, fine_columns, x, y)
+        return _spread_over_pixels(blocks, len(y), len(x)), fine
 
     def _find_blocks(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
         """Return rows and columns of the blocks with a corner in a square that has candidates."""
@@ -392,6 +384,12 @@ def _list_block_pixels(
     columns = (block_columns[:, None] * _BLOCK_PX + inner_columns).ravel()
     inside = ((rows < height) & (columns < width)).nonzero()[0]
     return rows[inside], columns[inside], inside // _BLOCK_PX**2
+
+
+def _spread_over_pixels(blocks: BorderPixels, height: int, width: int) -> BorderPixels:
+    """Return the pixels of blocks that are inside a picture, with the values of their blocks."""
+    rows, columns, block_indices = _list_block_pixels(blocks.rows, blocks.columns, height, width)
+    return BorderPixels(rows, columns, blocks.owners[block_indices], blocks.distances[block_indices])
 
 
 def _select_different(sites: IntArray, sources: IntArray) -> IntArray:

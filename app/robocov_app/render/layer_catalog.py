@@ -138,7 +138,7 @@ def _build_map_layers() -> list[Layer]:
 
 
 def _build_perception_layers() -> list[Layer]:
-    """Build what robots sense and hear."""
+    """Build the perception of robots: known obstacles, scans, ranges and neighbors."""
     return [
         Layer(
             "sensed",
@@ -261,7 +261,7 @@ def _build_robot_layers() -> list[Layer]:
 
 
 def _build_strips() -> list[Layer]:
-    """Build what is around the arena."""
+    """Build the annotations around the arena."""
     return [
         Layer("color_bar", "Color scale", draw_color_bar, needs=("field",), is_in_world=False),
         Layer("legend", "Legend", LegendLayer().draw, is_in_world=False),

@@ -18,8 +18,8 @@ from robocov_app.render.surface_cache import LatestValue
 MARGIN_PX = 14.0
 """Space at the sides of the legend and around the arena."""
 ROW_HEIGHT_PX = 22.0
-TOP_PX = 6.0
-"""Space above the first row."""
+PADDING_PX = 6.0
+"""Space above the first row and below the last one."""
 _SYMBOL_WIDTH_PX = 28.0
 """Width of a symbol with the space before its text."""
 _SYMBOL_GAP_PX = 6
@@ -60,13 +60,13 @@ def render_legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygam
     """
     scale = canvas.scale
     rows = arrange_legend_rows(canvas, entries)
-    height = round((TOP_PX + ROW_HEIGHT_PX * max(len(rows), 1)) * scale)
+    height = round((PADDING_PX + ROW_HEIGHT_PX * max(len(rows), 1)) * scale)
     strip = pygame.Surface((canvas.surface.get_width(), height), 0, 32)
     strip.fill(canvas.theme.background)
     strip_canvas = replace(canvas, surface=strip)
     for index, row in enumerate(rows):
         x = MARGIN_PX * scale
-        y = (TOP_PX + ROW_HEIGHT_PX * (index + 0.5)) * scale
+        y = (PADDING_PX + ROW_HEIGHT_PX * (index + 0.5)) * scale
         for entry in row:
             entry.draw(strip_canvas, x + 0.5 * (_SYMBOL_WIDTH_PX - _SYMBOL_GAP_PX) * scale, y)
             x += _SYMBOL_WIDTH_PX * scale

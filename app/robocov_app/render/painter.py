@@ -19,7 +19,7 @@ from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.color_bar import measure_color_bar
 from robocov_app.render.layer_catalog import FIELD_LAYERS, build_standard_layers
 from robocov_app.render.layers.layer import Layer
-from robocov_app.render.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, TOP_PX, arrange_legend_rows
+from robocov_app.render.legend_strip import MARGIN_PX, PADDING_PX, ROW_HEIGHT_PX, arrange_legend_rows
 from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import LatestValue
 
@@ -128,7 +128,7 @@ class Painter:
         rows = self._margins.legend_rows
         top = MARGIN_PX
         if rows:
-            top = TOP_PX + ROW_HEIGHT_PX * rows + TOP_PX
+            top = PADDING_PX + ROW_HEIGHT_PX * rows + PADDING_PX
         has_strip = bool({"scale_bar", "status"} & self.visible)
         is_low = is_low_pane(height, self.scale, self.visible)
         bottom = STRIP_HEIGHT_PX if has_strip and not is_low else MARGIN_PX

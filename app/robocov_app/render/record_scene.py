@@ -27,7 +27,7 @@ def build_record_scene(
     row : int
     cost : str
         The coverage cost in words.
-    fields : Fields, optional
+    fields : DistanceFields, optional
         Computes the distances to the nearest robot.
 
     Returns

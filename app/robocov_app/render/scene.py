@@ -42,7 +42,7 @@ def are_centroids(goals: Array, centroids: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The content of a picture at one moment. Whatever is None or empty is left out.
+    """The content of a picture at one time. Attributes that are None or empty are left out.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Scene:
         Display name of the controller.
     cost : str
         The coverage cost in words.
-    field : Field or None
+    field : DistanceField or None
         Distances to the nearest robot.
     field_limit : float, m
         End of the color scale of these distances.

@@ -21,7 +21,7 @@ FINENESS = 4
 SKETCH_FINENESS = 3
 """The same for sketches, which may be as large as the whole picture."""
 MAX_FINE_RADIUS_PX = 60.0
-"""Larger sprites have no shifts, which nobody would see, and half the fineness: they take megabytes."""
+"""Larger sprites have invisible shifts and take megabytes, so they have no shift and half the fineness."""
 NOSE_LENGTH = 1.65
 """Distance of the tip of a nose from the center of its disc, in radii."""
 N_NOSE_DIRECTIONS = 96

@@ -1,4 +1,4 @@
-"""Caches of what is drawn: many small surfaces in bounded memory, or the latest value of one kind."""
+"""Caches for drawing: many small surfaces in bounded memory, or the latest value of one kind."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -97,9 +97,9 @@ class LatestValue(Generic[_Value]):
         Parameters
         ----------
         source : object
-            The value is valid for this very object only, since comparing large ones takes long.
+            Object that the value is computed from; compared by identity, since it may be large.
         key : object
-            What else the value depends on; compared by equality.
+            Further properties that the value depends on; compared by equality.
         compute : callable
             Returns the value.
 

@@ -75,7 +75,7 @@ def draw_frames(
         The coverage cost along the run. Each frame shows the latest value.
     rows : (k,) int array or None
         Numbers of the steps that the frames show; those of `select_frame_rows` by default.
-    fields : Fields or None
+    fields : DistanceFields or None
         Distances to the nearest robot, if a layer shows them.
 
     Yields

@@ -105,7 +105,7 @@ def build_pane_layout(
     settings : VideoSettings
     size : (width, height) or None, px
         Size of the video. By default one that suits the map, up to `MAX_DEFAULT_SIZE_PX`.
-    fields : Fields or None
+    fields : DistanceFields or None
         Distances to the nearest robot, if a layer shows them.
     legend_scenes : sequence of Scene or None
         The scenes that the legend explains. By default the first steps of the records, and the last ones

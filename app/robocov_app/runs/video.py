@@ -57,7 +57,7 @@ def draw_comparison_frames(
     settings : VideoSettings
     hold : float, s
         Duration for which the last step is shown.
-    fields : Fields or None
+    fields : DistanceFields or None
         Distances to the nearest robot, if a layer shows them.
 
     Yields

@@ -1,4 +1,4 @@
-"""Pictures are kept as long as there is room."""
+"""Surfaces are cached within bounded memory."""
 
 import pygame
 import pytest
@@ -8,44 +8,49 @@ from hypothesis import strategies as st
 from robocov_app.render.surface_cache import cache_surfaces
 
 
-def drawing(most_bytes: int):
-    drawn: list[int] = []
+def create_renderer(max_bytes: int):
+    rendered: list[int] = []
 
-    @cache_surfaces(most_bytes)
-    def page(side: int, name: str = "") -> pygame.Surface:
-        drawn.append(side)
+    @cache_surfaces(max_bytes)
+    def render_page(side: int, name: str = "") -> pygame.Surface:
+        rendered.append(side)
         return pygame.Surface((side, side), 0, 32)
 
-    return page, drawn
+    return render_page, rendered
 
 
 @given(st.lists(st.integers(1, 30), max_size=60))
-def test_no_more_bytes_are_kept_than_allowed(sides: list[int]) -> None:
-    page, _ = drawing(4000)
+def test_memory_is_bounded(sides: list[int]) -> None:
+    render_page, _ = create_renderer(4000)
     for side in sides:
-        assert page(side).get_size() == (side, side)
-        assert sum(picture.get_pitch() * picture.get_height() for picture in page.surfaces.values()) <= 4000
+        assert render_page(side).get_size() == (side, side)
+        assert (
+            sum(surface.get_pitch() * surface.get_height() for surface in render_page.surfaces.values())
+            <= 4000
+        )
 
 
-def test_what_is_asked_for_often_stays() -> None:
-    page, drawn = drawing(2000)
+def test_frequently_used_surfaces_stay() -> None:
+    render_page, rendered = create_renderer(2000)
     for side in range(1, 20):
-        page(10)
-        page(side)
-    assert drawn.count(10) == 1
+        render_page(10)
+        render_page(side)
+    assert rendered.count(10) == 1
 
 
-@pytest.mark.parametrize("call", [lambda page: page(5, "a"), lambda page: page(5, name="a")])
-def test_other_words_are_another_picture(call) -> None:
-    page, drawn = drawing(10_000)
-    assert page(5) is not call(page)
-    assert call(page) is call(page)
-    assert drawn == [5, 5]
+@pytest.mark.parametrize(
+    "call", [lambda render_page: render_page(5, "a"), lambda render_page: render_page(5, name="a")]
+)
+def test_different_arguments_give_different_surfaces(call) -> None:
+    render_page, rendered = create_renderer(10_000)
+    assert render_page(5) is not call(render_page)
+    assert call(render_page) is call(render_page)
+    assert rendered == [5, 5]
 
 
-def test_cleared_pictures_are_drawn_again() -> None:
-    page, drawn = drawing(10_000)
-    page(5)
-    page.cache_clear()
-    page(5)
-    assert drawn == [5, 5]
+def test_surfaces_are_rendered_again_after_clearing() -> None:
+    render_page, rendered = create_renderer(10_000)
+    render_page(5)
+    render_page.cache_clear()
+    render_page(5)
+    assert rendered == [5, 5]

@@ -1,4 +1,4 @@
-"""Layers of a picture, each of which shows one aspect of a scene.
+"""Layers of a picture: each shows one aspect of a scene.
 
 Modules
 -------
@@ -13,7 +13,7 @@ robots, marks
 arrows, perception
     Force terms and velocities; ranges, neighbors and nearest obstacle points.
 ray_scans, known_obstacles
-    What range sensors measure, and the obstacles that robots know.
+    Measurements of range sensors, and the obstacles that robots know.
 trajectories, fading_trails, cursor_path
     Trajectories, and the shortest path from the cursor to its nearest robot.
 """

@@ -68,7 +68,7 @@ def _select_one_direction(edges: Array) -> Array:
 
 
 def _remove_duplicates(edges: Array) -> Array:
-    """Return each edge, (k, 4) px, once, whatever its direction."""
+    """Return each edge, (k, 4) px, once, without regard to its direction."""
     x1, y1, x2, y2 = edges.T
     is_backward = (x1 > x2) | ((x1 == x2) & (y1 > y2))
     directed = np.where(is_backward[:, None], edges[:, [2, 3, 0, 1]], edges)

@@ -113,7 +113,7 @@ def _place_samples(start: int, count: int, step: int) -> tuple[Array, Callable[[
 
 
 def _build_premultiplied_table(theme: Theme) -> NDArray[np.uint8]:
-    """Return the premultiplied color of each of 256 densities, (256, 4)."""
+    """Return the premultiplied colors of densities from the lowest to the highest, (256, 4)."""
     table = color_density(np.arange(256) / 255.0, theme).astype(np.uint16)
     table[:, :3] = table[:, :3] * table[:, 3:] // 255
     return table.astype(np.uint8)

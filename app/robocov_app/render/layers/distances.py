@@ -23,7 +23,7 @@ _BORDER_WIDTH_PX = 1.6
 _COARSE_PX = 2
 """Pixels of a distance map are computed at this distance: distances are smooth."""
 _HATCH_PX = 5
-"""Coarse pixels between lines that hatch what no robot can reach."""
+"""Coarse pixels between the lines that hatch unreachable areas."""
 _MIN_LENGTH_PX = 1e-9
 
 FieldRenderer: TypeAlias = Callable[[Canvas, Scene, DistanceField, Array, Array], pygame.Surface]
@@ -82,7 +82,7 @@ def _find_visible_pixels(canvas: Canvas, scene: Scene) -> tuple[Array, Array]:
 
 
 def _cover_outside(canvas: Canvas, vertices: Array) -> None:
-    """Cover what is outside a convex outline, (k, 2) m, with the background, one side after the other."""
+    """Cover the outside of a convex outline, (k, 2) m, with the background, one side after the other."""
     corners = canvas.camera.to_pixels(vertices)
     length = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):

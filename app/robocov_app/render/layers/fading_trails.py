@@ -88,7 +88,7 @@ def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen:
     sketch : Sketch
     points : (k, n, 2) array, enlarged px
     tips : (n, 2) array, enlarged px
-        Ends of what was drawn before; nan if nothing was.
+        Ends of the older parts; nan for robots without one.
     opacity : float
     pen : Pen
 

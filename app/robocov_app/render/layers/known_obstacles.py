@@ -37,7 +37,7 @@ class KnownObstaclesLayer:
         self._drawn_points = np.empty((0, 2))
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw what is known at the time of a scene."""
+        """Draw the obstacles that are known at the time of a scene."""
         assert scene.sensed is not None
         points, robots = scene.sensed.get_until(scene.now.time)
         selected = None if scene.selected is None else scene.get_number(scene.selected)
@@ -88,7 +88,7 @@ class KnownObstaclesLayer:
 
 
 def _build_key(canvas: Canvas, scene: Scene) -> tuple[object, ...]:
-    """Return what the page depends on in addition to the points."""
+    """Return the properties that the page depends on in addition to the points."""
     selected = None if scene.selected is None else scene.get_number(scene.selected)
     return (
         canvas.camera,

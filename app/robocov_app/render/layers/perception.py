@@ -1,4 +1,4 @@
-"""Layers of what robots perceive at the moment: ranges, neighbors and nearest obstacle points."""
+"""Layers of perception: ranges, neighbors and nearest obstacle points."""
 
 from functools import partial
 from typing import Literal
@@ -13,12 +13,13 @@ from robocov_app.render.layers.layer import Layer, build_legend
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Pixel
 
+# Lengths in pixels at scale 1.
 _RANGE_SYMBOL_RADIUS_PX = 6.5
 _POINT_RADIUS_PX = 3.0
 
 
 def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> Layer:
-    """Build the layer of finite sensing ranges, solid circles, or communication ranges, dashed ones."""
+    """Build the layer of finite sensing ranges (solid circles) or communication ranges (dashed)."""
     is_dashed = kind == "communication"
 
     def get_ranges(scene: Scene) -> Array:
@@ -26,11 +27,11 @@ def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> 
 
     def draw(canvas: Canvas, scene: Scene) -> None:
         centers = canvas.camera.to_pixels(scene.now.positions).tolist()
-        ranges = get_ranges(scene).tolist()
-        for center, range_, hue in zip(centers, ranges, canvas.hues.tolist(), strict=True):
-            if np.isfinite(range_):
+        radii = (get_ranges(scene) * canvas.camera.zoom).tolist()
+        for center, radius, hue in zip(centers, radii, canvas.hues.tolist(), strict=True):
+            if np.isfinite(radius):
                 color = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
-                canvas.draw_circle(center, range_ * canvas.camera.zoom, color, is_dashed=is_dashed)
+                canvas.draw_circle(center, radius, color, is_dashed=is_dashed)
 
     def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
         radius = _RANGE_SYMBOL_RADIUS_PX * canvas.scale

@@ -1,4 +1,4 @@
-"""The layer of ray scans: what range sensors measure all around."""
+"""The layer of ray scans, the measurements of range sensors in all directions."""
 
 from functools import partial
 from typing import NamedTuple

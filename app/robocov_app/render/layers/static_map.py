@@ -64,7 +64,7 @@ def _draw_grid_line(canvas: Canvas, environment: Environment, axis: int, coordin
 
 
 def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
-    """Draw the obstacles, and the area outside the boundary that robots do not know either."""
+    """Draw the obstacles and all other areas that block robots, such as those outside a concave boundary."""
     theme = canvas.theme
     page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
     page.set_clip(canvas.surface.get_clip())
@@ -84,7 +84,7 @@ def draw_blocked_area(canvas: Canvas, scene: Scene, *, fill: Color, moving_fill:
     Parameters
     ----------
     canvas : Canvas
-        Its surface is transparent, so that courtyards within obstacles show what is below.
+        Its surface is transparent, so that courtyards within obstacles show the layers below.
     scene : Scene
     fill, moving_fill, edge : Color
         Colors of obstacles at rest, of moving ones and of outlines.

@@ -219,7 +219,7 @@ class TrajectoriesLayer:
 
 
 def _build_key(canvas: Canvas, scene: Scene, pen: Pen, n_robots: int) -> tuple[object, ...]:
-    """Return what the page depends on in addition to the trail; fading ones change with time."""
+    """Return the properties that the page depends on in addition to the trail; fading adds the time."""
     fade_step = None
     if scene.trail_fade and scene.trail_time is not None:
         step = int(np.floor(scene.trail_time[-1] / scene.trail_fade * FADE_STEPS))

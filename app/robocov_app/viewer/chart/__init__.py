@@ -3,11 +3,11 @@
 Modules
 -------
 chart
-    `Chart`: what the window shows and asks for.
+    `Chart`, the part of the window.
 scale
     Positions of times and values.
 frame
-    What all parts of the chart are drawn from.
+    Place, look and content that all parts share.
 axes, events, curves
     Parts of the page, which changes seldom.
 captions, time_line, pointer_tag

@@ -1,4 +1,4 @@
-"""What all parts of the chart are drawn from."""
+"""Place, look and content that all parts of the chart share."""
 
 from dataclasses import dataclass
 
