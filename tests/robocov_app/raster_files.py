@@ -26,7 +26,7 @@ PLAN = """
 VALUES = {".": FREE, "?": UNKNOWN, "#": OCCUPIED}
 
 
-def drawn(text: str, values: dict[str, int] = VALUES) -> np.ndarray:
+def draw_pixels(text: str, values: dict[str, int] = VALUES) -> np.ndarray:
     """Return the pixels of a drawing, the top row first."""
     return np.array([[values[letter] for letter in line] for line in text.split()], dtype=np.uint8)
 
@@ -37,7 +37,7 @@ def pgm(pixels: np.ndarray, most: int = 255, head: str = "# drawn for a test\n")
     return f"P5\n{head}{columns} {rows}\n{most}\n".encode() + pixels.astype(kind).tobytes()
 
 
-def ros_map(
+def write_ros_map(
     folder: Path, pixels: np.ndarray | bytes, name: str = "plan", image: str | None = None, **keys: object
 ) -> Path:
     """Write a ROS map; return its YAML. Keys replace those of the YAML, None takes them out."""

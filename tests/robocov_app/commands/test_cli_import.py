@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import answer, complaint
-from raster_files import PLAN, drawn, pgm, ros_map
+from raster_files import PLAN, draw_pixels, pgm, write_ros_map
 
 from robocov.mapfile import load_map
 from robocov_app.cli import main
@@ -23,7 +23,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
 
 
 def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = ros_map(tmp_path, drawn(PLAN))
+    path = write_ros_map(tmp_path, draw_pixels(PLAN))
     out, picture = tmp_path / "out.json", tmp_path / "seen.png"
     lines = said(capsys, "import", str(path), "-o", str(out), "--preview", str(picture))
     assert lines == [
@@ -39,7 +39,7 @@ def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_the_answer_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = ros_map(tmp_path, drawn(PLAN))
+    path = write_ros_map(tmp_path, draw_pixels(PLAN))
     row = answer(
         capsys, "import", str(path), "-o", str(tmp_path / "a.json"), "--unknown", "cut", "--simplify", "0"
     )
@@ -80,7 +80,7 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
 
 
 @pytest.mark.parametrize(
-    ("file", "words", "wanted"),
+    ("file", "words", "expected"),
     [
         ("plan.yaml", "--water free", "--water: no option of the format ros, whose options are: --anywhere"),
         ("plan.yaml", "--cell 1", "--cell: no option of the format ros"),
@@ -103,12 +103,12 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
     ],
 )  # fmt: skip
 def test_what_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str, wanted: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str, expected: str
 ) -> None:
-    ros_map(tmp_path, drawn(PLAN))
+    write_ros_map(tmp_path, draw_pixels(PLAN))
     (tmp_path / "grid.map").write_text(GRID)
     out = tmp_path / "out.json"
-    assert wanted in complaint(capsys, "import", str(tmp_path / file), "-o", str(out), *words.split())
+    assert expected in complaint(capsys, "import", str(tmp_path / file), "-o", str(out), *words.split())
     assert not out.exists()
 
 
@@ -128,7 +128,7 @@ def test_a_large_map_is_soon_there(tmp_path: Path, capsys: pytest.CaptureFixture
     pixels[:, ::300] = pixels[::300, :] = 0
     for door in range(90, 1200, 300):
         pixels[door : door + 20, ::300] = pixels[::300, door : door + 20] = 254
-    path = ros_map(tmp_path, pgm(pixels), resolution=0.05)
+    path = write_ros_map(tmp_path, pgm(pixels), resolution=0.05)
     row = answer(capsys, "import", str(path), "-o", str(tmp_path / "a.json"))
     assert row["vertices_kept"] < row["vertices_read"] / 2
     assert row["area_kept_m2"] == pytest.approx(row["area_read_m2"], rel=0.01)

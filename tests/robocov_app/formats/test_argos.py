@@ -88,7 +88,7 @@ def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path
 
 
 @pytest.mark.parametrize(
-    ("body", "wanted"),
+    ("body", "expected"),
     [
         (POST, None),  # without a body it is nowhere
         (WALL.format("a", 0, 1, 0, 0, 0), "test.argos:4: <box> 'a': expected lengths above 0"),
@@ -106,13 +106,13 @@ def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path
         ("<box>", "not XML: mismatched tag"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, body: str, wanted: str | None) -> None:
-    if wanted is None:
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, body: str, expected: str | None) -> None:
+    if expected is None:
         assert read(tmp_path, body).free.equals(ARENA)
         return
     with pytest.raises(MapError) as caught:
         read(tmp_path, body)
-    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+    assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_without_an_arena_there_is_no_map(tmp_path: Path) -> None:

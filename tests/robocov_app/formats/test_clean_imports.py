@@ -34,7 +34,7 @@ def require_clean(environment: Environment, report: ImportReport) -> None:
     assert report.moved <= report.tolerance + GRID + MAX_SAGITTA_M
 
 
-def imported(case: Case, name: str, folder: Path, **options: Any) -> tuple[Environment, ImportReport]:
+def import_file(case: Case, name: str, folder: Path, **options: Any) -> tuple[Environment, ImportReport]:
     for file, content in case.files.items():
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_bytes(content)
@@ -48,7 +48,7 @@ def test_seeds_of_every_format_are_clean(name: str, tmp_path: Path) -> None:
     options = {"picture": {"cell": 0.5}, "svg": {"scale": 0.5}}.get(name, {})
     for k, case in enumerate(SEEDS[name]):
         try:
-            environment, report = imported(case, name, tmp_path / str(k), **options)
+            environment, report = import_file(case, name, tmp_path / str(k), **options)
         except RobocovError:
             continue
         require_clean(environment, report)
@@ -56,7 +56,7 @@ def test_seeds_of_every_format_are_clean(name: str, tmp_path: Path) -> None:
 
 def _require_made_clean(factory: pytest.TempPathFactory, name: str, case: Case) -> None:
     try:
-        environment, report = imported(case, name, factory.mktemp("made"))
+        environment, report = import_file(case, name, factory.mktemp("made"))
     except RobocovError:
         return
     require_clean(environment, report)

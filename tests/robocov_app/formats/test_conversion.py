@@ -61,8 +61,8 @@ def test_the_part_around_a_place() -> None:
     for x, y in report.others:
         assert f"--inside {x:g} {y:g} (" in note
         assert build_environment(whole, Shaping(inside=(x, y)), "plan")[1].area_kept > 50
-    wanted = r"plan: inside: 45 10 is solid, .*; 31 \S+ is one in the nearest part, 8 m away"
-    with pytest.raises(MapError, match=wanted):
+    expected = r"plan: inside: 45 10 is solid, .*; 31 \S+ is one in the nearest part, 8 m away"
+    with pytest.raises(MapError, match=expected):
         build_environment(whole, Shaping(inside=(45.0, 10.0)), "plan")
 
 
@@ -218,7 +218,7 @@ def test_where_robots_do_not_get() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parts", "shaping", "wanted"),
+    ("parts", "shaping", "expected"),
     [
         ((), {}, "plan: there is no free space"),
         ((Polygon([(0, 0), (1, 1), (2, 2)]),), {}, "plan: there is no free space"),
@@ -231,15 +231,15 @@ def test_where_robots_do_not_get() -> None:
     ],
     ids=map(str, range(99)),
 )  # fmt: skip
-def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], wanted: str) -> None:
+def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], expected: str) -> None:
     with pytest.raises(MapError) as caught:
         build_environment(foreign(*parts), Shaping(**shaping), "plan")
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("options", "wanted"),
+    ("options", "expected"),
     [
         ({"simplify": -1.0}, r"simplify: expected a number from 0 to 10 m"),
         ({"simplify": math.nan}, "simplify: expected a number from 0 to 10 m, got nan"),
@@ -252,8 +252,8 @@ def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], wa
         ({"default_start": "door"}, "default_start: expected one of room, uniform"),
     ],
 )
-def test_options_out_of_range(options: dict[str, Any], wanted: str) -> None:
-    with pytest.raises(ParameterError, match=wanted):
+def test_options_out_of_range(options: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ParameterError, match=expected):
         Shaping(**options)
 
 
@@ -342,12 +342,12 @@ def test_a_map_of_many_vertices_says_what_that_means() -> None:
     assert "many" not in lines(build_environment(foreign(round_room), Shaping(), "plan")[1])
 
 
-@pytest.mark.parametrize(("most", "wanted"), [("MAX_OBSTACLES", "obstacles"), ("MAX_VERTICES", "vertices")])
+@pytest.mark.parametrize(("most", "expected"), [("MAX_OBSTACLES", "obstacles"), ("MAX_VERTICES", "vertices")])
 def test_a_map_that_takes_too_long_is_refused(
-    monkeypatch: pytest.MonkeyPatch, most: str, wanted: str
+    monkeypatch: pytest.MonkeyPatch, most: str, expected: str
 ) -> None:
     monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.environment.{most}", 0)
-    with pytest.raises(MapError, match=rf"plan: expected at most 0, got \d+ {wanted}: --specks AREA"):
+    with pytest.raises(MapError, match=rf"plan: expected at most 0, got \d+ {expected}: --specks AREA"):
         build_environment(foreign(ROOM), Shaping(), "plan")
 
 

@@ -71,11 +71,11 @@ CASES: list[tuple[str, str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("suffix", "text", "wanted"), CASES)
-def test_what_has_no_extent_is_no_shape(tmp_path: Path, suffix: str, text: str, wanted: str) -> None:
+@pytest.mark.parametrize(("suffix", "text", "expected"), CASES)
+def test_what_has_no_extent_is_no_shape(tmp_path: Path, suffix: str, text: str, expected: str) -> None:
     path = tmp_path / f"plan.{suffix}"
     path.write_text(text)
     options = ReadOptions(scale=1.0) if suffix in ("svg", "dxf") else ReadOptions()
     with pytest.raises(MapError) as caught:
         import_map(path, options=options)
-    assert wanted in str(caught.value) and str(caught.value).isprintable()
+    assert expected in str(caught.value) and str(caught.value).isprintable()

@@ -26,7 +26,7 @@ METERS = 6
 Draw = Callable[[Any, Any], Any]
 
 
-def drawn(
+def read_drawing(
     folder: Path, draw: Draw, *, unit: int = METERS, version: str = "R2010", hall: bool = True, **options: Any
 ) -> ForeignMap:
     """Return what is read of a drawing; a hall of 20 x 10 units is its boundary."""
@@ -42,14 +42,14 @@ def drawn(
     return IMPORTERS["dxf"].read(path, ReadOptions(**options))
 
 
-def solid(folder: Path, draw: Draw, **options: Any) -> Any:
-    foreign = drawn(folder, draw, **options)
+def read_obstacles(folder: Path, draw: Draw, **options: Any) -> Any:
+    foreign = read_drawing(folder, draw, **options)
     assert not any("damaged" in line for line in foreign.dropped)
     return box(0, 0, 20, 10) - foreign.free
 
 
 @pytest.mark.parametrize(
-    ("draw", "wanted"),
+    ("draw", "expected"),
     [
         (lambda d, m: m.add_line((5, 0), (5, 4)), box(4.95, 0, 5.05, 4)),
         (lambda d, m: m.add_lwpolyline([(5, 0), (5, 4)]), box(4.95, 0, 5.05, 4)),
@@ -80,8 +80,8 @@ def solid(folder: Path, draw: Draw, **options: Any) -> Any:
         ),
     ],
 )
-def test_entities(tmp_path: Path, draw: Draw, wanted: Any) -> None:
-    assert solid(tmp_path, draw).symmetric_difference(wanted).area < 1e-4
+def test_entities(tmp_path: Path, draw: Draw, expected: Any) -> None:
+    assert read_obstacles(tmp_path, draw).symmetric_difference(expected).area < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_entities(tmp_path: Path, draw: Draw, wanted: Any) -> None:
     ],
 )
 def test_arcs_are_walls_of_half_a_ring(tmp_path: Path, draw: Draw) -> None:
-    wall = solid(tmp_path, draw, thickness=0.2)
+    wall = read_obstacles(tmp_path, draw, thickness=0.2)
     assert wall.area == pytest.approx(math.pi * 2 * 0.2, rel=2e-3)
     away = shapely.distance(shapely.Point(5, 5), shapely.points(shapely.get_coordinates(wall)))
     assert (away >= 1.9 - 2e-3).all()
@@ -104,24 +104,28 @@ def test_arcs_are_walls_of_half_a_ring(tmp_path: Path, draw: Draw) -> None:
 
 
 def test_closed_curves_are_areas(tmp_path: Path) -> None:
-    oval = solid(tmp_path, lambda d, m: m.add_ellipse((5, 5), (3, 0), 0.5))
+    oval = read_obstacles(tmp_path, lambda d, m: m.add_ellipse((5, 5), (3, 0), 0.5))
     assert oval.area == pytest.approx(math.pi * 3 * 1.5, rel=1e-3)
-    turned = solid(tmp_path, lambda d, m: m.add_ellipse((5, 5), (0, 3), 0.5))
+    turned = read_obstacles(tmp_path, lambda d, m: m.add_ellipse((5, 5), (0, 3), 0.5))
     assert turned.area == pytest.approx(oval.area, rel=1e-6)
-    lens = solid(tmp_path, lambda d, m: m.add_lwpolyline([(3, 5, 1), (7, 5, 1)], format="xyb", close=True))
+    lens = read_obstacles(
+        tmp_path, lambda d, m: m.add_lwpolyline([(3, 5, 1), (7, 5, 1)], format="xyb", close=True)
+    )
     assert lens.area == pytest.approx(math.pi * 4, rel=1e-3)
     points = [(5, 3, 0), (8, 5, 0), (5, 7, 0), (2, 5, 0)]
-    spline = solid(tmp_path, lambda d, m: m.add_spline().set_closed(points))
+    spline = read_obstacles(tmp_path, lambda d, m: m.add_spline().set_closed(points))
     assert 4 < spline.area < 12
     assert spline.centroid.coords[0] == pytest.approx((5, 5), abs=1e-3)
     center = ezdxf.math.OCS((1, 0, 1)).from_wcs((5, 5, 0))
-    tilted = solid(tmp_path, lambda d, m: m.add_circle(center, 1, dxfattribs={"extrusion": (1, 0, 1)}))
+    tilted = read_obstacles(
+        tmp_path, lambda d, m: m.add_circle(center, 1, dxfattribs={"extrusion": (1, 0, 1)})
+    )
     assert tilted.area == pytest.approx(math.pi * math.sqrt(0.5), rel=2e-3)
 
 
 def test_splines_stay_near_their_curve(tmp_path: Path) -> None:
     control = [(2, 2), (6, 9), (10, 1), (14, 8)]
-    wall = solid(tmp_path, lambda d, m: m.add_open_spline(control, degree=3), thickness=0.02)
+    wall = read_obstacles(tmp_path, lambda d, m: m.add_open_spline(control, degree=3), thickness=0.02)
     t = np.linspace(0, 1, 500)[:, None]
     weights = [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3]
     exact = shapely.points(sum(w * np.array(c) for w, c in zip(weights, control, strict=True)))
@@ -149,7 +153,7 @@ def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(
     assert (height.max() if bulge > 0 else -height.min()) == pytest.approx(abs(bulge) * chord / 2, abs=2e-3)
 
 
-def chair(document: Any, name: str = "chair") -> Any:
+def add_chair(document: Any, name: str = "chair") -> Any:
     block = document.blocks.new(name)
     block.add_lwpolyline([(0, 0), (1, 0), (1, 0.5), (0, 0.5)], close=True)
     return block
@@ -157,7 +161,7 @@ def chair(document: Any, name: str = "chair") -> Any:
 
 def test_blocks_are_carried_out_where_they_are_inserted(tmp_path: Path) -> None:
     def draw(document: Any, space: Any) -> None:
-        chair(document)
+        add_chair(document)
         pair = document.blocks.new("pair")
         pair.add_blockref("chair", (0, 0))
         pair.add_blockref("chair", (2, 0), dxfattribs={"rotation": 90, "xscale": 2.0, "yscale": 2.0})
@@ -172,8 +176,8 @@ def test_blocks_are_carried_out_where_they_are_inserted(tmp_path: Path) -> None:
     )
     rows = [affinity.translate(seat, 15 + 1.5 * k, 1 + 2 * j) for k in range(2) for j in range(3)]
     mirrored = affinity.scale(pair, -1, 1, origin=(0, 0))
-    wanted = shapely.union_all([affinity.translate(pair, 3, 3), affinity.translate(mirrored, 12, 3), *rows])
-    assert solid(tmp_path, draw).symmetric_difference(wanted).area < 1e-6
+    expected = shapely.union_all([affinity.translate(pair, 3, 3), affinity.translate(mirrored, 12, 3), *rows])
+    assert read_obstacles(tmp_path, draw).symmetric_difference(expected).area < 1e-6
 
 
 def test_circles_in_blocks_that_are_stretched(tmp_path: Path) -> None:
@@ -181,7 +185,7 @@ def test_circles_in_blocks_that_are_stretched(tmp_path: Path) -> None:
         document.blocks.new("table").add_circle((0, 0), 1)
         space.add_blockref("table", (5, 5), dxfattribs={"xscale": 3.0})
 
-    oval = solid(tmp_path, draw)
+    oval = read_obstacles(tmp_path, draw)
     assert oval.area == pytest.approx(math.pi * 3, rel=2e-3)
     assert oval.bounds == pytest.approx((2, 4, 8, 6), abs=2e-3)
 
@@ -196,13 +200,13 @@ def test_layers_are_chosen_and_those_that_are_off_are_not_there(tmp_path: Path) 
             space.add_lwpolyline(
                 [(k, 1), (k + 1, 1), (k + 1, 2), (k, 2)], close=True, dxfattribs={"layer": name}
             )
-        chair(document)
+        add_chair(document)
         space.add_blockref("chair", (10, 5), dxfattribs={"layer": "Furniture"})
 
-    assert solid(tmp_path, draw).area == pytest.approx(2.5)
-    assert solid(tmp_path, draw, skip=("furniture",)).area == pytest.approx(1.0)
-    assert solid(tmp_path, draw, skip=("CHAIR",)).area == pytest.approx(2.0)
-    foreign = drawn(tmp_path, draw, only=("0", "walls"))
+    assert read_obstacles(tmp_path, draw).area == pytest.approx(2.5)
+    assert read_obstacles(tmp_path, draw, skip=("furniture",)).area == pytest.approx(1.0)
+    assert read_obstacles(tmp_path, draw, skip=("CHAIR",)).area == pytest.approx(2.0)
+    foreign = read_drawing(tmp_path, draw, only=("0", "walls"))
     assert foreign.free.area == pytest.approx(199.0)
     assert foreign.dropped == (
         "2 shapes by their names (--only, --skip)",
@@ -216,9 +220,9 @@ def test_a_layer_of_lines_is_the_boundary(tmp_path: Path) -> None:
             space.add_line(a, b, dxfattribs={"layer": "Outer walls"})
         space.add_line((4, 0), (4, 3))
 
-    named = drawn(tmp_path, draw, hall=False, boundary="outer walls", thickness=0.2)
+    named = read_drawing(tmp_path, draw, hall=False, boundary="outer walls", thickness=0.2)
     assert named.free.area == pytest.approx(54 - 0.6)
-    walls = drawn(tmp_path, draw, hall=False, thickness=0.2)
+    walls = read_drawing(tmp_path, draw, hall=False, thickness=0.2)
     assert walls.free.area == pytest.approx(8.8 * 5.8 - 0.2 * 2.9)
     assert walls.boundary is not None
     assert walls.boundary.bounds == pytest.approx((-0.1, -0.1, 9.1, 6.1))
@@ -234,7 +238,7 @@ def test_what_is_no_wall_is_told(tmp_path: Path) -> None:
         space.add_blockref("nothing", (0, 0))
         space.add_line((3, 3, 2.5), (3, 4, 2.5))
 
-    foreign = drawn(tmp_path, draw)
+    foreign = read_drawing(tmp_path, draw)
     assert foreign.dropped == (
         "1 3DFACE",
         "1 HATCH (--hatches takes them as areas)",
@@ -244,7 +248,7 @@ def test_what_is_no_wall_is_told(tmp_path: Path) -> None:
         "1 point (--pillar RADIUS makes pillars of them)",
         "2 third coordinates, z from 2.5 to 2.5",
     )
-    assert drawn(tmp_path, draw, hatches=True, pillar=0.5).free.area == pytest.approx(
+    assert read_drawing(tmp_path, draw, hatches=True, pillar=0.5).free.area == pytest.approx(
         200 - 0.1 - 1 - 0.7854, abs=0.01
     )
 
@@ -254,7 +258,7 @@ def test_multilines_are_their_lines(tmp_path: Path) -> None:
         line = space.add_mline([(5, 2), (9, 2)])
         line.set_justification(1)
 
-    assert solid(tmp_path, draw).area > 0.5
+    assert read_obstacles(tmp_path, draw).area > 0.5
 
 
 @pytest.mark.parametrize("unit", sorted(UNITS))
@@ -265,24 +269,24 @@ def test_units(tmp_path: Path, unit: int) -> None:
     def draw(document: Any, space: Any) -> None:
         space.add_lwpolyline([(0, 0), (size, 0), (size, size / 2), (0, size / 2)], close=True)
 
-    foreign = drawn(tmp_path, draw, unit=unit, hall=False)
+    foreign = read_drawing(tmp_path, draw, unit=unit, hall=False)
     assert foreign.free.area == pytest.approx(50.0)
     assert foreign.notes[0] == f"in {UNITS[unit][0]}"
     if unit not in (9, 21):  # which ezdxf does not convert
         assert ezdxf.units.conversion_factor(ezdxf.units.InsertUnits(unit), ezdxf.units.M) == pytest.approx(
             scale
         )
-    given = drawn(tmp_path, draw, unit=unit, hall=False, scale=2 * scale)
+    given = read_drawing(tmp_path, draw, unit=unit, hall=False, scale=2 * scale)
     assert given.free.area == pytest.approx(200.0)
 
 
 def test_a_drawing_without_a_unit_needs_one(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"plan.dxf: .INSUNITS: expected a unit, got 0: --scale METERS"):
-        drawn(tmp_path, lambda d, m: None, unit=0)
-    assert drawn(tmp_path, lambda d, m: None, unit=0, scale=0.5).free.area == pytest.approx(50.0)
-    assert drawn(tmp_path, lambda d, m: None, unit=0, scale=0.5, version="R12").free.area == pytest.approx(
-        50.0
-    )
+        read_drawing(tmp_path, lambda d, m: None, unit=0)
+    assert read_drawing(tmp_path, lambda d, m: None, unit=0, scale=0.5).free.area == pytest.approx(50.0)
+    assert read_drawing(
+        tmp_path, lambda d, m: None, unit=0, scale=0.5, version="R12"
+    ).free.area == pytest.approx(50.0)
 
 
 def test_a_binary_file(tmp_path: Path) -> None:
@@ -292,7 +296,7 @@ def test_a_binary_file(tmp_path: Path) -> None:
     assert IMPORTERS["dxf"].read(tmp_path / "plan.dxf", ReadOptions()).free.area == pytest.approx(54.0)
 
 
-def text_of(draw: Draw) -> str:
+def format_drawing(draw: Draw) -> str:
     document = ezdxf.new()
     draw(document, document.modelspace())
     stream = io.StringIO()
@@ -300,14 +304,14 @@ def text_of(draw: Draw) -> str:
     return stream.getvalue()
 
 
-def recursive(document: Any, space: Any) -> None:
+def draw_recursive_block(document: Any, space: Any) -> None:
     document.blocks.new("a").add_blockref("b", (0, 0))
     document.blocks.new("b").add_blockref("A", (0, 0))
     space.add_blockref("a", (0, 0))
 
 
-def bomb(document: Any, space: Any) -> None:
-    chair(document, "b0")
+def draw_bomb(document: Any, space: Any) -> None:
+    add_chair(document, "b0")
     for k in range(9):
         block = document.blocks.new(f"b{k + 1}")
         for _ in range(10):
@@ -315,20 +319,20 @@ def bomb(document: Any, space: Any) -> None:
     space.add_blockref("b9", (0, 0))
 
 
-def deep(document: Any, space: Any) -> None:
-    chair(document, "b0")
+def draw_nested_blocks(document: Any, space: Any) -> None:
+    add_chair(document, "b0")
     for k in range(40):
         document.blocks.new(f"b{k + 1}").add_blockref(f"b{k}", (0, 0))
     space.add_blockref("b40", (0, 0))
 
 
-def many(document: Any, space: Any) -> None:
-    chair(document)
+def draw_many_entities(document: Any, space: Any) -> None:
+    add_chair(document)
     space.add_blockref("chair", (0, 0), dxfattribs={"row_count": 30000, "column_count": 30000})
 
 
 @pytest.mark.parametrize(
-    ("content", "wanted"),
+    ("content", "expected"),
     [
         (b"", "expected a DXF with sections, got a file that begins with b''"),
         (b"hello", "expected a DXF with sections, got a file that begins with b'hello'"),
@@ -337,10 +341,10 @@ def many(document: Any, space: Any) -> None:
         (b"0\nSECTION\n", "no closed outline and no line"),
         (b"0\nSECTION\n" + b" 10\n0\n" * 600_000, "expected at most 500000"),
         (b"0\nSECTION\n" + b"1\n\n" * 4_000_100, "expected at most 8000000"),
-        (recursive, "block 'a' is inserted into itself"),
-        (bomb, "expected at most 200000, got "),
-        (many, "entities to be drawn, blocks and all"),
-        (deep, "blocks are nested deeper than 32"),
+        (draw_recursive_block, "block 'a' is inserted into itself"),
+        (draw_bomb, "expected at most 200000, got "),
+        (draw_many_entities, "entities to be drawn, blocks and all"),
+        (draw_nested_blocks, "blocks are nested deeper than 32"),
         (lambda d, m: m.add_line((0, 0), (1e300, 0)), "expected coordinates"),
         (lambda d, m: m.add_line((0, 0), (math.nan, 0)), "expected coordinates"),
         (
@@ -367,16 +371,16 @@ def many(document: Any, space: Any) -> None:
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
-def test_what_cannot_be_used_is_refused(tmp_path: Path, content: Any, wanted: str) -> None:
+def test_what_cannot_be_used_is_refused(tmp_path: Path, content: Any, expected: str) -> None:
     path = tmp_path / "plan.dxf"
     if isinstance(content, bytes):
         path.write_bytes(content)
     else:
-        path.write_text(text_of(content))
+        path.write_text(format_drawing(content))
     with pytest.raises(MapError) as caught:
         IMPORTERS["dxf"].read(path, ReadOptions(scale=1.0))
     assert str(caught.value).startswith(str(path))
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -384,7 +388,7 @@ def test_without_ezdxf_there_is_one_line_with_the_way_to_get_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "plan.dxf"
-    path.write_text(text_of(lambda d, m: m.add_line((0, 0), (1, 1))))
+    path.write_text(format_drawing(lambda d, m: m.add_line((0, 0), (1, 1))))
     monkeypatch.setitem(sys.modules, "ezdxf", None)
     with pytest.raises(MapError, match=r'plan.dxf: ezdxf is not installed: pip install "robocov\[dxf\]"'):
         IMPORTERS["dxf"].read(path, ReadOptions())

@@ -241,6 +241,6 @@ def test_free_and_solid_are_each_others_complement(rooms: list[tuple[int, int, i
     frame = (square(-1, -1, 60, 60), "boundary")
     foreign = taken(shapes(frame, *(square(*room) for room in rooms), outlines=what))
     together = shapely.union_all([box(x, y, x + w, y + h) for x, y, w, h in rooms])
-    wanted = together if what == "free" else box(-1, -1, 59, 59) - together
+    expected = together if what == "free" else box(-1, -1, 59, 59) - together
     assert foreign.free.is_valid
-    assert foreign.free.symmetric_difference(wanted).area < 1e-6
+    assert foreign.free.symmetric_difference(expected).area < 1e-6

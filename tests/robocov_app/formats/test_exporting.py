@@ -53,14 +53,14 @@ def test_what_is_not_known(tmp_path: Path) -> None:
         ParameterError, match="--mode: no option of the format picture, whose options are: --cell"
     ):
         export_map(ROOM, tmp_path / "a.png", options=WriteOptions(mode="raw"))
-    for options, wanted in (
+    for options, expected in (
         ({"cell": 0.0}, "cell: expected a number from 1e-06 to 10000 m, got 0.0"),
         ({"mode": "binary"}, "mode: expected one of trinary, scale, raw"),
         ({"image": "bmp"}, "image: expected one of pgm, png, got 'bmp'"),
         ({"digits": 99}, "digits: expected a number from 0 to 12, got 99"),
         ({"scale": float("nan")}, "scale: expected a number from"),
     ):
-        with pytest.raises(ParameterError, match=wanted):
+        with pytest.raises(ParameterError, match=expected):
             WriteOptions(**options)  # type: ignore[arg-type]
 
 

@@ -98,7 +98,7 @@ def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("document", "wanted"),
+    ("document", "expected"),
     [
         (
             '{"type":"Polygon",\n"coordinates":[[[0,0],[1,"a"]]]}',
@@ -133,7 +133,7 @@ def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
         ("{", "not JSON"),
     ],
 )
-def test_what_is_none_is_refused_with_its_place(tmp_path: Path, document: Any, wanted: str | None) -> None:
+def test_what_is_none_is_refused_with_its_place(tmp_path: Path, document: Any, expected: str | None) -> None:
     path = tmp_path / "plan.geojson"
     path.write_text(document if isinstance(document, str) else json.dumps(document))
     with pytest.raises(MapError) as caught:
@@ -141,7 +141,7 @@ def test_what_is_none_is_refused_with_its_place(tmp_path: Path, document: Any, w
     message = str(caught.value)
     assert message.startswith(f"{path}:")
     assert "\n" not in message
-    assert wanted is None or wanted in message
+    assert expected is None or expected in message
 
 
 def test_two_systems_in_a_file(tmp_path: Path) -> None:
@@ -166,9 +166,9 @@ def test_free_space_is_what_shapely_reads(tmp_path_factory: pytest.TempPathFacto
         return
     # on a grid: without one GEOS may lose parts
     valid = shapely.make_valid(polygons, method="structure", keep_collapsed=False)
-    wanted = shapely.union_all(valid, grid_size=1e-7)
+    expected = shapely.union_all(valid, grid_size=1e-7)
     length = max(sum(polygon.length for polygon in polygons), 1.0)
-    assert shapely.symmetric_difference(found, wanted, grid_size=1e-7).area <= 2e-6 * length
+    assert shapely.symmetric_difference(found, expected, grid_size=1e-7).area <= 2e-6 * length
 
 
 # Sequences
@@ -200,7 +200,7 @@ def test_a_sequence_of_texts_is_read_as_one_map(tmp_path: Path, name: str, text:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         (
             f"{WEST}\n\n" + '{"type": "Point", "coordinates": [1, "x"]}',
@@ -212,8 +212,8 @@ def test_a_sequence_of_texts_is_read_as_one_map(tmp_path: Path, name: str, text:
     ],
     ids=["value", "cut", "number", "separated"],
 )
-def test_what_is_wrong_in_a_sequence_is_told_with_its_line(tmp_path: Path, text: str, wanted: str) -> None:
+def test_what_is_wrong_in_a_sequence_is_told_with_its_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "plan.geojsonl"
     path.write_text(text)
-    with pytest.raises(MapError, match=wanted):
+    with pytest.raises(MapError, match=expected):
         import_map(path)

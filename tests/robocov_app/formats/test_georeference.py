@@ -81,7 +81,7 @@ def test_a_system_is_obeyed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("crs", "points", "wanted"),
+    ("crs", "points", "expected"),
     [
         ("EPSG:99999", [[0, 0]], "reference system EPSG:99999 is unknown"),
         (
@@ -95,8 +95,8 @@ def test_a_system_is_obeyed() -> None:
         ("EPSG:4326", [[0, 0], [np.nan, 1]], r"expected longitude and latitude"),
     ],
 )
-def test_what_no_place_is_is_refused(crs: str, points: Any, wanted: str) -> None:
-    with pytest.raises(MapError, match=rf"^plan: {wanted}.*--units meters") as caught:
+def test_what_no_place_is_is_refused(crs: str, points: Any, expected: str) -> None:
+    with pytest.raises(MapError, match=rf"^plan: {expected}.*--units meters") as caught:
         moved(points, crs=crs)
     assert "\n" not in str(caught.value)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from raster_files import PLAN, chunk, drawn, pgm, raw_png
+from raster_files import PLAN, chunk, draw_pixels, pgm, raw_png
 
 MEMORY = 200 * 2**20
 SECONDS = 3.0
@@ -41,7 +41,7 @@ print(json.dumps([told(path, cell) for path, cell in json.loads(sys.argv[1])]))
 """
 
 
-def watched(files: list[tuple[Path, float | None]]) -> list[tuple[str, float, int]]:
+def measure_import(files: list[tuple[Path, float | None]]) -> list[tuple[str, float, int]]:
     """Import files in a process of its own; return what is said of each, seconds, and peak in bytes."""
     done = subprocess.run(
         [sys.executable, "-c", WATCHED, json.dumps([(str(path), cell) for path, cell in files])],
@@ -74,7 +74,7 @@ def large(kind: str, side: int, keep: int | None = None, **options: object) -> b
     return stream.getvalue()[:keep]
 
 
-def sized(data: bytes, old: int, new: int) -> bytes:
+def write_header(data: bytes, old: int, new: int) -> bytes:
     """Return a picture that says that it has another size."""
     form = ">H" if data.startswith(b"\xff") else "<H"
     return data.replace(struct.pack(form, old), struct.pack(form, new))
@@ -105,18 +105,24 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     "a grid of 10^9": ("a.map", lambda: GRID % (31623, 31623), "", TOO_MANY),
     "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 characters"),
     "noise": ("a.pgm", lambda: pgm(255 * (np.indices((2500, 2500)).sum(axis=0) % 2)), "cell", "vertices"),
-    "10^9 of a JPEG": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
-    "a JPEG cut off": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 8000), "cell", "complete JPEG"),
-    "a BMP cut off": ("a.bmp", lambda: sized(large("BMP", 997), 997, 8000), "cell", "complete BMP"),
+    "10^9 of a JPEG": ("a.jpg", lambda: write_header(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
+    "a JPEG cut off": ("a.jpg", lambda: write_header(large("JPEG", 997), 997, 8000), "cell", "complete JPEG"),
+    "a BMP cut off": ("a.bmp", lambda: write_header(large("BMP", 997), 997, 8000), "cell", "complete BMP"),
     "a TIFF cut off": (
         "a.tif", lambda: large("TIFF", 4000, 9000, compression="packbits"), "cell", "complete TIFF"
     ),
-    "10^9 of a TIFF": ("a.tif", lambda: sized(large("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
+    "10^9 of a TIFF": ("a.tif", lambda: write_header(large("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
     "a TIFF of nothing": (
-        "a.tif", lambda: sized(large("TIFF", 997, compression="tiff_lzw"), 997, 8000), "cell", "complete TIFF"
+        "a.tif",
+        lambda: write_header(large("TIFF", 997, compression="tiff_lzw"), 997, 8000),
+        "cell",
+        "complete TIFF",
     ),
     "a wide TIFF": (
-        "a.tif", lambda: sized(large("TIFF", 997, compression="group4"), 997, 8000), "cell", "complete TIFF"
+        "a.tif",
+        lambda: write_header(large("TIFF", 997, compression="group4"), 997, 8000),
+        "cell",
+        "complete TIFF",
     ),
     "a PPM cut off": ("a.ppm", lambda: b"P6 8000 8000 255\n" + b"\xff" * 1000, "cell", "cut off after 333"),
     "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "complete PPM"),
@@ -141,7 +147,7 @@ def test_they_are_refused(tmp_path: Path) -> None:
             (folder / file).write_bytes(content())
         files.append((folder / file, 1.0 if options == "cell" else None))
     for (name, case), (path, _), (said, seconds, memory) in zip(
-        HOSTILE.items(), files, watched(files), strict=True
+        HOSTILE.items(), files, measure_import(files), strict=True
     ):
         assert case[3] in said, name
         assert said.startswith(str(path)), name
@@ -153,7 +159,7 @@ def test_they_are_refused(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_good_one_is_not(tmp_path: Path) -> None:
     path = tmp_path / "a.pgm"
-    path.write_bytes(pgm(drawn(PLAN)))
-    ((said, _, memory),) = watched([(path, 1.0)])
+    path.write_bytes(pgm(draw_pixels(PLAN)))
+    ((said, _, memory),) = measure_import([(path, 1.0)])
     assert said == "accepted"
     assert memory < MEMORY

@@ -34,7 +34,7 @@ def plan(verts: Any, **others: Any) -> dict[str, Any]:
     return {"verts": verts, "id": "abc", "room_num": 2, "room_category": {}, "bbox": {}} | others
 
 
-def imported(path: Path, **shaping: Any) -> tuple[Environment, ImportReport]:
+def import_plan(path: Path, **shaping: Any) -> tuple[Environment, ImportReport]:
     environment, report, foreign = import_map(path, format="houseexpo", shaping=Shaping(**shaping))
     assert foreign.format == report.format == "houseexpo"
     return environment, report
@@ -43,7 +43,7 @@ def imported(path: Path, **shaping: Any) -> tuple[Environment, ImportReport]:
 def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
     path = write(tmp_path, plan(PLAN))
     assert detect_format(path).name == "houseexpo"
-    environment, report = imported(path)
+    environment, report = import_plan(path)
     assert environment.name == "HouseExpo abc"
     assert environment.free_area == pytest.approx(12 + 12 + 0.09, abs=1e-3)
     assert len(environment.free.geoms) == 1
@@ -58,20 +58,20 @@ def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
 
 
 def test_cut_corners_become_whole(tmp_path: Path) -> None:
-    environment, report = imported(write(tmp_path, plan(PLAN)))
+    environment, report = import_plan(write(tmp_path, plan(PLAN)))
     assert report.vertices_kept == 12
     assert set(environment.boundary) == {
         (0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (4.1, 1.0), (4.1, 0.0), (8.1, 0.0),
         (8.1, 3.0), (4.1, 3.0), (4.1, 1.9), (4.0, 1.9), (4.0, 3.0), (0.0, 3.0),
     }  # fmt: skip
-    untouched, report = imported(write(tmp_path, plan(PLAN)), simplify=0.0)
+    untouched, report = import_plan(write(tmp_path, plan(PLAN)), simplify=0.0)
     assert report.vertices_kept == 17
     assert set(untouched.boundary) == {(float(x), float(y)) for x, y in PLAN}
 
 
 def test_a_closed_ring_with_repeats(tmp_path: Path) -> None:
     verts = [[0, 0], [5, 0], [5, 0], [5, 3], [0, 3], [0, 0]]
-    environment, report = imported(write(tmp_path, plan(verts)))
+    environment, report = import_plan(write(tmp_path, plan(verts)))
     assert len(environment.boundary) == 4
     assert environment.area == 15.0
     assert report.repaired == ("2 repeated vertices taken out",)
@@ -80,7 +80,7 @@ def test_a_closed_ring_with_repeats(tmp_path: Path) -> None:
 def test_a_ring_that_crosses_itself(tmp_path: Path) -> None:
     # a bow tie of 8 m² and 2 m²
     verts = [[0, 0], [0, 4], [6, -2], [6, 0]]
-    environment, report = imported(write(tmp_path, plan(verts)))
+    environment, report = import_plan(write(tmp_path, plan(verts)))
     assert environment.area == pytest.approx(8.0)
     assert report.area_read == pytest.approx(10.0)
     assert report.area_kept == pytest.approx(8.0)
@@ -91,7 +91,7 @@ def test_a_ring_that_crosses_itself(tmp_path: Path) -> None:
 def test_a_ring_round_a_block_gives_an_obstacle(tmp_path: Path) -> None:
     # the outline runs in to a block, round it, and out again the same way
     verts = [[0, 0], [6, 0], [6, 6], [0, 6], [0, 3], [2, 3], [2, 4], [4, 4], [4, 2], [2, 2], [2, 3], [0, 3]]
-    environment, report = imported(write(tmp_path, plan(verts)))
+    environment, report = import_plan(write(tmp_path, plan(verts)))
     assert environment.free_area == pytest.approx(36 - 4)
     assert [type(obstacle) for obstacle in environment.obstacles] == [PolygonObstacle]
     assert report.repaired
@@ -99,17 +99,17 @@ def test_a_ring_round_a_block_gives_an_obstacle(tmp_path: Path) -> None:
 
 def test_the_starts(tmp_path: Path) -> None:
     path = write(tmp_path, plan(PLAN))
-    environment, _ = imported(path)
+    environment, _ = import_plan(path)
     assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
     assert len(environment.start("room").sample(6)) == 6
-    assert list(imported(path, default_start="uniform")[0].starts) == ["uniform", "room"]
+    assert list(import_plan(path, default_start="uniform")[0].starts) == ["uniform", "room"]
     room = environment.starts["room"]
     assert isinstance(room, DiscStart)
     assert room.radius == pytest.approx(1.39, abs=0.02)
 
 
 @pytest.mark.parametrize(
-    ("document", "wanted"),
+    ("document", "expected"),
     [
         ([], "not a HouseExpo plan"),
         ({"vertices": []}, 'expected an object with "verts"'),
@@ -126,13 +126,13 @@ def test_the_starts(tmp_path: Path) -> None:
         (plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),
     ],
 )
-def test_what_is_no_plan_is_refused_in_one_line(tmp_path: Path, document: Any, wanted: str) -> None:
+def test_what_is_no_plan_is_refused_in_one_line(tmp_path: Path, document: Any, expected: str) -> None:
     path = write(tmp_path, document)
     with pytest.raises(MapError) as caught:
-        imported(path)
+        import_plan(path)
     message = str(caught.value)
     assert message.startswith(str(path))
-    assert wanted in message
+    assert expected in message
     assert "\n" not in message
 
 
@@ -153,9 +153,9 @@ def test_options_out_of_range(tmp_path: Path) -> None:
     path = write(tmp_path, plan(PLAN))
     for tolerance in (-1.0, math.nan, 11.0):
         with pytest.raises(ParameterError, match="simplify"):
-            imported(path, simplify=tolerance)
+            import_plan(path, simplify=tolerance)
     with pytest.raises(ParameterError, match="default_start: expected one of room, uniform, got 'door'"):
-        imported(path, default_start="door")  # type: ignore[arg-type]
+        import_plan(path, default_start="door")  # type: ignore[arg-type]
 
 
 def test_other_files_are_not_recognized(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_any_ring_is_imported_or_refused(
     path = write(tmp_path_factory.getbasetemp(), plan([[x / 4, y / 4] for x, y in verts]))
     message = None
     try:
-        environment, report = imported(path, simplify=tolerance)
+        environment, report = import_plan(path, simplify=tolerance)
     except MapError as error:
         message = str(error)
     if message is not None:

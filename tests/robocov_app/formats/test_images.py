@@ -79,8 +79,8 @@ def test_png_of_every_depth_and_color(tmp_path: Path) -> None:
     }
     for name, data in files.items():
         picture = read(tmp_path, data)
-        wanted = GRAY if name != "interlaced" else np.array([[0x77]])
-        np.testing.assert_allclose(shade(picture), wanted / 255, atol=1e-5, err_msg=name)
+        expected = GRAY if name != "interlaced" else np.array([[0x77]])
+        np.testing.assert_allclose(shade(picture), expected / 255, atol=1e-5, err_msg=name)
         assert picture.alpha is None
     for bits, step in ((1, 255), (2, 85)):
         levels = np.array([0, 1, 1, 0] if bits == 1 else [0, 1, 3, 2])
@@ -141,7 +141,7 @@ def test_tall_pictures_are_converted_strip_by_strip(tmp_path: Path) -> None:
 COLORS = np.array([[[255, 0, 0], [0, 250, 0]], [[0, 3, 255], [10, 20, 30]], [[9, 9, 9], [255, 255, 255]]])
 
 
-def saved(image: Image.Image, kind: str, **options: object) -> bytes:
+def save_picture(image: Image.Image, kind: str, **options: object) -> bytes:
     stream = io.BytesIO()
     image.save(stream, kind, **options)
     return stream.getvalue()
@@ -155,12 +155,12 @@ def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: s
         image = Image.fromarray(np.asarray(image).astype(np.uint16) * 257)
     if (kind, mode) in {("BMP", "I;16"), ("BMP", "CMYK"), ("PPM", "CMYK"), ("PNG", "CMYK"), ("PPM", "P")}:
         pytest.skip("is never saved so")
-    data = saved(image, kind)
+    data = save_picture(image, kind)
     assert is_picture(data)
     picture = read(tmp_path, data)
     plain = image.convert("I") if mode == "I;16" else image.convert("RGB")
-    wanted = np.asarray(plain) / 65535 if mode == "I;16" else np.asarray(plain).sum(axis=2) / 765
-    np.testing.assert_allclose(shade(picture), wanted, atol=1e-9)
+    expected = np.asarray(plain) / 65535 if mode == "I;16" else np.asarray(plain).sum(axis=2) / 765
+    np.testing.assert_allclose(shade(picture), expected, atol=1e-9)
     assert (picture.alpha is not None) == (mode == "RGBA" and kind in ("TIFF", "PNG"))
     assert not picture.lossy
 
@@ -168,7 +168,7 @@ def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: s
 @pytest.mark.parametrize("compression", ["tiff_lzw", "tiff_adobe_deflate", "packbits", "group4"])
 def test_tiff_with_compression(tmp_path: Path, compression: str) -> None:
     image = Image.fromarray(np.array(GRAY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
-    picture = read(tmp_path, saved(image, "TIFF", compression=compression))
+    picture = read(tmp_path, save_picture(image, "TIFF", compression=compression))
     np.testing.assert_array_equal(shade(picture), np.asarray(image.convert("L")) / 255)
 
 
@@ -196,12 +196,12 @@ def test_tiff_of_16_bits(tmp_path: Path, kind: str, white_is_zero: bool) -> None
         ):
             read(tmp_path, data)
         return
-    wanted = np.array([[0, 65535], [1000, 2000]]) / 65535
-    np.testing.assert_allclose(shade(read(tmp_path, data)), 1 - wanted if white_is_zero else wanted)
+    expected = np.array([[0, 65535], [1000, 2000]]) / 65535
+    np.testing.assert_allclose(shade(read(tmp_path, data)), 1 - expected if white_is_zero else expected)
 
 
 def floats(values: list[list[float]]) -> bytes:
-    return saved(Image.fromarray(np.array(values, dtype=np.float32)), "TIFF")
+    return save_picture(Image.fromarray(np.array(values, dtype=np.float32)), "TIFF")
 
 
 def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
@@ -221,7 +221,7 @@ def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
         ),
         (floats([[0.0, 255.0]]), "floating-point samples from 0 (black) to 1 (white), got 0 to 255"),
         (floats([[math.nan, math.inf]]), "samples from 0 (black) to 1 (white), got none that is a number"),
-        (saved(Image.new("I", (3, 3)), "TIFF"), "samples of up to 16 bits without a sign, got others"),
+        (save_picture(Image.new("I", (3, 3)), "TIFF"), "samples of up to 16 bits without a sign, got others"),
     ],
     ids=["heights", "bytes", "nan", "whole"],
 )
@@ -244,7 +244,7 @@ def test_pictures_stand_as_their_exif_says(tmp_path: Path, kind: str, turn: int)
     upright |= {7: image.transpose(Image.Transpose.TRANSVERSE), 8: image.rotate(90, expand=True)}
     exif = Image.Exif()
     exif[274] = turn
-    picture = read(tmp_path, saved(image, kind, exif=exif))
+    picture = read(tmp_path, save_picture(image, kind, exif=exif))
     np.testing.assert_array_equal(picture.level, np.asarray(upright[turn]))
 
 
@@ -252,7 +252,7 @@ def test_pictures_stand_as_their_exif_says(tmp_path: Path, kind: str, turn: int)
 def test_jpeg(tmp_path: Path, mode: str) -> None:
     image = Image.new("RGB", (32, 16), (250, 240, 230))
     image.paste((20, 0, 10), (8, 0, 24, 16))
-    picture = read(tmp_path, saved(image.convert(mode), "JPEG", quality=95))
+    picture = read(tmp_path, save_picture(image.convert(mode), "JPEG", quality=95))
     assert picture.lossy and picture.level.shape == (16, 32)
     np.testing.assert_allclose(shade(picture), np.asarray(image).sum(axis=2) / 765, atol=0.05)
 
@@ -268,7 +268,7 @@ WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), 
 
 
 @pytest.mark.parametrize(
-    ("data", "wanted"),
+    ("data", "expected"),
     [
         (b"", "begins with b''"),
         (b"GIF89a", "expected a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM, got a file that begins with b'GIF"),
@@ -310,12 +310,12 @@ WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), 
     ],
     ids=map(str, range(99)),
 )  # fmt: skip
-def test_what_is_refused(tmp_path: Path, data: bytes, wanted: str) -> None:
+def test_what_is_refused(tmp_path: Path, data: bytes, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, data)
     message = str(caught.value)
     assert message.startswith("picture: ")
-    assert wanted in message
+    assert expected in message
     assert "\n" not in message
 
 

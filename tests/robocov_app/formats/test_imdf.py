@@ -173,7 +173,7 @@ def many() -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("content", "wanted"),
+    ("content", "expected"),
     [
         (bomb(), "expected at most 50 MB when unpacked, got more"),
         (many(), "expected an archive of at most 1000 files, got more"),
@@ -182,12 +182,12 @@ def many() -> bytes:
     ],
     ids=["bomb", "many", "cut", "mixed"],
 )
-def test_archives_that_are_refused(tmp_path: Path, content: bytes, wanted: str) -> None:
+def test_archives_that_are_refused(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "mill.zip"
     path.write_bytes(content)
     with pytest.raises(MapError) as caught:
         read(path)
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert str(caught.value).startswith(str(path)) and str(caught.value).isprintable()
 
 
@@ -205,11 +205,11 @@ def test_content_that_is_refused(tmp_path: Path) -> None:
         ("unit", [unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
         ("unit", [unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),
     ]
-    for k, (name, features, wanted) in enumerate(cases):
+    for k, (name, features, expected) in enumerate(cases):
         path = as_folder(tmp_path / f"mill{k}", {**venue(), name: features})
         with pytest.raises(MapError) as caught:
             read(path)
-        assert wanted in str(caught.value)
+        assert expected in str(caught.value)
 
 
 def test_a_folder_or_zip_of_something_else_is_none(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from raster_files import PLAN, drawn, pgm, ros_map
+from raster_files import PLAN, draw_pixels, pgm, write_ros_map
 
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, get_importer, import_map
@@ -42,9 +42,9 @@ def test_no_format_takes_noise_for_its_own(tmp_path: Path) -> None:
 
 
 def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
-    (tmp_path / "plan.map").write_bytes(pgm(drawn(PLAN)))
+    (tmp_path / "plan.map").write_bytes(pgm(draw_pixels(PLAN)))
     assert detect_format(tmp_path / "plan.map").name == "picture"
-    assert detect_format(ros_map(tmp_path, drawn(PLAN))).name == "ros"
+    assert detect_format(write_ros_map(tmp_path, draw_pixels(PLAN))).name == "ros"
     (tmp_path / "half.yaml").write_text("image: plan.map\n")
     assert detect_format(tmp_path / "half.yaml").name == "ros"
     with pytest.raises(MapError, match="resolution: missing"):
@@ -54,8 +54,8 @@ def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
 def test_what_is_not_known(tmp_path: Path) -> None:
     path = tmp_path / "plan.xyz"
     path.write_text("nothing")
-    wanted = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), expected one of .*ros.*"
-    with pytest.raises(MapError, match=wanted):
+    expected = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), expected one of .*ros.*"
+    with pytest.raises(MapError, match=expected):
         detect_format(path)
     with pytest.raises(MapError, match="no such file"):
         detect_format(tmp_path / "none.png")
@@ -69,7 +69,7 @@ def test_what_is_not_known(tmp_path: Path) -> None:
 
 
 def test_a_format_may_be_forced(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn(PLAN))
+    path = write_ros_map(tmp_path, draw_pixels(PLAN))
     image = path.with_suffix(".pgm").rename(tmp_path / "image.bin")
     environment, report, foreign = import_map(
         image, format="picture", options=ReadOptions(cell=0.25, threshold=0.9)
@@ -81,7 +81,7 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "wanted"),
+    ("options", "expected"),
     [
         ({"cell": 0.0}, "cell: expected a number from 1e-06 to 10000 m, got 0.0"),
         ({"cell": float("nan")}, "cell: expected a number from 1e-06 to 10000 m, got nan"),
@@ -93,13 +93,13 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
         ({"trees": "green"}, "trees: expected one of obstacle, free"),
     ],
 )
-def test_options_out_of_range(options: dict[str, object], wanted: str) -> None:
-    with pytest.raises(ParameterError, match=wanted):
+def test_options_out_of_range(options: dict[str, object], expected: str) -> None:
+    with pytest.raises(ParameterError, match=expected):
         ReadOptions(**options)  # type: ignore[arg-type]
 
 
 def test_the_same_file_gives_the_same_map(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn(PLAN))
+    path = write_ros_map(tmp_path, draw_pixels(PLAN))
     first, report, _ = import_map(path, shaping=Shaping(keep="all"))
     again, same, _ = import_map(path, shaping=Shaping(keep="all"))
     assert first == again

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
-from raster_files import drawn, pgm
+from raster_files import draw_pixels, pgm
 from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
@@ -27,7 +27,7 @@ def read(folder: Path, text: str, world: str = WORLD, **options: object) -> Fore
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 
-def solid(foreign: ForeignMap) -> shapely.Geometry:
+def compute_obstacles(foreign: ForeignMap) -> shapely.Geometry:
     return SPACE - foreign.free
 
 
@@ -51,13 +51,13 @@ obstacle:
 """,
         thickness=0.2,
     )
-    wanted = [
+    expected = [
         CircleObstacle((1.0, 5.0), 0.5).polygon,
         affinity.rotate(box(3, 3.5, 5, 4.5), 0.5, origin=(4, 4), use_radians=True),
         shapely.Polygon([(7, 5), (8, 5), (8, 7)]),
         box(5.9, 3, 6.1, 5),
     ]
-    assert solid(foreign).symmetric_difference(shapely.union_all(wanted)).area < 1e-5
+    assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(expected)).area < 1e-5
     assert foreign.boundary is not None and foreign.boundary.equals(SPACE)
 
 
@@ -77,10 +77,10 @@ obstacle:
     shape: {name: rectangle, length: 0.5, width: 0.1}
 """,
     )
-    wanted = [box(0, 3.5, 2, 4.5), box(3.5, 3.5, 4.5, 4.5), box(6.5, 3.5, 7.5, 4.5)]
-    wanted += [box(6.25, 4.95, 6.75, 5.05), box(1.25, 4.95, 1.75, 5.05)]
-    wanted += [box(3.95, 7.25, 4.05, 7.75), box(3.95, 2.25, 4.05, 2.75)]
-    assert solid(foreign).symmetric_difference(shapely.union_all(wanted)).area < 1e-5
+    expected = [box(0, 3.5, 2, 4.5), box(3.5, 3.5, 4.5, 4.5), box(6.5, 3.5, 7.5, 4.5)]
+    expected += [box(6.25, 4.95, 6.75, 5.05), box(1.25, 4.95, 1.75, 5.05)]
+    expected += [box(3.95, 7.25, 4.05, 7.75), box(3.95, 2.25, 4.05, 2.75)]
+    assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(expected)).area < 1e-5
 
 
 def test_parts_of_a_compound_have_poses_of_their_own(tmp_path: Path) -> None:
@@ -96,8 +96,8 @@ obstacle:
   state: [4, 5, 1.5707963267948966]
 """,
     )
-    wanted = shapely.MultiPolygon([box(3.75, 4, 4.25, 6), box(2.75, 4.5, 3.25, 5.5)])
-    assert solid(foreign).symmetric_difference(wanted).area < 1e-5
+    expected = shapely.MultiPolygon([box(3.75, 4, 4.25, 6), box(2.75, 4.5, 3.25, 5.5)])
+    assert compute_obstacles(foreign).symmetric_difference(expected).area < 1e-5
 
 
 def test_what_is_by_chance_or_collides_with_nothing_is_counted(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ obstacle:
   - {number: -3, distribution: {name: random}}
 """
     foreign = read(tmp_path, text)
-    assert solid(foreign).equals(box(6.5, 4.5, 7.5, 5.5))
+    assert compute_obstacles(foreign).equals(box(6.5, 4.5, 7.5, 5.5))
     assert foreign.robots == ((0.0, 3.0), (1.0, 3.0))
     assert foreign.dropped == (
         "10 obstacles that IR-SIM places at random",
@@ -130,7 +130,7 @@ obstacle:
 
 
 def test_a_picture_fills_the_world_whatever_its_cells_are(tmp_path: Path) -> None:
-    (tmp_path / "grid.pgm").write_bytes(pgm(drawn("#...\n....\n...#")))
+    (tmp_path / "grid.pgm").write_bytes(pgm(draw_pixels("#...\n....\n...#")))
     foreign = read(tmp_path, "  obstacle_map: 'grid.pgm'\n")
     # cells of 2.5 x 2 m, the top row of the picture is the highest
     assert foreign.free.equals(SPACE - box(-1, 6, 1.5, 8) - box(6.5, 2, 9, 4))
@@ -143,7 +143,7 @@ def test_a_picture_fills_the_world_whatever_its_cells_are(tmp_path: Path) -> Non
 
 
 def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
-    (tmp_path / "far.pgm").write_bytes(pgm(drawn("#.\n..")))
+    (tmp_path / "far.pgm").write_bytes(pgm(draw_pixels("#.\n..")))
     folder = tmp_path / "worlds"
     folder.mkdir()
     with pytest.raises(MapError, match=r"world\.obstacle_map: '\.\./far\.pgm' is outside"):
@@ -152,7 +152,7 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("  obstacle_map: {name: perlin, seed: 1}", "world.obstacle_map: expected a picture, got 'perlin'"),
         ("  mdownsample: 0\n  obstacle_map: a.pgm", "world.mdownsample: expected a number from 1"),
@@ -172,11 +172,11 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
         ("obstacle: " + "[" * 20, "nested too deeply, expected at most 12 levels"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, wanted: str) -> None:
+def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "a.pgm").write_bytes(pgm(np.full((2, 2), 255, np.uint8)))
     with pytest.raises(MapError) as caught:
         read(tmp_path, text)
-    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+    assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
@@ -204,8 +204,10 @@ obstacle:
   - {shape: {<<: *box, length: 2}, state: [4, 3.5]}
 """,
     )
-    wanted = shapely.union_all([box(1.5, 4.75, 2.5, 5.25), box(5.5, 4.75, 6.5, 5.25), box(3, 3.25, 5, 3.75)])
-    assert solid(foreign).symmetric_difference(wanted).area < 1e-6
+    expected = shapely.union_all(
+        [box(1.5, 4.75, 2.5, 5.25), box(5.5, 4.75, 6.5, 5.25), box(3, 3.25, 5, 3.75)]
+    )
+    assert compute_obstacles(foreign).symmetric_difference(expected).area < 1e-6
 
 
 PARTS = ", ".join(["*a"] * 100)
@@ -231,7 +233,7 @@ def test_parts_of_many_objects_are_counted_together(tmp_path: Path, text: str) -
 # Maps that are installed with IR-SIM
 
 
-def install(folder: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
+def install_irsim(folder: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
     """Put a package that looks like IR-SIM, and may not be imported, where Python looks for packages."""
     maps = folder / "site" / "irsim" / "world" / "map" / "more"
     maps.mkdir(parents=True)
@@ -248,9 +250,9 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
 ) -> None:
     cells = np.full((6, 10), 255, np.uint8)
     cells[0, 0] = 0
-    install(tmp_path, monkeypatch, pgm(cells))
+    install_irsim(tmp_path, monkeypatch, pgm(cells))
     foreign = read(tmp_path, BUNDLED)
-    assert solid(foreign).equals(box(-1, 7, 0, 8))
+    assert compute_obstacles(foreign).equals(box(-1, 7, 0, 8))
     assert "world.obstacle_map: 'cave.png' taken from the installed ir-sim" in foreign.notes
     with pytest.raises(
         MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"
@@ -258,7 +260,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
         read(tmp_path, "  obstacle_map: hall.png\n")
     # A picture next to the file has priority.
     (tmp_path / "cave.png").write_bytes(pgm(np.full((6, 10), 255, np.uint8)))
-    assert solid(read(tmp_path, BUNDLED)).is_empty
+    assert compute_obstacles(read(tmp_path, BUNDLED)).is_empty
 
 
 def test_without_irsim_a_bundled_map_is_said_to_need_it(
@@ -268,8 +270,8 @@ def test_without_irsim_a_bundled_map_is_said_to_need_it(
     with pytest.raises(MapError) as caught:
         read(tmp_path, BUNDLED)
     place = f"{tmp_path / 'world.yaml'}: world.obstacle_map: "
-    wanted = "expected a picture next to the file, or one of those of IR-SIM, got 'cave.png'. "
-    assert str(caught.value) == place + wanted + "IR-SIM is not installed (pip install ir-sim)."
+    expected = "expected a picture next to the file, or one of those of IR-SIM, got 'cave.png'. "
+    assert str(caught.value) == place + expected + "IR-SIM is not installed (pip install ir-sim)."
 
 
 def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:

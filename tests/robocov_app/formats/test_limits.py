@@ -21,7 +21,7 @@ def test_the_beginning_and_the_whole_of_a_file(tmp_path: Path) -> None:
 
 def test_what_is_no_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    for path, wanted in (
+    for path, expected in (
         (tmp_path / "none", "no such file"),
         (tmp_path, "expected a file, got a folder"),
         (tmp_path / "pipe", "expected a file, got a pipe or a device"),
@@ -32,7 +32,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
         for read in (files.read_head, files.read_content):
             with pytest.raises(MapError) as caught:
                 read(path)
-            assert wanted in str(caught.value)
+            assert expected in str(caught.value)
             assert "\n" not in str(caught.value)
 
 

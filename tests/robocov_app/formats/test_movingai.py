@@ -29,8 +29,8 @@ def read(folder: Path, text: str | bytes, **options: object) -> ForeignMap:
 
 def test_letters(tmp_path: Path) -> None:
     foreign = read(tmp_path, GRID)
-    wanted = shapely.box(1, 1, 5, 2) | shapely.box(1, 2, 3, 3) | shapely.box(1, 3, 4, 4)
-    assert shapely.equals(foreign.free, wanted)
+    expected = shapely.box(1, 1, 5, 2) | shapely.box(1, 2, 3, 3) | shapely.box(1, 3, 4, 4)
+    assert shapely.equals(foreign.free, expected)
     assert foreign.cell == 1.0
     assert foreign.notes == (
         "no cell size was given: 1 m taken",
@@ -66,7 +66,7 @@ def test_line_ends_marks_blanks_and_the_order_of_the_header(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("", "expected a line map after type, height and width, got none"),
         ("type octile\n", "expected a line map after type, height and width, got none"),
@@ -99,10 +99,10 @@ def test_line_ends_marks_blanks_and_the_order_of_the_header(tmp_path: Path) -> N
     ],
     ids=map(str, range(99)),
 )
-def test_what_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
+def test_what_is_refused(tmp_path: Path, text: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, text)
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

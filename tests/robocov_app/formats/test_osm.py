@@ -83,8 +83,8 @@ def test_buildings_stand_where_they_are_north_up(tmp_path: Path) -> None:
     extract.way(square(10, 5, 8), building="yes")
     extract.way(square(-30, -20, 5), building="church", name="St. Anna")
     found = solid(tmp_path, extract)
-    wanted = shapely.union_all([box(10, 5, 18, 13), box(-30, -20, -25, -15)])
-    assert found.symmetric_difference(wanted).area < 0.05
+    expected = shapely.union_all([box(10, 5, 18, 13), box(-30, -20, -25, -15)])
+    assert found.symmetric_difference(expected).area < 0.05
     assert solid(tmp_path, extract, skip=("church",)).area == pytest.approx(64, abs=0.05)
 
 
@@ -156,7 +156,7 @@ def crowd() -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         (HEAD, "town.osm:3: not XML: no element found"),
         (HEAD.replace("<osm", "<!DOCTYPE osm [<!ENTITY a 'b'>]><osm"), "osm:2: expected no document type"),
@@ -174,12 +174,12 @@ def crowd() -> str:
     ],
     ids=map(str, range(13)),
 )  # fmt: skip
-def test_what_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
+def test_what_is_refused(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "town.osm"
     path.write_text(text)
     with pytest.raises(MapError) as caught:
         IMPORTERS["osm"].read(path, ReadOptions())
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
@@ -206,8 +206,8 @@ def test_a_degenerate_way_beside_others_is_left_out(tmp_path: Path) -> None:
     extract.ways.append('<way id="999">' + '<nd ref="1"/>' * 3 + "</way>")
     assert solid(tmp_path, extract).area == pytest.approx(25, abs=0.05)
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
-    wanted = ("1 outline without an area", "1 relation without an area", "1 way without an area")
-    assert foreign.dropped == wanted
+    expected = ("1 outline without an area", "1 relation without an area", "1 way without an area")
+    assert foreign.dropped == expected
 
 
 # JSON of Overpass
@@ -273,7 +273,7 @@ def test_overpass_relations_hold_their_ways(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("elements", "wanted"),
+    ("elements", "expected"),
     [
         ("{}", ": elements: expected a list of elements, got {}"),
         ("[3]", ": elements[0]: expected an element"),
@@ -290,12 +290,12 @@ def test_overpass_relations_hold_their_ways(tmp_path: Path) -> None:
         ('[{"type": "area", "id": 1}]', "no closed outline and no line"),
     ],
 )
-def test_overpass_json_that_is_refused(tmp_path: Path, elements: str, wanted: str) -> None:
+def test_overpass_json_that_is_refused(tmp_path: Path, elements: str, expected: str) -> None:
     path = tmp_path / "town.json"
     path.write_text('{"osm3s": {}, "elements": ' + elements + "}")
     with pytest.raises(MapError) as caught:
         import_map(path, format="osm")
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
 
 
 # Indoors

@@ -18,7 +18,9 @@ IMPORTER = IMPORTERS["picture"]
 LEVELS = np.array([[0, 127, 128, 255], [255, 255, 255, 255]], dtype=np.uint8)
 
 
-def saved(folder: Path, pixels: np.ndarray, chunk: str | None = None, title: str | None = None) -> Path:
+def save_picture(
+    folder: Path, pixels: np.ndarray, chunk: str | None = None, title: str | None = None
+) -> Path:
     texts = PngImagePlugin.PngInfo()
     if chunk is not None:
         texts.add_text(GEOREFERENCE_CHUNK, chunk)
@@ -34,7 +36,7 @@ def read(path: Path, **options: object) -> shapely.MultiPolygon:
 
 
 def test_dark_is_an_obstacle(tmp_path: Path) -> None:
-    path = saved(tmp_path, LEVELS)
+    path = save_picture(tmp_path, LEVELS)
     assert detect_format(path) is IMPORTER
     lower = shapely.box(0, 0, 4, 1)
     assert shapely.equals(read(path, cell=1.0), lower | shapely.box(2, 1, 4, 2))
@@ -67,7 +69,7 @@ def test_what_is_transparent_is_unknown(tmp_path: Path) -> None:
     pixels = np.full((4, 4, 4), 255, dtype=np.uint8)
     pixels[:, 2, 3] = 127
     pixels[:, 3] = (0, 0, 0, 128)
-    path = saved(tmp_path, pixels)
+    path = save_picture(tmp_path, pixels)
     assert shapely.equals(read(path, cell=1.0), shapely.box(0, 0, 2, 4))
     assert shapely.equals(read(path, cell=1.0, unknown="free"), shapely.box(0, 0, 3, 4))
     foreign = IMPORTER.read(path, ReadOptions(cell=1.0, unknown="cut"))
@@ -75,11 +77,11 @@ def test_what_is_transparent_is_unknown(tmp_path: Path) -> None:
     assert foreign.notes == ("4 x 4 cells of 1 m: 50 % free, 25 % blocked, 25 % transparent, cut away",)
     pixels[..., 3] = 0
     with pytest.raises(MapError, match="--unknown free takes transparent cells as free"):
-        read(saved(tmp_path, pixels), cell=1.0)
+        read(save_picture(tmp_path, pixels), cell=1.0)
 
 
 def test_the_place_that_it_says_of_itself(tmp_path: Path) -> None:
-    path = saved(tmp_path, LEVELS, json.dumps({"cell_m": 0.5, "origin_m": [3, -2]}), title="an office")
+    path = save_picture(tmp_path, LEVELS, json.dumps({"cell_m": 0.5, "origin_m": [3, -2]}), title="an office")
     foreign = IMPORTER.read(path, ReadOptions())
     assert foreign.free.bounds == (3.0, -2.0, 5.0, -1.0)
     assert (foreign.name, foreign.cell) == ("an office", 0.5)
@@ -96,7 +98,7 @@ def test_the_place_that_it_says_of_itself(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) -> None:
-    path = saved(tmp_path, LEVELS, chunk)
+    path = save_picture(tmp_path, LEVELS, chunk)
     with pytest.raises(
         MapError, match=r"plan.png: a picture has no scale, expected --cell, the meters per pixel"
     ):
@@ -105,7 +107,7 @@ def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) ->
 
 
 def test_the_yaml_beside_it_is_pointed_at(tmp_path: Path) -> None:
-    path = saved(tmp_path, LEVELS)
+    path = save_picture(tmp_path, LEVELS)
     (tmp_path / "plan.yaml").write_text("image: plan.png")
     with pytest.raises(MapError, match=r"\(or import plan\.yaml next to it\)"):
         import_map(path)

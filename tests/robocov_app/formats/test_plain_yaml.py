@@ -52,7 +52,7 @@ def test_merge_keys_give_what_is_not_given() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         (b"a: !!python/object/apply:os.system [ls]", "m: line 1: expected a plain value, got the tag"),
         (b"a: 1\nb: !x 2", "m: line 2: expected a plain value"),
@@ -83,10 +83,10 @@ def test_merge_keys_give_what_is_not_given() -> None:
     ],
     ids=map(str, range(99)),
 )
-def test_what_is_refused(text: bytes, wanted: str) -> None:
+def test_what_is_refused(text: bytes, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         parse(text, "m")
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

@@ -16,7 +16,7 @@ def paper(width: int = 200, height: int = 120) -> tuple[Image.Image, ImageDraw.I
     return picture, ImageDraw.Draw(picture)
 
 
-def imported(
+def import_picture(
     folder: Path, picture: Image.Image, name: str = "plan.png", inside: tuple[float, float] | None = None,
     **options: object,
 ) -> tuple[float, ImportReport, ForeignMap]:  # fmt: skip
@@ -37,19 +37,19 @@ def flat() -> Image.Image:
 
 
 def test_a_plan_on_paper_is_taken_without_the_paper(tmp_path: Path) -> None:
-    area, report, _ = imported(tmp_path, flat())
+    area, report, _ = import_picture(tmp_path, flat())
     assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.05)
     (note,) = [note for note in report.notes if "paper around a plan" in note]
     assert "the largest part of the free space, 208 m²" in note and "100 % of the edge" in note
     assert "--inside" in note
     place = report.others[0]
-    assert imported(tmp_path, flat(), inside=place)[0] == pytest.approx(20 * 12 - 8 * 4, abs=0.1)
+    assert import_picture(tmp_path, flat(), inside=place)[0] == pytest.approx(20 * 12 - 8 * 4, abs=0.1)
 
 
 def test_the_inside_of_a_small_obstacle_is_no_plan(tmp_path: Path) -> None:
     picture, draw = paper()
     draw.rectangle((60, 40, 84, 64), outline="black", width=3)
-    area, report, _ = imported(tmp_path, picture)
+    area, report, _ = import_picture(tmp_path, picture)
     assert area > 200.0
     assert not any("paper" in note for note in report.notes)
 
@@ -59,7 +59,7 @@ def test_free_space_within_walls_at_the_edge_stays(tmp_path: Path) -> None:
     draw.rectangle((0, 0, 199, 119), outline="black", width=2)
     draw.rectangle((90, 0, 99, 5), fill="white")  # a door to the edge of the picture
     draw.rectangle((150, 60, 199, 119), outline="black", width=2)
-    area, report, _ = imported(tmp_path, picture)
+    area, report, _ = import_picture(tmp_path, picture)
     assert area > 150.0
     assert not any("paper" in note for note in report.notes)
 
@@ -67,7 +67,7 @@ def test_free_space_within_walls_at_the_edge_stays(tmp_path: Path) -> None:
 def test_an_open_outer_door_is_named_as_a_cause(tmp_path: Path) -> None:
     picture = flat()
     ImageDraw.Draw(picture).rectangle((110, 76, 119, 82), fill="white")
-    area, report, _ = imported(tmp_path, picture)
+    area, report, _ = import_picture(tmp_path, picture)
     assert area > 200.0
     assert any("an outer door may be open" in note for note in report.notes)
 
@@ -78,16 +78,16 @@ def test_thin_strokes_are_dropped_and_walls_keep_their_corners(tmp_path: Path) -
     draw.arc((104, 46, 124, 66), 180, 360, fill="black")
     draw.line((104, 56, 124, 56), fill="black")
     draw.rectangle((110, 66, 116, 72), outline="black")
-    with_strokes = imported(tmp_path, picture)[0]
-    area, report, _ = imported(tmp_path, picture, min_stroke="2px")
+    with_strokes = import_picture(tmp_path, picture)[0]
+    area, report, _ = import_picture(tmp_path, picture, min_stroke="2px")
     assert with_strokes < area - 0.1
     assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.05)
     (dropped,) = [line for line in report.dropped if "strokes" in line]
     assert dropped.startswith("strokes thinner than 0.2 m (2 px) in ")
     assert dropped.endswith("(--min-stroke)")
-    assert imported(tmp_path, picture, min_stroke="0.2")[0] == area
+    assert import_picture(tmp_path, picture, min_stroke="0.2")[0] == area
     # the wall of two pixels is thinner than 3 px
-    assert imported(tmp_path, picture, min_stroke="3px")[0] == pytest.approx(7.4 * 3.4, abs=0.1)
+    assert import_picture(tmp_path, picture, min_stroke="3px")[0] == pytest.approx(7.4 * 3.4, abs=0.1)
 
 
 @pytest.mark.parametrize("text", ["", "x", "-1", "1e9", "3 pixels", "nan", "px", "99999m"])
@@ -98,7 +98,7 @@ def test_what_is_no_width_of_a_stroke_is_refused(text: str) -> None:
 
 def test_a_stroke_as_wide_as_a_hall_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="min_stroke: expected at most 200 pixels, got 201"):
-        imported(tmp_path, flat(), min_stroke="201px")
+        import_picture(tmp_path, flat(), min_stroke="201px")
 
 
 @pytest.mark.parametrize("width", range(1, 10))
@@ -132,10 +132,10 @@ def colored() -> Image.Image:
 def test_colors_of_a_picture_are_what_is_declared(tmp_path: Path, name: str) -> None:
     room, bench, rug = 19.4 * 11.4, 8.0, 8.0
     above = 9.7 * 19.4
-    area, _, _ = imported(tmp_path, colored(), name)
+    area, _, _ = import_picture(tmp_path, colored(), name)
     assert area == pytest.approx(above - rug, abs=1.0)
     declared = {"free_color": ("navy", "white"), "solid_color": ("#c8c8c8",), "ignore_color": ("red",)}
-    area, report, _ = imported(tmp_path, colored(), name, **declared, color_tolerance=90.0)
+    area, report, _ = import_picture(tmp_path, colored(), name, **declared, color_tolerance=90.0)
     assert area == pytest.approx(room - bench, abs=1.0)
     shares = [note for note in report.notes if "of the pixels are" in note]
     assert [note.rpartition(" ")[2] for note in shares] == ["free", "obstacles", "out"]
@@ -148,12 +148,12 @@ def test_soft_edges_of_a_dark_color_are_no_walls(tmp_path: Path, role: str) -> N
     draw.rectangle((0, 0, 799, 479), outline="black", width=16)
     draw.rectangle((501, 101, 702, 303), fill="#204080")
     soft = large.resize((200, 120), Image.Resampling.LANCZOS)
-    area, _, _ = imported(tmp_path, soft, **{f"{role}_color": ("#204080",)})
+    area, _, _ = import_picture(tmp_path, soft, **{f"{role}_color": ("#204080",)})
     assert area == pytest.approx(19.2 * 11.2, abs=0.3)
 
 
 def test_an_ignored_line_leaves_the_wall_below_it(tmp_path: Path) -> None:
-    _, _, foreign = imported(tmp_path, colored(), ignore_color=("red",))
+    _, _, foreign = import_picture(tmp_path, colored(), ignore_color=("red",))
     low_x, _, high_x, _ = foreign.free.bounds
     assert (low_x, high_x) == pytest.approx((0.3, 19.7))
 
@@ -164,10 +164,10 @@ def test_the_nearest_declared_color_counts(tmp_path: Path) -> None:
     draw.rectangle((10, 10, 19, 19), fill=(200, 200, 200))
     draw.rectangle((25, 25, 34, 34), fill=(210, 210, 210))
     options = {"solid_color": ("#c8c8c8",), "free_color": ("#d2d2d2",)}
-    area, _, _ = imported(tmp_path, picture, **options)
+    area, _, _ = import_picture(tmp_path, picture, **options)
     assert area == pytest.approx(3.6**2 - 1.0)
-    assert imported(tmp_path, picture, solid_color=("#c8c8c8",))[0] == pytest.approx(3.6**2 - 2.0)
-    exact = imported(tmp_path, picture, solid_color=("#c8c8c8",), color_tolerance=0.0)
+    assert import_picture(tmp_path, picture, solid_color=("#c8c8c8",))[0] == pytest.approx(3.6**2 - 2.0)
+    exact = import_picture(tmp_path, picture, solid_color=("#c8c8c8",), color_tolerance=0.0)
     assert exact[0] == pytest.approx(3.6**2 - 1.0)
 
 
@@ -193,17 +193,17 @@ def drawn_on_nothing() -> Image.Image:
 
 
 def test_a_dark_drawing_without_paper_is_free_where_it_is_transparent(tmp_path: Path) -> None:
-    area, report, _ = imported(tmp_path, drawn_on_nothing())
+    area, report, _ = import_picture(tmp_path, drawn_on_nothing())
     assert area == pytest.approx(6.4 * 4.4)
     assert any(note.startswith("nothing but dark paint on a transparent ground") for note in report.notes)
     with pytest.raises(MapError, match=r"no cell is free: .* % of the pixels are transparent"):
-        imported(tmp_path, drawn_on_nothing(), unknown="obstacle")
+        import_picture(tmp_path, drawn_on_nothing(), unknown="obstacle")
 
 
 def test_transparency_is_named_where_it_leaves_nothing_solid(tmp_path: Path) -> None:
     picture = Image.new("RGBA", (40, 40), (255, 255, 255, 255))
     ImageDraw.Draw(picture).rectangle((10, 10, 19, 19), fill=(0, 0, 0, 100))
-    _, report, _ = imported(tmp_path, picture, unknown="free")
+    _, report, _ = import_picture(tmp_path, picture, unknown="free")
     (note,) = [note for note in report.notes if note.startswith("nothing is solid")]
     assert "6.25 % of the pixels are transparent (less than half opaque)" in note
 
@@ -212,27 +212,27 @@ def test_brightness_is_named_where_all_is_solid_or_free(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"its brightness is from 0.2 to 0.4 .*--threshold"):
         picture = Image.new("L", (30, 30), 51)
         ImageDraw.Draw(picture).rectangle((5, 5, 20, 20), fill=102)
-        imported(tmp_path, picture)
-    _, report, _ = imported(tmp_path, Image.new("L", (30, 30), 204))
+        import_picture(tmp_path, picture)
+    _, report, _ = import_picture(tmp_path, Image.new("L", (30, 30), 204))
     assert any("the darkest pixel has a brightness of 0.8" in note for note in report.notes)
 
 
 def test_light_lines_on_a_dark_ground_are_named(tmp_path: Path) -> None:
     blueprint = ImageOps.invert(flat())
     ImageDraw.Draw(blueprint).line((100, 41, 100, 79), fill="white", width=3)
-    _, report, _ = imported(tmp_path, blueprint)
+    _, report, _ = import_picture(tmp_path, blueprint)
     assert any("if they are the walls, --invert takes them as such" in note for note in report.notes)
     # rooms amid dark rock are no lines
     rooms = Image.new("L", (200, 120), 0)
     ImageDraw.Draw(rooms).rectangle((20, 20, 59, 59), fill=255)
-    _, report, _ = imported(tmp_path, rooms)
+    _, report, _ = import_picture(tmp_path, rooms)
     assert not any("--invert" in note for note in report.notes)
 
 
 def test_a_thin_frame_at_the_edge_is_dropped_as_other_strokes(tmp_path: Path) -> None:
     picture = flat()
     ImageDraw.Draw(picture).rectangle((0, 0, 199, 119), outline="black")
-    assert imported(tmp_path, picture)[0] > 200.0
-    area, report, _ = imported(tmp_path, picture, min_stroke="2px")
+    assert import_picture(tmp_path, picture)[0] > 200.0
+    area, report, _ = import_picture(tmp_path, picture, min_stroke="2px")
     assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.1)
     assert any("paper around a plan" in note for note in report.notes)

@@ -24,39 +24,45 @@ PILLARS = shapely.union_all([box(4, 2, 5, 3), box(4, 3.6, 5, 5), box(9, 6, 9.1, 
 CLOSET = box(13, 0, 15, 2)
 
 
-def foreign(free: Any, **given: Any) -> ForeignMap:
+KEEP_SMALL_OBSTACLES = Shaping(specks=0.05)
+
+
+def build_foreign_map(free: Any, **attributes: Any) -> ForeignMap:
     parts = list(getattr(free, "geoms", [free]))
-    return ForeignMap("plan", "", MultiPolygon(parts), "svg", vertices_read=123, **given)
+    return ForeignMap("plan", "", MultiPolygon(parts), "svg", vertices_read=123, **attributes)
 
 
-def plotted(free: Any, shaping: Shaping = Shaping(specks=0.05), theme: str = "light", **given: Any) -> Any:  # noqa: B008
-    read = foreign(free, **given)
-    return plot_import(read, *build_environment(read, shaping, "plan.svg"), theme=theme)
+def plot_converted_map(
+    free: Any, shaping: Shaping = KEEP_SMALL_OBSTACLES, theme: str = "light", **attributes: Any
+) -> Any:
+    foreign = build_foreign_map(free, **attributes)
+    environment, report = build_environment(foreign, shaping, "plan.svg")
+    return plot_import(foreign, environment, report, theme=theme)
 
 
-def marked(axes: Any, color: tuple[int, int, int]) -> list[Any]:
+def find_marks(axes: Any, color: tuple[int, int, int]) -> list[Any]:
     return [patch for patch in axes.patches if to_rgb(patch.get_facecolor()) == to_plot_color(color)]
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 def test_what_was_lost_is_on_the_left_and_what_was_opened_on_the_right(theme: Any) -> None:
-    figure = plotted((HALL - PILLARS).union(CLOSET), theme=theme.name)
+    figure = plot_converted_map((HALL - PILLARS).union(CLOSET), theme=theme.name)
     before, after = figure.axes
     assert before.get_xlim() == after.get_xlim()
     assert before.get_ylim() == after.get_ylim()
-    lost = marked(before, theme.trajectory)
+    lost = find_marks(before, theme.trajectory)
     assert [patch.get_path().get_extents().bounds for patch in lost] == [CLOSET.bounds[:2] + (2, 2)]
-    opened = marked(after, theme.start)
+    opened = find_marks(after, theme.start)
     assert np.allclose([patch.get_path().get_extents().bounds for patch in opened], [(9, 6, 0.1, 0.1)])
-    assert not marked(before, theme.start)
-    assert not marked(after, theme.trajectory)
+    assert not find_marks(before, theme.start)
+    assert not find_marks(after, theme.trajectory)
     said = {text.get_text() for text in figure.legends[0].get_texts()}
     assert {"left out: 4 m² were free", "opened: 0.01 m² were solid", "narrowest passage, 0.6 m"} <= said
     all_clear(figure)
 
 
 def test_the_words() -> None:
-    figure = plotted((HALL - PILLARS).union(CLOSET), repaired=("2 rings closed",))
+    figure = plot_converted_map((HALL - PILLARS).union(CLOSET), repaired=("2 rings closed",))
     words = [text.get_text() for text in figure.texts]
     assert {"plan", "as read", "as imported", "repaired: 2 rings closed"} <= set(words)
     assert any(word.startswith("123 vertices, ") for word in words)
@@ -65,10 +71,10 @@ def test_the_words() -> None:
 
 
 def test_nothing_is_marked_where_nothing_differs() -> None:
-    figure = plotted(HALL - box(4, 2, 5, 8))
+    figure = plot_converted_map(HALL - box(4, 2, 5, 8))
     before, after = figure.axes
-    assert not marked(before, LIGHT.trajectory)
-    assert not marked(after, LIGHT.start)
+    assert not find_marks(before, LIGHT.trajectory)
+    assert not find_marks(after, LIGHT.start)
     assert len(figure.legends[0].get_texts()) == 3
     edges = [found for found in before.collections if isinstance(found, LineCollection)]
     assert sum(len(found.get_segments()) for found in edges) == 1
@@ -77,13 +83,13 @@ def test_nothing_is_marked_where_nothing_differs() -> None:
 def test_walls_that_moved_by_the_tolerance_are_nothing_lost() -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     wavy = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * (4 + 0.03 * np.cos(40 * angle))[:, None])
-    figure = plotted(wavy, Shaping(simplify=0.1))
-    assert not marked(figure.axes[0], LIGHT.trajectory)
-    assert not marked(figure.axes[1], LIGHT.start)
+    figure = plot_converted_map(wavy, Shaping(simplify=0.1))
+    assert not find_marks(figure.axes[0], LIGHT.trajectory)
+    assert not find_marks(figure.axes[1], LIGHT.start)
 
 
 def test_all_lines_of_a_long_note_but_the_first_are_indented() -> None:
-    figure = plotted(HALL, notes=("long note " * 60,))
+    figure = plot_converted_map(HALL, notes=("long note " * 60,))
     lines = [text.get_text() for text in figure.texts if "long note" in text.get_text()]
     assert len(lines) > 2
     *indented, first = lines  # The last line of the report is written first.
@@ -99,7 +105,7 @@ def test_all_lines_of_a_long_note_but_the_first_are_indented() -> None:
 @pytest.mark.parametrize("lines", [0, 1, 30])
 def test_nothing_covers_or_cuts_anything(free: Any, lines: int) -> None:
     notes = tuple(f"note {k}: " + "what was taken as something else " * 9 for k in range(lines))
-    figure = plotted(free, notes=notes)
+    figure = plot_converted_map(free, notes=notes)
     all_clear(figure)
     words = [text.get_text() for text in figure.texts]
     assert any(word.startswith("and ") and word.endswith(" more lines") for word in words) == (lines > 9)
@@ -108,13 +114,13 @@ def test_nothing_covers_or_cuts_anything(free: Any, lines: int) -> None:
 def test_free_space_that_is_not_valid_is_drawn_all_the_same() -> None:
     bow = Polygon([(0, 0), (8, 8), (8, 0), (0, 8)])
     assert not bow.is_valid
-    figure = plotted(bow)
+    figure = plot_converted_map(bow)
     assert any(isinstance(patch, PathPatch) for patch in figure.axes[0].patches)
 
 
 @pytest.mark.slow
 def test_files_are_the_same_every_time(tmp_path: Path) -> None:
-    read = foreign(HALL - PILLARS)
+    read = build_foreign_map(HALL - PILLARS)
     environment, report = build_environment(read, Shaping(), "plan.svg")
     for name in ("plan.png", "plan.svg", "plan.pdf"):
         save_preview(read, environment, report, tmp_path / name)

@@ -33,14 +33,14 @@ _BLOCK = st.builds(
 )
 
 
-def drawn(primitives: list[Any], blocks: list[Polygon]) -> ForeignMap:
+def read_shapes(primitives: list[Any], blocks: list[Polygon]) -> ForeignMap:
     solid = shapely.union_all([*blocks, *(one.polygon for one in primitives)])
     free = MultiPolygon([p for p in shapely.get_parts(ROOM - solid).tolist() if p.area > 0])
     return ForeignMap("plan", "", free, "test", boundary=ROOM, primitives=tuple(primitives))
 
 
-def made(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment:
-    return build_environment(drawn(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
+def build_map(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment:
+    return build_environment(read_shapes(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow])
@@ -53,7 +53,7 @@ def made(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment
 def test_free_space_stays(
     circles: list[CircleObstacle], walls: list[WallObstacle], blocks: list[Polygon], tolerance: float
 ) -> None:
-    foreign = drawn([*circles, *walls], blocks)
+    foreign = read_shapes([*circles, *walls], blocks)
     parts = sorted(foreign.free.geoms, key=lambda part: -part.area)
     if not parts or not shapely.maximum_inscribed_circle(parts[0], tolerance=0.01).length > 0.5:
         return
@@ -74,7 +74,7 @@ def test_free_space_stays(
 def test_each_is_kept_with_its_name_and_the_rest_are_polygons() -> None:
     pillar = CircleObstacle((4.0, 4.0), 0.5, "pillar")
     wall = WallObstacle(((10.0, -1.0), (10.0, 6.0), (12.0, 6.0)), 0.2, "wall")
-    environment = made([pillar, wall], box(15, 10, 17, 12))
+    environment = build_map([pillar, wall], box(15, 10, 17, 12))
     assert environment.obstacles[1:] == (pillar, wall)
     assert isinstance(environment.obstacles[0], PolygonObstacle)
     assert environment.free_area == pytest.approx(320 - 4 - pillar.polygon.area - 1.6)
@@ -98,20 +98,20 @@ def test_each_is_kept_with_its_name_and_the_rest_are_polygons() -> None:
 def test_what_is_more_than_primitives_stays_a_polygon(
     primitives: list[Obstacle], blocks: list[Polygon]
 ) -> None:
-    environment = made(primitives, *blocks)
+    environment = build_map(primitives, *blocks)
     assert all(isinstance(one, PolygonObstacle) for one in environment.obstacles)
 
 
 def test_a_circle_whose_rounded_twin_has_more_sides() -> None:
     circle = CircleObstacle((4.0, 4.0), 0.50676)
     assert len(circle.polygon.exterior.coords) != len(CircleObstacle((4, 4), 0.5068).polygon.exterior.coords)
-    assert made([circle], simplify=0.0).obstacles == (CircleObstacle((4.0, 4.0), 0.5068),)
+    assert build_map([circle], simplify=0.0).obstacles == (CircleObstacle((4.0, 4.0), 0.5068),)
 
 
 def test_what_was_filled_among_several_stays_filled() -> None:
     # below the wall a wedge is cut off, so flat that both are as good within the tolerance
     circles = [CircleObstacle((1.0, 2.0), 1.0), CircleObstacle((3.0, 0.0), 1.0)]
-    environment = made([*circles, WallObstacle(((0, 0), (3, 1)), 0.5)], simplify=0.2)
+    environment = build_map([*circles, WallObstacle(((0, 0), (3, 1)), 0.5)], simplify=0.2)
     assert len(environment.free.geoms) == 1
     assert [one for one in environment.obstacles if isinstance(one, CircleObstacle)] == circles[:1]
 

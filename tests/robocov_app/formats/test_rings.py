@@ -65,7 +65,7 @@ def test_a_hole_that_sticks_out_and_meets_itself(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("document", "wanted"),
+    ("document", "expected"),
     [
         ([], "expected a list of rings"),
         ([[]], "expected at least 3 times 2 numbers"),
@@ -87,11 +87,11 @@ def test_a_hole_that_sticks_out_and_meets_itself(tmp_path: Path) -> None:
         ([[[0, 0], [1, 1], [2, 2]]], "1 outline without an area"),
     ],
 )
-def test_what_is_none_is_refused(tmp_path: Path, document: Any, wanted: str) -> None:
+def test_what_is_none_is_refused(tmp_path: Path, document: Any, expected: str) -> None:
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(document))
     with pytest.raises(MapError) as caught:
         IMPORTERS["rings"].read(path, ReadOptions())
     assert str(caught.value).startswith(str(path))
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, drawn, pgm, ros_map
+from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, draw_pixels, pgm, write_ros_map
 from shapely import MultiPolygon
 
 from robocov.errors import MapError, ParameterError
@@ -29,11 +29,11 @@ def read(path: Path, **options: object) -> MultiPolygon:
 
 
 def test_a_map_is_read_where_it_lies(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn(PLAN), origin=[-1.5, 2.0, 0.0])
+    path = write_ros_map(tmp_path, draw_pixels(PLAN), origin=[-1.5, 2.0, 0.0])
     assert detect_format(path) is IMPORTER
     foreign = IMPORTER.read(path, ReadOptions())
-    wanted = shapely.transform(ROOMS, lambda p: p * 0.25 + (-1.5, 2.0))
-    assert shapely.equals(foreign.free, wanted)
+    expected = shapely.transform(ROOMS, lambda p: p * 0.25 + (-1.5, 2.0))
+    assert shapely.equals(foreign.free, expected)
     assert (foreign.name, foreign.cell, foreign.vertices_read) == ("plan", 0.25, 12)
     assert foreign.notes == (
         "16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, taken as obstacles",
@@ -41,17 +41,19 @@ def test_a_map_is_read_where_it_lies(tmp_path: Path) -> None:
 
 
 def test_the_top_row_of_the_picture_is_the_highest(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn("..#\n###\n###"), resolution=1.0)
+    path = write_ros_map(tmp_path, draw_pixels("..#\n###\n###"), resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 2, 2, 3))
 
 
 def test_yaw_turns_the_map_about_its_lower_left_corner(tmp_path: Path) -> None:
-    pixels = drawn("...\n.##")
-    straight = read(ros_map(tmp_path, pixels, resolution=1.0, origin="[1, 2, 0]"))
-    turned = read(ros_map(tmp_path, pixels, "turned", resolution=1.0, origin=f"[1, 2, {math.pi / 2!r}]"))
-    wanted = shapely.affinity.rotate(straight, 90, origin=(1, 2))
-    assert shapely.equals_exact(turned.normalize(), wanted.normalize(), 1e-9)
-    slanted = ros_map(tmp_path, np.full((30, 40), FREE, np.uint8), "slanted", origin="[0, 0, 0.5]")
+    pixels = draw_pixels("...\n.##")
+    straight = read(write_ros_map(tmp_path, pixels, resolution=1.0, origin="[1, 2, 0]"))
+    turned = read(
+        write_ros_map(tmp_path, pixels, "turned", resolution=1.0, origin=f"[1, 2, {math.pi / 2!r}]")
+    )
+    expected = shapely.affinity.rotate(straight, 90, origin=(1, 2))
+    assert shapely.equals_exact(turned.normalize(), expected.normalize(), 1e-9)
+    slanted = write_ros_map(tmp_path, np.full((30, 40), FREE, np.uint8), "slanted", origin="[0, 0, 0.5]")
     environment, report, _ = import_map(slanted)
     assert report.vertices_kept == 4
     assert environment.free_area == pytest.approx(75, abs=0.01)
@@ -75,7 +77,7 @@ def test_yaw_turns_the_map_about_its_lower_left_corner(tmp_path: Path) -> None:
     ],
 )
 def test_a_map_that_is_turned_is_said_to_be(tmp_path: Path, yaw: str, notes: list[str]) -> None:
-    path = ros_map(tmp_path, np.full((3, 3), FREE, np.uint8), origin=f"[0, 0, {yaw}]")
+    path = write_ros_map(tmp_path, np.full((3, 3), FREE, np.uint8), origin=f"[0, 0, {yaw}]")
     foreign = IMPORTER.read(path, ReadOptions())
     assert [note for note in foreign.notes if note.startswith("origin")] == notes
 
@@ -92,7 +94,7 @@ def test_a_map_that_is_turned_is_said_to_be(tmp_path: Path, yaw: str, notes: lis
 )
 def test_transparency_is_named_as_the_cause(tmp_path: Path, mode: str, cause: str) -> None:
     Image.new("LA", (4, 4), (200, 0)).save(tmp_path / "plan.png")
-    path = ros_map(tmp_path, b"", image="plan.png", mode=mode)
+    path = write_ros_map(tmp_path, b"", image="plan.png", mode=mode)
     with pytest.raises(MapError, match=f"no cell is free: {cause}"):
         IMPORTER.read(path, ReadOptions())
 
@@ -100,12 +102,12 @@ def test_transparency_is_named_as_the_cause(tmp_path: Path, mode: str, cause: st
 def test_a_map_of_floats_is_read_in_every_mode(tmp_path: Path) -> None:
     values = np.array([[1.0, 1.0, 0.0], [1.0, np.nan, 0.5]], dtype=np.float32)
     Image.fromarray(values).save(tmp_path / "plan.tif")
-    path = ros_map(tmp_path, b"", image="plan.tif", resolution=1.0)
+    path = write_ros_map(tmp_path, b"", image="plan.tif", resolution=1.0)
     assert read(path).area == 3
 
 
 def test_unknown_cells(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn(PLAN), resolution=1.0)
+    path = write_ros_map(tmp_path, draw_pixels(PLAN), resolution=1.0)
     assert read(path).area == 68
     assert read(path, unknown="free").area == 68 + 48
     foreign = IMPORTER.read(path, ReadOptions(unknown="cut"))
@@ -116,8 +118,8 @@ def test_unknown_cells(tmp_path: Path) -> None:
 
 
 def test_of_a_cut_map_the_island_with_most_free_space_stays(tmp_path: Path) -> None:
-    pixels = drawn("...????\n...????\n???????\n?????..")
-    foreign = IMPORTER.read(ros_map(tmp_path, pixels, resolution=1.0), ReadOptions(unknown="cut"))
+    pixels = draw_pixels("...????\n...????\n???????\n?????..")
+    foreign = IMPORTER.read(write_ros_map(tmp_path, pixels, resolution=1.0), ReadOptions(unknown="cut"))
     assert shapely.equals(foreign.free, shapely.box(0, 2, 3, 4))
     assert foreign.dropped == ("2 m² of free space on other islands of known cells",)
 
@@ -158,12 +160,12 @@ def test_every_pixel_means_what_map_server_says(
     else:
         cells = classify_raw(picture, 0.5)
     for value in range(256):
-        wanted = occupancy(value, mode, negate, low, high, opacity if with_alpha else -1)
-        kind = 2 if wanted < 0 else int(wanted >= 50)
+        expected = occupancy(value, mode, negate, low, high, opacity if with_alpha else -1)
+        kind = 2 if expected < 0 else int(expected >= 50)
         near = mode != "raw" and any(
             abs(x - t) < 1e-9 for x in ((255 - value) / 255, value / 255) for t in (low, high)
         )
-        assert near or cells[0, value] == kind, (value, wanted)
+        assert near or cells[0, value] == kind, (value, expected)
 
 
 def test_colors_count_as_their_mean(tmp_path: Path) -> None:
@@ -172,14 +174,14 @@ def test_colors_count_as_their_mean(tmp_path: Path) -> None:
     colors[:, 2] = (255, 0, 0)  # dark by 0.67
     colors[:, 3] = (255, 100, 100)  # dark by 0.4: unknown
     Image.fromarray(colors).save(tmp_path / "plan.png")
-    path = ros_map(tmp_path, b"", image="plan.png", resolution=1.0)
+    path = write_ros_map(tmp_path, b"", image="plan.png", resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 2, 4))
     assert shapely.equals(read(path, unknown="free"), shapely.box(0, 0, 2, 4) | shapely.box(3, 0, 4, 4))
 
 
 def test_the_threshold_of_scale_and_raw(tmp_path: Path) -> None:
     levels = np.array([[0, 30, 49, 50, 100, 101, 255]], dtype=np.uint8)
-    path = ros_map(tmp_path, levels, mode="raw", resolution=1.0)
+    path = write_ros_map(tmp_path, levels, mode="raw", resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 3, 1))
     assert shapely.equals(read(path, threshold=0.2), shapely.box(0, 0, 1, 1))
     assert shapely.equals(read(path, threshold=1.0), shapely.box(0, 0, 4, 1))
@@ -192,13 +194,13 @@ def test_the_threshold_of_scale_and_raw(tmp_path: Path) -> None:
 
 def test_16_bits(tmp_path: Path) -> None:
     deep = np.array([[65535, 65535, 52685, 0]])
-    path = ros_map(tmp_path, pgm(deep, 65535), resolution=1.0)
+    path = write_ros_map(tmp_path, pgm(deep, 65535), resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 2, 1))
     assert "25 % unknown" in IMPORTER.read(path, ReadOptions()).notes[-1]
 
 
 def test_what_is_worth_a_word(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn(PLAN), free_thresh=0.25, occupied_thresh=None, frame="map")
+    path = write_ros_map(tmp_path, draw_pixels(PLAN), free_thresh=0.25, occupied_thresh=None, frame="map")
     environment, report, _ = import_map(path, shaping=Shaping(radius=0.1))
     assert report.repaired == ("occupied_thresh is missing, 0.65 taken",)
     assert report.notes[0] == "frame: no key of map_server, not looked at"
@@ -213,7 +215,7 @@ def test_single_cells_are_noise_unless_somebody_says_no(tmp_path: Path) -> None:
     pixels[10, 10] = OCCUPIED
     pixels[20, 30] = UNKNOWN
     pixels[40, 40:42] = OCCUPIED
-    path = ros_map(tmp_path, pixels, resolution=0.05)
+    path = write_ros_map(tmp_path, pixels, resolution=0.05)
     environment, report, _ = import_map(path)
     assert len(environment.obstacles) == 1
     assert report.dropped == (
@@ -224,7 +226,7 @@ def test_single_cells_are_noise_unless_somebody_says_no(tmp_path: Path) -> None:
 
 
 def test_line_ends_marks_and_comments_do_no_harm(tmp_path: Path) -> None:
-    (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN), head="# CREATOR: map_saver.cpp 0.250 m/pix\n"))
+    (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN), head="# CREATOR: map_saver.cpp 0.250 m/pix\n"))
     text = (
         "# saved\r\nimage: plan.pgm\r\nresolution: 2.5e-1\r\norigin: [-1.0, -2.0, 0.0]\r\nnegate: 0\r\n\r\n"
         "occupied_thresh: 0.65\r\nfree_thresh: 0.196\r\n"
@@ -237,21 +239,21 @@ def test_line_ends_marks_and_comments_do_no_harm(tmp_path: Path) -> None:
 def test_the_picture_is_looked_for_beside_the_file_and_nowhere_else(tmp_path: Path) -> None:
     maps = tmp_path / "maps"
     (maps / "pictures").mkdir(parents=True)
-    (maps / "pictures" / "a.pgm").write_bytes(pgm(drawn(PLAN)))
-    (tmp_path / "secret.pgm").write_bytes(pgm(drawn(PLAN)))
-    assert read(ros_map(maps, b"", image="pictures/a.pgm")).area > 0
-    assert read(ros_map(maps, b"", image="./pictures/../pictures/a.pgm")).area > 0
+    (maps / "pictures" / "a.pgm").write_bytes(pgm(draw_pixels(PLAN)))
+    (tmp_path / "secret.pgm").write_bytes(pgm(draw_pixels(PLAN)))
+    assert read(write_ros_map(maps, b"", image="pictures/a.pgm")).area > 0
+    assert read(write_ros_map(maps, b"", image="./pictures/../pictures/a.pgm")).area > 0
     (maps / "link.pgm").symlink_to(tmp_path / "secret.pgm")
     (maps / "away").symlink_to(tmp_path)
     (maps / "secret.pgm").symlink_to(tmp_path / "secret.pgm")
     for image in ("../secret.pgm", str(tmp_path / "secret.pgm"), "link.pgm", "away/secret.pgm", "secret.pgm"):
-        path = ros_map(maps, b"", image=image)
+        path = write_ros_map(maps, b"", image=image)
         with pytest.raises(MapError, match=r"expected a picture in it .--anywhere allows it."):
             read(path)
         assert read(path, anywhere=True).area > 0
     # a link to the whole folder is no way out of it
     (tmp_path / "linked").symlink_to(maps)
-    assert read(ros_map(tmp_path / "linked", b"", image="pictures/a.pgm")).area > 0
+    assert read(write_ros_map(tmp_path / "linked", b"", image="pictures/a.pgm")).area > 0
 
 
 @pytest.mark.parametrize(
@@ -265,14 +267,14 @@ def test_the_picture_is_looked_for_beside_the_file_and_nowhere_else(tmp_path: Pa
     ],
 )
 def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Path, name: str) -> None:
-    (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN)))
-    foreign = IMPORTER.read(ros_map(tmp_path, b"", "a", image=name), ReadOptions())
+    (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
+    foreign = IMPORTER.read(write_ros_map(tmp_path, b"", "a", image=name), ReadOptions())
     assert foreign.free.area > 0
     assert foreign.repaired == (f"image: {name!r} not found, 'plan.pgm' next to the file taken",)
 
 
 @pytest.mark.parametrize(
-    ("keys", "wanted"),
+    ("keys", "expected"),
     [
         ({"image": "none.pgm"}, "none.pgm: no such file"),
         ({"image": "''"}, "image: empty"),
@@ -306,14 +308,14 @@ def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Pat
         ({"mode": "!!str raw"}, "the tag 'tag:yaml.org,2002:str'"),
     ],
 )
-def test_what_is_refused(tmp_path: Path, keys: dict[str, object], wanted: str) -> None:
-    (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN)))
+def test_what_is_refused(tmp_path: Path, keys: dict[str, object], expected: str) -> None:
+    (tmp_path / "plan.pgm").write_bytes(pgm(draw_pixels(PLAN)))
     os.mkfifo(tmp_path / "pipe")
     keys = {"image": "plan.pgm"} | keys
-    path = ros_map(tmp_path, b"", **keys)  # type: ignore[arg-type]
+    path = write_ros_map(tmp_path, b"", **keys)  # type: ignore[arg-type]
     with pytest.raises(MapError) as caught:
         IMPORTER.read(path, ReadOptions())
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert len(str(caught.value)) < 700
     assert str(caught.value).startswith(str(tmp_path))
     assert "\n" not in str(caught.value)
@@ -321,13 +323,13 @@ def test_what_is_refused(tmp_path: Path, keys: dict[str, object], wanted: str) -
 
 def test_nothing_free(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"no cell is free \(--unknown free takes unknown"):
-        read(ros_map(tmp_path, drawn("##\n??")))
+        read(write_ros_map(tmp_path, draw_pixels("##\n??")))
     with pytest.raises(MapError, match=r"no cell is free$"):
-        read(ros_map(tmp_path, drawn("##\n##")))
+        read(write_ros_map(tmp_path, draw_pixels("##\n##")))
 
 
 def test_options_of_other_formats(tmp_path: Path) -> None:
-    path = ros_map(tmp_path, drawn(PLAN))
+    path = write_ros_map(tmp_path, draw_pixels(PLAN))
     with pytest.raises(
         ParameterError, match="--trees: no option of the format ros, whose options are: --anywhere, --"
     ):

@@ -17,7 +17,7 @@ from robocov_app.formats.geometry.simplification.simplify import simplify_free_s
 CELL = 0.05
 
 
-def cells_of(shape: shapely.Geometry, cell: float = CELL, rim: int = 2) -> MultiPolygon:
+def build_cells(shape: shapely.Geometry, cell: float = CELL, rim: int = 2) -> MultiPolygon:
     """Return the outline of the cells whose centers are in `shape`."""
     low_x, low_y, high_x, high_y = shape.bounds
     columns, rows = int((high_x - low_x) / cell) + 2 * rim, int((high_y - low_y) / cell) + 2 * rim
@@ -37,7 +37,7 @@ def vertices(shape: shapely.Geometry) -> int:
 @pytest.mark.parametrize("shift", [0.0, 0.021])
 def test_walls_at_any_angle_are_straight(angle: float, shift: float) -> None:
     room = affinity.rotate(shapely.box(0, 0, 6, 4), angle, origin=(shift, shift))
-    stairs = cells_of(room)
+    stairs = build_cells(room)
     result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert result.changed == ()
     # four walls; at a sharp tip of cells a corner may stay cut
@@ -59,7 +59,7 @@ def test_walls_at_any_angle_are_straight(angle: float, shift: float) -> None:
 
 def test_straight_walls_stay_where_they_are() -> None:
     room = shapely.box(0, 0, 6, 4) - shapely.box(2, 1, 2.1, 3) - shapely.box(4, 2, 5, 4)
-    stairs = cells_of(room)
+    stairs = build_cells(room)
     result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert shapely.equals_exact(result.free.normalize(), MultiPolygon([room]).normalize(), 1e-9)
 
@@ -79,7 +79,7 @@ def test_a_bump_of_a_cell_in_a_wall_goes() -> None:
 def test_round_things_keep_their_size() -> None:
     for radius in (0.16, 0.2, 0.35, 1.0):
         pillar = shapely.Point(2.013, 1.987).buffer(radius, quad_segs=64)
-        stairs = cells_of(shapely.box(0, 0, 4, 4) - pillar)
+        stairs = build_cells(shapely.box(0, 0, 4, 4) - pillar)
         result = simplify_free_space(stairs, CELL, CELL, 0.1)
         (hole,) = result.free.geoms[0].interiors
         was = Polygon(stairs.geoms[0].interiors[0]).area
@@ -104,7 +104,7 @@ def test_a_wall_of_one_cell_keeps_its_shape(length: int, turned: bool) -> None:
 @pytest.mark.parametrize("angle", [0.0, 5.0, 30.0, 45.0])
 def test_a_thin_wall_at_an_angle_keeps_its_area(angle: float) -> None:
     wall = affinity.rotate(shapely.box(1, 1.95, 4, 2.05), angle)
-    stairs = cells_of(shapely.box(0, 0, 5, 4) - wall)
+    stairs = build_cells(shapely.box(0, 0, 5, 4) - wall)
     solid = shapely.box(*stairs.bounds) - stairs
     result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert (shapely.box(*stairs.bounds) - result.free).area == pytest.approx(
@@ -277,13 +277,13 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     turned = affinity.rotate(cells, 20, origin=(0, 0))
     for shape, turn in ((cells, 0), (turned, 20)):
         outline = OriginalOutline(list(shape.geoms), max(sides))
-        wanted = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
+        expected = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
         assert outline.is_neck.sum() == 2
-        assert outline.points[outline.is_neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))
+        assert outline.points[outline.is_neck] == pytest.approx(np.repeat([expected.coords[0]], 2, axis=0))
     # walls at an angle are straight
     room = affinity.rotate(shapely.box(0, 0, 6, 4), 20, origin=(0, 0))
     stretched = affinity.scale(room, 1 / sides[0], 1 / sides[1], origin=(0, 0))
-    stairs = affinity.scale(cells_of(stretched, 1.0), *sides, origin=(0, 0))
+    stairs = affinity.scale(build_cells(stretched, 1.0), *sides, origin=(0, 0))
     result = simplify_free_space(stairs, max(sides), max(sides), 0.1)
     assert vertices(result.free) <= 8
     assert result.free.area == pytest.approx(24, rel=0.01)

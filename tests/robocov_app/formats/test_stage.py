@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import shapely
 from PIL import Image
-from raster_files import drawn, pgm
+from raster_files import draw_pixels, pgm
 from shapely import affinity, box
 
 from robocov.environment import PointsStart
@@ -33,21 +33,21 @@ def test_a_bitmap_is_scaled_to_the_size_of_its_model(tmp_path: Path) -> None:
     # the white around the dark is not part of it, and its cells are no squares
     (tmp_path / "maps").mkdir()
     rooms = ".........\n.#######.\n.#..#..#.\n.#.....#.\n.#######.\n........."
-    (tmp_path / "maps" / "rooms.pgm").write_bytes(pgm(drawn(rooms)))
+    (tmp_path / "maps" / "rooms.pgm").write_bytes(pgm(draw_pixels(rooms)))
     foreign = read(
         tmp_path,
         "define floorplan model ( boundary 1 obstacle_return 0 ranger_return 0.5 )\n"
         'floorplan ( name "rooms" size [14.000 8.000 0.8] pose [1 2 0 0] bitmap "maps/rooms.pgm" )',
     )
     # cells of 2 x 2 m: the box is 14 x 8 m about [1, 2]
-    wanted = (box(-4, 0, 6, 4)) - box(0, 2, 2, 4)
-    assert shapely.equals(foreign.free, wanted)
+    expected = (box(-4, 0, 6, 4)) - box(0, 2, 2, 4)
+    assert shapely.equals(foreign.free, expected)
     assert (foreign.cell, foreign.vertices_read, foreign.name) == (2.0, 8, "hall")
     turned = read(
         tmp_path, 'model ( size [14 16] pose [1 2 0 90] obstacle_return 0 bitmap "maps/rooms.pgm" )'
     )
-    wanted = affinity.rotate(affinity.scale(wanted, 1, 2, origin=(1, 2)), 90, origin=(1, 2))
-    assert shapely.equals(shapely.set_precision(wanted, 1e-9), turned.free)
+    expected = affinity.rotate(affinity.scale(expected, 1, 2, origin=(1, 2)), 90, origin=(1, 2))
+    assert shapely.equals(shapely.set_precision(expected, 1e-9), turned.free)
     assert turned.cell == 4.0
 
 
@@ -156,7 +156,7 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("model (\n", ":1: expected a \\) after what begins here"),
         ("model ( )\n)", ":2: expected the name of a model"),
@@ -181,19 +181,21 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
     ],
     ids=range(17),
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, wanted: str) -> None:
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "hall.world"
     path.write_text(text)
-    with pytest.raises(MapError, match=f"hall.world.*{wanted}" if wanted[0] == ":" else wanted) as caught:
+    with pytest.raises(
+        MapError, match=f"hall.world.*{expected}" if expected[0] == ":" else expected
+    ) as caught:
         IMPORTER.read(path, ReadOptions())
     assert "\n" not in str(caught.value)
 
 
 def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp_path: Path) -> None:
-    (tmp_path / "a.pgm").write_bytes(pgm(drawn("...\n...")))
+    (tmp_path / "a.pgm").write_bytes(pgm(draw_pixels("...\n...")))
     with pytest.raises(MapError, match=r"a\.pgm: all is light"):
         read(tmp_path, 'model ( bitmap "a.pgm" )')
-    (tmp_path / "a.pgm").write_bytes(pgm(drawn("###\n###")))
+    (tmp_path / "a.pgm").write_bytes(pgm(draw_pixels("###\n###")))
     foreign = read(tmp_path, ROOM + 'room ( ) model ( bitmap "a.pgm" size [2 1] pose [5 -3 0 0] )')
     assert foreign.free.area == pytest.approx(100 - 2)
 

@@ -19,18 +19,20 @@ BLOCK, WALL = box(1, 4, 3, 5), box(1, 4.9, 3, 5.1)
 XLINK = 'xmlns:xlink="http://www.w3.org/1999/xlink"'
 
 
-def drawn(folder: Path, body: str, head: str = 'width="1000" height="600"', **options: Any) -> ForeignMap:
+def read_shapes(
+    folder: Path, body: str, head: str = 'width="1000" height="600"', **options: Any
+) -> ForeignMap:
     """Read a drawing in which a unit is a centimeter."""
     return read(folder, "svg", svg(body, head), **{"scale": 0.01, **options})
 
 
-def solid(folder: Path, body: str, **options: Any) -> Any:
+def compute_obstacles(folder: Path, body: str, **options: Any) -> Any:
     """Return what is drawn on a page of 10 x 6 m, y up."""
-    return box(0, 0, 10, 6) - drawn(folder, PAGE + body, **options).free
+    return box(0, 0, 10, 6) - read_shapes(folder, PAGE + body, **options).free
 
 
 @pytest.mark.parametrize(
-    ("body", "wanted"),
+    ("body", "expected"),
     [
         ('<rect x="100" y="100" width="200" height="100"/>', BLOCK),
         ('<polygon points="100,100 300,100 300,200 100,200"/>', BLOCK),
@@ -84,23 +86,23 @@ def solid(folder: Path, body: str, **options: Any) -> Any:
         ('<switch><foreignObject/><g><rect x="100" y="100" width="200" height="100"/></g></switch>', BLOCK),
     ],
 )
-def test_shapes_are_where_they_are_drawn(tmp_path: Path, body: str, wanted: Any) -> None:
-    assert solid(tmp_path, body).symmetric_difference(wanted).area < 1e-6
+def test_shapes_are_where_they_are_drawn(tmp_path: Path, body: str, expected: Any) -> None:
+    assert compute_obstacles(tmp_path, body).symmetric_difference(expected).area < 1e-6
 
 
 def test_round_things(tmp_path: Path) -> None:
-    pillar = solid(tmp_path, '<circle cx="500" cy="300" r="50"/>')
+    pillar = compute_obstacles(tmp_path, '<circle cx="500" cy="300" r="50"/>')
     exact = CircleObstacle((5.0, 3.0), 0.5).polygon
     assert pillar.symmetric_difference(exact).area < 1e-5
-    oval = solid(tmp_path, '<ellipse cx="500" cy="300" rx="200" ry="50"/>')
+    oval = compute_obstacles(tmp_path, '<ellipse cx="500" cy="300" rx="200" ry="50"/>')
     assert oval.area == pytest.approx(math.pi * 2 * 0.5, abs=oval.length * 1e-3)
     assert oval.bounds == pytest.approx((3, 2.5, 7, 3.5), abs=1e-3)
-    same = solid(tmp_path, '<circle cx="125" cy="300" r="50" transform="scale(4 1)"/>')
+    same = compute_obstacles(tmp_path, '<circle cx="125" cy="300" r="50" transform="scale(4 1)"/>')
     assert same.symmetric_difference(oval).area < oval.length * 1e-3
-    rounded = solid(tmp_path, '<rect x="100" y="100" width="200" height="100" rx="20"/>')
+    rounded = compute_obstacles(tmp_path, '<rect x="100" y="100" width="200" height="100" rx="20"/>')
     assert rounded.area == pytest.approx(2 - (4 - math.pi) * 0.04, abs=1e-3)
     # radii are at most half a side, and one of them stands for both
-    pill = solid(tmp_path, '<rect x="100" y="100" width="200" height="100" ry="900"/>')
+    pill = compute_obstacles(tmp_path, '<rect x="100" y="100" width="200" height="100" ry="900"/>')
     assert pill.bounds == pytest.approx((1, 4, 3, 5))
     assert pill.area == pytest.approx(math.pi * 0.5, abs=pill.length * 1e-3)
 
@@ -122,7 +124,7 @@ def test_round_things(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_not_there_is_told(tmp_path: Path, body: str, dropped: str) -> None:
-    foreign = drawn(tmp_path, PAGE + body)
+    foreign = read_shapes(tmp_path, PAGE + body)
     assert foreign.free.equals(box(0, 0, 10, 6))
     assert foreign.dropped == (dropped,)
 
@@ -139,7 +141,7 @@ def test_what_is_not_there_is_told(tmp_path: Path, body: str, dropped: str) -> N
     ],
 )
 def test_what_is_never_drawn_is_not_told(tmp_path: Path, body: str) -> None:
-    foreign = drawn(tmp_path, PAGE + body)
+    foreign = read_shapes(tmp_path, PAGE + body)
     assert foreign.free.equals(box(0, 0, 10, 6))
     assert foreign.dropped == ()
 
@@ -150,7 +152,7 @@ def test_what_is_taken_otherwise_is_told(tmp_path: Path) -> None:
         'transform="scale(1 3)"/></g><g clip-path="url(#a)"><rect width="9" height="9"/></g>'
         "<style>g > rect{fill:none}</style>"
     )
-    notes = drawn(tmp_path, PAGE + body).notes
+    notes = read_shapes(tmp_path, PAGE + body).notes
     for words in (
         "a unit is 0.01 m",
         "curves flattened to within 1 mm",
@@ -164,15 +166,15 @@ def test_what_is_taken_otherwise_is_told(tmp_path: Path) -> None:
 def test_widths_of_strokes(tmp_path: Path) -> None:
     line = '<path d="M0 300H1000" fill="none" stroke="red" stroke-width="5" transform="scale(1 2)"/>'
     lower = line.replace("M0 300", "M0 150")
-    assert drawn(tmp_path, PAGE + lower).free.area == pytest.approx(60 - 10 * 0.1)
+    assert read_shapes(tmp_path, PAGE + lower).free.area == pytest.approx(60 - 10 * 0.1)
     upright = '<path d="M300 0V300" fill="none" stroke="red" stroke-width="5" transform="scale(1 2)"/>'
-    assert drawn(tmp_path, PAGE + upright).free.area == pytest.approx(60 - 6 * 0.05)
-    assert drawn(tmp_path, PAGE + lower, thickness=0.3).free.area == pytest.approx(60 - 3)
+    assert read_shapes(tmp_path, PAGE + upright).free.area == pytest.approx(60 - 6 * 0.05)
+    assert read_shapes(tmp_path, PAGE + lower, thickness=0.3).free.area == pytest.approx(60 - 3)
     plain = line.replace("scale(1 2)", "scale(2)").replace("M0 300H1000", "M0 150H500")
-    assert drawn(tmp_path, PAGE + plain).free.area == pytest.approx(60 - 1)
+    assert read_shapes(tmp_path, PAGE + plain).free.area == pytest.approx(60 - 1)
     percent = '<line x2="1000" y1="300" y2="300" stroke="red" stroke-width="1%"/>'
     width = math.hypot(10, 6) / math.sqrt(2) / 100
-    assert drawn(tmp_path, PAGE + percent).free.area == pytest.approx(60 - 10 * width)
+    assert read_shapes(tmp_path, PAGE + percent).free.area == pytest.approx(60 - 10 * width)
 
 
 def test_names_are_ids_classes_and_labels_of_all_groups_around(tmp_path: Path) -> None:
@@ -182,17 +184,17 @@ def test_names_are_ids_classes_and_labels_of_all_groups_around(tmp_path: Path) -
         '<g class="furniture"><rect id="desk" x="500" width="200" height="100"/></g>'
     )
     for name in ("layer1", "walls", "Load-Bearing", "brick"):
-        assert drawn(tmp_path, PAGE + body, skip=(name,)).free.area == pytest.approx(60 - 2)
-    assert drawn(tmp_path, PAGE + body, skip=("furniture", "layer1")).free.area == pytest.approx(60)
-    assert drawn(tmp_path, PAGE + body, boundary="desk").free.area == pytest.approx(2)
+        assert read_shapes(tmp_path, PAGE + body, skip=(name,)).free.area == pytest.approx(60 - 2)
+    assert read_shapes(tmp_path, PAGE + body, skip=("furniture", "layer1")).free.area == pytest.approx(60)
+    assert read_shapes(tmp_path, PAGE + body, boundary="desk").free.area == pytest.approx(2)
     with pytest.raises(RobocovError, match="skip: unknown name 'wals': did you mean 'Walls'"):
-        drawn(tmp_path, PAGE + body, skip=("wals",))
+        read_shapes(tmp_path, PAGE + body, skip=("wals",))
 
 
 def test_rooms_can_be_free(tmp_path: Path) -> None:
     rooms = '<rect width="300" height="300"/><rect x="300" y="100" width="200" height="100"/>'
-    assert drawn(tmp_path, rooms, outlines="free").free.area == pytest.approx(9 + 2)
-    assert drawn(tmp_path, rooms).free.area == pytest.approx(7 * 5 - 11)
+    assert read_shapes(tmp_path, rooms, outlines="free").free.area == pytest.approx(9 + 2)
+    assert read_shapes(tmp_path, rooms).free.area == pytest.approx(7 * 5 - 11)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +212,7 @@ def test_rooms_can_be_free(tmp_path: Path) -> None:
 )
 def test_scales(tmp_path: Path, head: str, options: dict[str, Any], size: tuple[float, float]) -> None:
     corner = 'x="5" y="7"' if "5 7" in head else ""
-    free = drawn(tmp_path, f'<rect {corner} width="1000" height="600"/>', head, **options).free
+    free = read_shapes(tmp_path, f'<rect {corner} width="1000" height="600"/>', head, **options).free
     x, y, right, top = free.bounds
     assert (right - x, top - y) == pytest.approx(size, rel=1e-6)
     if head:
@@ -218,20 +220,20 @@ def test_scales(tmp_path: Path, head: str, options: dict[str, Any], size: tuple[
 
 
 def test_an_origin_that_the_file_gives(tmp_path: Path) -> None:
-    foreign = drawn(tmp_path, PAGE, 'width="1000" height="600" data-origin="-3 2.5"')
+    foreign = read_shapes(tmp_path, PAGE, 'width="1000" height="600" data-origin="-3 2.5"')
     assert foreign.free.bounds == pytest.approx((-3, 2.5, 7, 8.5))
 
 
 def test_a_plan_as_small_as_its_paper_needs_a_scale(tmp_path: Path) -> None:
-    wanted = "expected at least 1 m, got 0.265 x 0.159 m at its own scale: --scale METERS"
-    with pytest.raises(MapError, match=wanted):
-        drawn(tmp_path, PAGE, scale=None)
+    expected = "expected at least 1 m, got 0.265 x 0.159 m at its own scale: --scale METERS"
+    with pytest.raises(MapError, match=expected):
+        read_shapes(tmp_path, PAGE, scale=None)
 
 
 def test_the_title_names_the_map(tmp_path: Path) -> None:
-    foreign = drawn(tmp_path, f"<title>Ground\n floor</title><desc>With stairs.</desc>{PAGE}")
+    foreign = read_shapes(tmp_path, f"<title>Ground\n floor</title><desc>With stairs.</desc>{PAGE}")
     assert (foreign.name, foreign.description, foreign.format) == ("Ground floor", "With stairs.", "svg")
-    assert drawn(tmp_path, PAGE).name == "plan"
+    assert read_shapes(tmp_path, PAGE).name == "plan"
 
 
 def test_what_editors_write_before_it(tmp_path: Path) -> None:
@@ -248,7 +250,7 @@ def test_what_editors_write_before_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("body", "wanted"),
+    ("body", "expected"),
     [
         ('<path id="p" d="M0 0 L 10"/>', ":1: <path> 'p': character 10: expected a number"),
         ('\n<rect width="10em"/>', ":2: <rect>: expected a length in px"),
@@ -269,11 +271,11 @@ def test_what_editors_write_before_it(tmp_path: Path) -> None:
         ("<g><text>Hall</text></g>", "expected a drawing"),
     ],
 )
-def test_what_cannot_be_understood_is_refused(tmp_path: Path, body: str, wanted: str) -> None:
+def test_what_cannot_be_understood_is_refused(tmp_path: Path, body: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
-        drawn(tmp_path, body)
+        read_shapes(tmp_path, body)
     assert str(caught.value).startswith(str(tmp_path / "plan.svg"))
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -298,7 +300,7 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("content", "wanted"),
+    ("content", "expected"),
     [
         (b"", "not XML: no element found"),
         (b"<svg><g></svg>", ":1: not XML: mismatched tag"),
@@ -340,17 +342,17 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
-def test_what_is_no_svg_is_refused(tmp_path: Path, content: bytes, wanted: str) -> None:
+def test_what_is_no_svg_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "plan.svg"
     path.write_bytes(content)
     with pytest.raises(MapError) as caught:
         IMPORTERS["svg"].read(path, ReadOptions())
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("body", "wanted"),
+    ("body", "expected"),
     [
         ('<g id="a"><use href="#a"/></g>', "<g> 'a': is used within itself"),
         ('<g id="a"><use href="#b"/></g><g id="b"><use href="#a"/></g>', "is used within itself"),
@@ -367,15 +369,15 @@ def test_what_is_no_svg_is_refused(tmp_path: Path, content: bytes, wanted: str) 
         ),
     ],
 )
-def test_uses_without_an_end_are_refused(tmp_path: Path, body: str, wanted: str) -> None:
+def test_uses_without_an_end_are_refused(tmp_path: Path, body: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
-        drawn(tmp_path, body)
-    assert wanted in str(caught.value)
+        read_shapes(tmp_path, body)
+    assert expected in str(caught.value)
 
 
 @pytest.mark.slow
 def test_a_path_may_have_many_subpaths(tmp_path: Path) -> None:
     data = "".join(f"M{x} {y}h4v4h-4z" for x in range(10, 990, 10) for y in range(10, 590, 10))
-    foreign = drawn(tmp_path, f'{PAGE}<path d="{data}"/>')
+    foreign = read_shapes(tmp_path, f'{PAGE}<path d="{data}"/>')
     assert shapely.get_num_interior_rings(foreign.free.geoms[0]) == 98 * 58
     assert foreign.free.area == pytest.approx(60 - 98 * 58 * 0.0016)

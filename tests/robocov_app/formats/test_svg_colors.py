@@ -15,62 +15,62 @@ WALLS = '<path d="M0 0H10V6H0Z M5 0V4" fill="none" stroke="#000" stroke-width="0
 ROOM = 9.8 * 5.8 - 0.2 * 3.9  # m² free within the walls
 
 
-def drawn(folder: Path, body: str, **options: object) -> ForeignMap:
+def read_shapes(folder: Path, body: str, **options: object) -> ForeignMap:
     return read(folder, "svg", svg(body, PAGE), **options)
 
 
-def free(folder: Path, body: str, **options: object) -> float:
-    return drawn(folder, body, **options).free.area
+def read_free_space(folder: Path, body: str, **options: object) -> float:
+    return read_shapes(folder, body, **options).free.area
 
 
 def test_paint_that_is_declared_free_is_no_obstacle(tmp_path: Path) -> None:
     rug = FLOOR + WALLS + '<rect x="1" y="1" width="3" height="2" fill="#e0e0ff"/>'
-    foreign = drawn(tmp_path, rug)
+    foreign = read_shapes(tmp_path, rug)
     assert foreign.free.area == pytest.approx(ROOM - 6)
     assert "pale paint taken as solid: #e0e0ff (1) (--free-color: as free space)" in foreign.notes
-    chosen = drawn(tmp_path, rug, free_color=("#e0e0ff",))
+    chosen = read_shapes(tmp_path, rug, free_color=("#e0e0ff",))
     assert chosen.free.area == pytest.approx(ROOM)
     assert "painted as free: #e0e0ff (1) (--free-color)" in chosen.notes
-    assert free(tmp_path, rug, free_color=("#e6e6fa",), color_tolerance=6.0) == pytest.approx(ROOM)
-    ignored = drawn(tmp_path, rug, ignore_color=("#e0e0ff",))
+    assert read_free_space(tmp_path, rug, free_color=("#e6e6fa",), color_tolerance=6.0) == pytest.approx(ROOM)
+    ignored = read_shapes(tmp_path, rug, ignore_color=("#e0e0ff",))
     assert ignored.free.area == pytest.approx(ROOM)
     assert any("of a color that is left out" in line for line in ignored.dropped)
 
 
 def test_a_color_that_does_not_occur_is_named_with_those_that_do(tmp_path: Path) -> None:
-    notes = drawn(tmp_path, FLOOR + WALLS, free_color=("red",)).notes
+    notes = read_shapes(tmp_path, FLOOR + WALLS, free_color=("red",)).notes
     assert any("nothing is painted #ff0000 (--free-color); there are #" in note for note in notes)
 
 
 def test_what_is_painted_later_counts(tmp_path: Path) -> None:
     door = '<rect x="4.8" y="2" width="0.4" height="1" fill="white"/>'
-    assert free(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
+    assert read_free_space(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
     below = FLOOR + door + WALLS
-    assert free(tmp_path, below, free_color=("white",)) == pytest.approx(ROOM)
+    assert read_free_space(tmp_path, below, free_color=("white",)) == pytest.approx(ROOM)
 
 
 def test_a_free_stroke_opens_a_wall(tmp_path: Path) -> None:
     door = '<line x1="5" y1="2" x2="5" y2="3" stroke="white" stroke-width="0.4"/>'
-    assert free(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
+    assert read_free_space(tmp_path, FLOOR + WALLS + door, free_color=("white",)) == pytest.approx(ROOM + 0.2)
 
 
 def test_a_pale_fill_with_dark_paint_on_it_is_floor(tmp_path: Path) -> None:
     rooms = '<rect x="0" y="0" width="5" height="6" fill="#fff0d0"/>'
     table = '<circle cx="2" cy="3" r="0.5" fill="#444"/>'
-    foreign = drawn(tmp_path, FLOOR + rooms + table + WALLS)
+    foreign = read_shapes(tmp_path, FLOOR + rooms + table + WALLS)
     assert any(note.startswith("pale fills taken as floor: #fff0d0 (1)") for note in foreign.notes)
     assert foreign.free.area == pytest.approx(ROOM - shapely.Point(0, 0).buffer(0.5).area, abs=0.01)
     # of its color all are floor, and of others none
     other = '<rect x="6" y="1" width="1" height="1" fill="#fff0d0"/>'
-    same = free(tmp_path, FLOOR + rooms + table + WALLS + other)
+    same = read_free_space(tmp_path, FLOOR + rooms + table + WALLS + other)
     assert same == pytest.approx(foreign.free.area)
-    declared = free(tmp_path, FLOOR + rooms + table + WALLS, solid_color=("#fff0d0",))
+    declared = read_free_space(tmp_path, FLOOR + rooms + table + WALLS, solid_color=("#fff0d0",))
     assert declared == pytest.approx(4.9 * 5.8 - 0.1 * 3.9)
 
 
 def test_a_stroke_around_floor_is_a_wall(tmp_path: Path) -> None:
     room = '<rect x="1" y="1" width="4" height="4" fill="white" stroke="#000" stroke-width="0.2"/>'
-    foreign = drawn(tmp_path, FLOOR + WALLS.replace("M5 0V4", "") + room, free_color=("white",))
+    foreign = read_shapes(tmp_path, FLOOR + WALLS.replace("M5 0V4", "") + room, free_color=("white",))
     assert foreign.free.area == pytest.approx(9.8 * 5.8 - (4.2**2 - 3.8**2))
 
 
@@ -78,32 +78,32 @@ def test_rooms_on_a_dark_ground_are_free(tmp_path: Path) -> None:
     ground = '<rect width="10" height="6" fill="#333"/>'
     rooms = "".join(f'<rect x="{x}" y="1" width="3" height="4" fill="#eee"/>' for x in (1, 6))
     door = '<rect x="4" y="2" width="2" height="1" fill="#fff"/>'
-    foreign = drawn(tmp_path, ground + rooms + door)
+    foreign = read_shapes(tmp_path, ground + rooms + door)
     assert foreign.free.area == pytest.approx(26)
     assert any("#eeeeee (2), #ffffff (1) on a dark ground" in note for note in foreign.notes)
     # with nothing pale a dark outline is a boundary as any other
-    assert free(tmp_path, ground + '<rect x="1" y="1" width="3" height="3" fill="#777"/>') == pytest.approx(
-        51
-    )
+    assert read_free_space(
+        tmp_path, ground + '<rect x="1" y="1" width="3" height="3" fill="#777"/>'
+    ) == pytest.approx(51)
 
 
 def test_only_what_is_painted_free_is_free_where_nothing_encloses(tmp_path: Path) -> None:
     rooms = "".join(f'<rect x="{x}" y="1" width="3" height="4" fill="#eef"/>' for x in (1, 4))
-    assert free(tmp_path, rooms, free_color=("#eef",)) == pytest.approx(24)
+    assert read_free_space(tmp_path, rooms, free_color=("#eef",)) == pytest.approx(24)
 
 
 def test_nested_outlines_are_free_and_solid_by_turns(tmp_path: Path) -> None:
     boxes = "".join(
         f'<rect x="{k}" y="{k}" width="{10 - 2 * k}" height="{6 - 2 * k}" fill="#555"/>' for k in range(3)
     )
-    foreign = drawn(tmp_path, boxes, outlines="nested")
+    foreign = read_shapes(tmp_path, boxes, outlines="nested")
     assert foreign.free.area == pytest.approx(60 - 32 + 12)
     assert any("an odd number of outlines is free, 40 m²" in note for note in foreign.notes)
     # double lines: the walls between them are the smaller area
     double = '<rect width="10" height="6"/>' + "".join(
         f'<rect x="{x}" y="0.2" width="4.7" height="5.6"/>' for x in (0.2, 5.1)
     )
-    walls = drawn(tmp_path, double, outlines="nested")
+    walls = read_shapes(tmp_path, double, outlines="nested")
     assert walls.free.area == pytest.approx(2 * 4.7 * 5.6)
     assert any("an even number of outlines is free" in note for note in walls.notes)
 
@@ -113,7 +113,7 @@ def test_nested_outlines_within_a_named_boundary_begin_solid(tmp_path: Path) -> 
         '<rect id="boundary" width="10" height="6"/><rect x="1" y="1" width="7" height="4"/>'
         '<rect x="2" y="2" width="1" height="1"/>'
     )
-    assert free(tmp_path, body, outlines="nested") == pytest.approx(60 - 28 + 1)
+    assert read_free_space(tmp_path, body, outlines="nested") == pytest.approx(60 - 28 + 1)
 
 
 def test_a_plan_on_a_white_page_is_taken_without_the_page(tmp_path: Path) -> None:
@@ -136,15 +136,15 @@ def test_thin_strokes_and_shapes_are_dropped(tmp_path: Path) -> None:
         '<rect x="6" y="1" width="0.03" height="3"/>'
     )
     body = FLOOR + WALLS + thin
-    assert free(tmp_path, body) < ROOM - 0.1
-    foreign = drawn(tmp_path, body, min_stroke="0.05")
+    assert read_free_space(tmp_path, body) < ROOM - 0.1
+    foreign = read_shapes(tmp_path, body, min_stroke="0.05")
     assert foreign.free.area == pytest.approx(ROOM)
     assert foreign.dropped == (
         "1 shape thinner than 0.05 m (--min-stroke)",
         "1 stroke thinner than 0.05 m (--min-stroke)",
     )
     # a pixel is a unit of the drawing's page: 1/96 of an inch
-    assert free(tmp_path, body, min_stroke=f"{0.05 / 0.0254 * 96:.0f}px") == pytest.approx(ROOM)
+    assert read_free_space(tmp_path, body, min_stroke=f"{0.05 / 0.0254 * 96:.0f}px") == pytest.approx(ROOM)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_the_width_of_a_stretched_stroke_is_that_across_it(
     tmp_path: Path, transform: str, d: str, width: str
 ) -> None:
     path = f'<path d="{d}" fill="none" stroke="#000" stroke-width="0.2" transform="{transform}"/>'
-    notes = drawn(tmp_path, '<rect id="boundary" x="-20" y="-20" width="50" height="50"/>' + path).notes
+    notes = read_shapes(tmp_path, '<rect id="boundary" x="-20" y="-20" width="50" height="50"/>' + path).notes
     assert f"1 line taken as walls, {width} m wide (--thickness)" in notes
 
 
@@ -190,14 +190,14 @@ def test_colors_are_read_as_they_are_seen(tmp_path: Path, paint: str, color: str
         "<linearGradient id='second' href='#shade'/></defs>"
     )
     shape = f'<g><rect x="1" y="1" width="3" height="2" {paint}/></g>'
-    foreign = drawn(tmp_path, head + FLOOR + WALLS + shape)
+    foreign = read_shapes(tmp_path, head + FLOOR + WALLS + shape)
     assert f"pale paint taken as solid: {color} (1) (--free-color: as free space)" in foreign.notes
 
 
 @pytest.mark.parametrize("paint", ['fill="rgba(0,0,0,0)"', 'fill="#0000"', 'fill="transparent"'])
 def test_what_is_transparent_is_not_there(tmp_path: Path, paint: str) -> None:
     shape = f'<rect x="1" y="1" width="3" height="2" {paint}/>'
-    assert free(tmp_path, FLOOR + WALLS + shape) == pytest.approx(ROOM)
+    assert read_free_space(tmp_path, FLOOR + WALLS + shape) == pytest.approx(ROOM)
 
 
 def test_layers_are_left_out_by_their_names(tmp_path: Path) -> None:
@@ -206,7 +206,9 @@ def test_layers_are_left_out_by_their_names(tmp_path: Path) -> None:
         'inkscape:label="Furniture"><rect x="1" y="1" width="1" height="1"/></g>'
         '<g id="text"><rect x="3" y="1" width="1" height="1"/></g>'
     )
-    assert free(tmp_path, FLOOR + WALLS + layers) == pytest.approx(ROOM - 2)
-    assert free(tmp_path, FLOOR + WALLS + layers, skip=("furniture", "text")) == pytest.approx(ROOM)
+    assert read_free_space(tmp_path, FLOOR + WALLS + layers) == pytest.approx(ROOM - 2)
+    assert read_free_space(tmp_path, FLOOR + WALLS + layers, skip=("furniture", "text")) == pytest.approx(
+        ROOM
+    )
     with pytest.raises(ParameterError, match=r"skip: .*[Ff]urnitur"):
-        drawn(tmp_path, FLOOR + WALLS + layers, skip=("Furnitur",))
+        read_shapes(tmp_path, FLOOR + WALLS + layers, skip=("Furnitur",))

@@ -25,7 +25,7 @@ def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("M1 2L3 4", [[1, 2], [3, 4]]),
         ("m1,2 2,2", [[1, 2], [3, 4]]),
@@ -38,8 +38,8 @@ def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
         ("M0 0A0 5 0 0 1 4 4", [[0, 0], [4, 4]]),
     ],
 )
-def test_commands(text: str, wanted: list[list[float]]) -> None:
-    assert points(text) == wanted
+def test_commands(text: str, expected: list[list[float]]) -> None:
+    assert points(text) == expected
 
 
 def test_subpaths_begin_where_the_last_one_did() -> None:
@@ -98,7 +98,7 @@ def test_arcs_obey_the_equation_of_their_ellipse(
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("L1 1", "character 1: expected M, got L first"),
         ("M1", "character 3: expected a number"),
@@ -112,10 +112,10 @@ def test_arcs_obey_the_equation_of_their_ellipse(
         ("M0 0 A 1e20 1e20 0 1 1 5 5", "expected at most 100 points, got more"),
     ],
 )
-def test_what_is_no_path_is_refused_with_its_place(text: str, wanted: str) -> None:
+def test_what_is_no_path_is_refused_with_its_place(text: str, expected: str) -> None:
     with pytest.raises(ValueError, match="expected") as caught:
         parse_path(text, 1e-3, 100)
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
 
 
 def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
@@ -126,7 +126,7 @@ def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "point", "wanted"),
+    ("text", "point", "expected"),
     [
         ("translate(2)", (1, 1), (3, 1)),
         ("translate(2, 3)", (1, 1), (3, 4)),
@@ -143,8 +143,10 @@ def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
         ("", (1, 2), (1, 2)),
     ],
 )
-def test_transforms(text: str, point: tuple[float, float], wanted: tuple[float, float]) -> None:
-    assert transform_points(parse_transform(text), np.array([point], dtype=float))[0] == pytest.approx(wanted)
+def test_transforms(text: str, point: tuple[float, float], expected: tuple[float, float]) -> None:
+    assert transform_points(parse_transform(text), np.array([point], dtype=float))[0] == pytest.approx(
+        expected
+    )
 
 
 @pytest.mark.parametrize(
@@ -170,7 +172,7 @@ def test_stretch_is_what_happens_to_a_circle() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("10", 10),
         ("10px", 10),
@@ -183,8 +185,8 @@ def test_stretch_is_what_happens_to_a_circle() -> None:
         (" 1e1 ", 10),
     ],
 )
-def test_lengths(text: str, wanted: float) -> None:
-    assert parse_length(text, 80.0) == pytest.approx(wanted)
+def test_lengths(text: str, expected: float) -> None:
+    assert parse_length(text, 80.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("text", ["", "x", "10em", "10 px x", "%", "1e99px", "nan"])

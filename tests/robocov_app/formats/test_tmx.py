@@ -54,18 +54,18 @@ def read(
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 
-def solid(foreign: ForeignMap, size: tuple[float, float] = (4, 3)) -> shapely.Geometry:
+def compute_obstacles(foreign: ForeignMap, size: tuple[float, float] = (4, 3)) -> shapely.Geometry:
     return box(0, 0, *size) - foreign.free
 
 
-def same(one: shapely.Geometry, other: shapely.Geometry) -> bool:
+def are_equal(one: shapely.Geometry, other: shapely.Geometry) -> bool:
     """Return whether two areas are the same, but for the necks between cells that touch at a corner."""
     return bool(one.symmetric_difference(other).area < 0.01)
 
 
 def test_tiles_are_solid_that_say_so(tmp_path: Path) -> None:
     foreign = read(tmp_path, TILES.format(""), tiles("Ground"))
-    assert same(solid(foreign), WALLS)
+    assert are_equal(compute_obstacles(foreign), WALLS)
     assert (foreign.cell, foreign.name) == (1.0, "map")
     assert foreign.notes == ("no size of a tile was given: 1 m wide taken (--cell)",)
 
@@ -74,19 +74,22 @@ def test_layers_are_solid_by_name_property_or_if_they_are_asked_for(tmp_path: Pa
     plain = '<tileset firstgid="1" tilewidth="16" tileheight="16"/>'
     floor, upper = tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1"), ROWS.replace("1", "0")
     for name in ("Walls", "collision", "Collision Layer 2", "is_solid"):
-        assert same(solid(read(tmp_path, plain, floor, tiles(name, upper))), WALLS)
+        assert are_equal(compute_obstacles(read(tmp_path, plain, floor, tiles(name, upper))), WALLS)
     marked = tiles("Things", upper).replace("<data", SOLID.format("collides", "") + "<data")
-    assert same(solid(read(tmp_path, plain, floor, marked)), WALLS)
+    assert are_equal(compute_obstacles(read(tmp_path, plain, floor, marked)), WALLS)
     grouped = f'<group name="obstacles">{tiles("Things", upper)}</group>'
-    assert same(solid(read(tmp_path, plain, floor, grouped)), WALLS)
+    assert are_equal(compute_obstacles(read(tmp_path, plain, floor, grouped)), WALLS)
     things = tiles("Things", upper)
     with pytest.raises(MapError, match=r"nothing is solid .* --only LAYER.* 'Floor', 'Things'"):
         read(tmp_path, plain, floor, things)
-    assert same(solid(read(tmp_path, plain, floor, things, only=("things",))), WALLS)
+    assert are_equal(compute_obstacles(read(tmp_path, plain, floor, things, only=("things",))), WALLS)
     with pytest.raises(ParameterError, match=r"only: unknown name 'thing': did you mean 'Things'\?"):
         read(tmp_path, plain, floor, things, tiles("Walls"), only=("thing",))
-    assert same(
-        solid(read(tmp_path, plain, floor, tiles("Walls"), things, skip=("walls",), only=("things",))), WALLS
+    assert are_equal(
+        compute_obstacles(
+            read(tmp_path, plain, floor, tiles("Walls"), things, skip=("walls",), only=("things",))
+        ),
+        WALLS,
     )
 
 
@@ -98,13 +101,13 @@ def test_tiles_may_be_packed(tmp_path: Path, packing: str) -> None:
     raw = struct.pack("<12I", *(int(gid) for gid in ROWS.split(",")))
     text = base64.b64encode(PACKED[packing](raw)).decode()
     layer = tiles("a", text).replace('"csv"', f'"base64" compression="{packing}"')
-    assert same(solid(read(tmp_path, TILES.format(""), layer)), WALLS)
+    assert are_equal(compute_obstacles(read(tmp_path, TILES.format(""), layer)), WALLS)
 
 
 def test_tiles_may_be_elements(tmp_path: Path) -> None:
     inner = "".join(f'<tile gid="{int(gid)}"/>' if int(gid) > 1 else "<tile/>" for gid in ROWS.split(","))
     layer = f'<layer name="a" width="4" height="3"><data>{inner}</data></layer>'
-    assert same(solid(read(tmp_path, TILES.format(""), layer)), WALLS)
+    assert are_equal(compute_obstacles(read(tmp_path, TILES.format(""), layer)), WALLS)
 
 
 def test_an_infinite_map_is_as_large_as_its_tiles(tmp_path: Path) -> None:
@@ -115,16 +118,16 @@ def test_an_infinite_map_is_as_large_as_its_tiles(tmp_path: Path) -> None:
     layer = f'<layer name="a" width="4" height="3"><data encoding="csv">{chunks}</data></layer>'
     foreign = read(tmp_path, TILES.format(""), layer, head='infinite="1"')
     # columns -13 to -11, rows -1 to 1
-    assert same(solid(foreign, (3, 3)), box(0, 0, 1, 1) | box(1, 1, 2, 2))
+    assert are_equal(compute_obstacles(foreign, (3, 3)), box(0, 0, 1, 1) | box(1, 1, 2, 2))
 
 
 def test_tiles_need_not_be_square(tmp_path: Path) -> None:
     tile = 'tilewidth="16" tileheight="8"'
     foreign = read(tmp_path, TILES.format(""), tiles("a"), tile=tile, cell=0.5)
-    assert same(solid(foreign, (2, 0.75)), affinity.scale(WALLS, 0.5, 0.25, origin=(0, 0)))
+    assert are_equal(compute_obstacles(foreign, (2, 0.75)), affinity.scale(WALLS, 0.5, 0.25, origin=(0, 0)))
     assert foreign.cell == 0.5
     foreign = read(tmp_path, TILES.format(""), tiles("a"), tile=tile, scale=0.25)
-    assert same(solid(foreign, (16, 6)), affinity.scale(WALLS, 4, 2, origin=(0, 0)))
+    assert are_equal(compute_obstacles(foreign, (16, 6)), affinity.scale(WALLS, 4, 2, origin=(0, 0)))
     with pytest.raises(ParameterError, match="both say how large a tile is"):
         read(tmp_path, TILES.format(""), tiles("a"), scale=0.25, cell=1.0)
     environment, _, _ = import_map(tmp_path / "map.tmx", options=ReadOptions(cell=2.0))
@@ -138,16 +141,18 @@ def test_tiles_have_the_shape_of_their_collision_objects(tmp_path: Path) -> None
     rows = ",".join(str(4 + flip) for flip in flips) + ",0" * 8
     foreign = read(tmp_path, TILES.format(corner), tiles("a", rows))
     quarters = [box(0, 2, 0.5, 2.5), box(1.5, 2, 2, 2.5), box(2, 2.5, 2.5, 3), box(3.5, 2.5, 4, 3)]
-    assert solid(foreign).symmetric_difference(shapely.union_all(quarters)).area < 1e-5
+    assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(quarters)).area < 1e-5
     # one as large as the cell is the cell, and one of a tall picture begins above it
     whole = corner.replace('y="8" width="8" height="8"', 'y="0" width="16" height="16"')
-    assert solid(read(tmp_path, TILES.format(whole), tiles("a", "4" + ",0" * 11))).equals(box(0, 2, 1, 3))
+    assert compute_obstacles(read(tmp_path, TILES.format(whole), tiles("a", "4" + ",0" * 11))).equals(
+        box(0, 2, 1, 3)
+    )
     tall = (
         '<tileset firstgid="9" name="b" tilewidth="16" tileheight="32"><tileoffset x="4" y="0"/>'
         '<tile id="0"><objectgroup><object x="0" y="8" width="8" height="24"/></objectgroup></tile></tileset>'
     )
     foreign = read(tmp_path, tall, tiles("a", "0,0,0,0,0,9,0,0,0,0,0,0"))
-    assert solid(foreign).equals(box(1.25, 1, 1.75, 2.5))
+    assert compute_obstacles(foreign).equals(box(1.25, 1, 1.75, 2.5))
 
 
 def test_objects_of_every_shape(tmp_path: Path) -> None:
@@ -162,7 +167,7 @@ def test_objects_of_every_shape(tmp_path: Path) -> None:
         '<object name="robot" x="8" y="24"><point/></object>',
     )
     foreign = read(tmp_path, objects("things", *given), scale=1.0, thickness=2.0)
-    wanted = [
+    expected = [
         box(8, 32, 24, 40),
         box(24, 24, 32, 40),  # clockwise about its upper left corner
         CircleObstacle((44.0, 12.0), 4.0).polygon,
@@ -170,7 +175,7 @@ def test_objects_of_every_shape(tmp_path: Path) -> None:
         box(55, 28, 57, 44),
         box(48, 0, 64, 4),  # of tiles the lower left corner is given
     ]
-    assert solid(foreign, (64, 48)).symmetric_difference(shapely.union_all(wanted)).area < 1e-3
+    assert compute_obstacles(foreign, (64, 48)).symmetric_difference(shapely.union_all(expected)).area < 1e-3
     assert foreign.robots == ((8.0, 24.0),)
     assert foreign.dropped == ("1 object of text, a template or without an area",)
     assert foreign.cell is None
@@ -181,13 +186,13 @@ def test_objects_beside_tiles_are_solid_only_if_they_say_so(tmp_path: Path) -> N
     things = objects("triggers", square.format("door"), square.format("wall").replace('x="0"', 'x="48"'))
     ground = tiles("Ground", ROWS.replace("2", "1"))
     foreign = read(tmp_path, ground, things)
-    assert solid(foreign).equals(box(3, 2, 4, 3))
+    assert compute_obstacles(foreign).equals(box(3, 2, 4, 3))
     assert foreign.dropped == ("1 object not solid by name or property (--only NAME takes it)",)
-    assert solid(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
+    assert compute_obstacles(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
     moved = objects("walls", square.format(""), more='offsetx="16" offsety="16"')
-    assert solid(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))
+    assert compute_obstacles(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))
     shifted = tiles("walls", "2" + ",0" * 11, 'offsetx="8" offsety="4"')
-    assert solid(read(tmp_path, ground, shifted)).equals(box(0.5, 1.75, 1.5, 2.75))
+    assert compute_obstacles(read(tmp_path, ground, shifted)).equals(box(0.5, 1.75, 1.5, 2.75))
 
 
 def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
@@ -197,12 +202,12 @@ def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
     (tmp_path / "far.tsx").write_text(text)
     (folder / "near.tsx").write_text(text)
     near, far = (f'<tileset firstgid="1" source="{name}"/>' for name in ("near.tsx", "../far.tsx"))
-    assert same(solid(read(folder, near, tiles("a"))), WALLS)
+    assert are_equal(compute_obstacles(read(folder, near, tiles("a"))), WALLS)
     with pytest.raises(
         MapError, match=r"map.tmx:3: .../far.tsx. is outside the folder of the file, expected a"
     ):
         read(folder, far, tiles("a"))
-    assert same(solid(read(folder, far, tiles("a"), anywhere=True)), WALLS)
+    assert are_equal(compute_obstacles(read(folder, far, tiles("a"), anywhere=True)), WALLS)
     (folder / "near.tsx").write_text("<map/>")
     with pytest.raises(MapError, match=r"near\.tsx: expected <tileset>, got <map>"):
         read(folder, near, tiles("a"))
@@ -212,7 +217,7 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
 
 
 @pytest.mark.parametrize(
-    ("parts", "wanted"),
+    ("parts", "expected"),
     [
         (tiles("walls", "1,2"), "map.tmx:3: <data>: expected 12 tiles, as it says, got 2"),
         (tiles("walls", "1,x" + ",1" * 10), "expected whole numbers from 0, separated by commas"),
@@ -235,10 +240,10 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
     ],
     ids=range(18),
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, parts: str, wanted: str) -> None:
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, parts: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, parts)
-    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+    assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("orientation", ["isometric", "staggered", "hexagonal"])
@@ -278,12 +283,12 @@ def test_tilesets_are_limited_together(tmp_path: Path) -> None:
     sides = 'width="1" height="1" tilewidth="8" tileheight="8"'
     layer = f'<layer name="walls" {sides}><data encoding="csv">1</data></layer>'
     path = tmp_path / "plan.tmx"
-    for tiles, count, wanted in (
+    for tiles, count, expected in (
         (1, 201, "more than 200 files"),
         (60_000, 2, "tilesets of more than 100000"),
     ):
         named = "".join(f'<tileset firstgid="{k + 1}" source="t.tsx"/>' for k in range(count))
         path.write_text(f"<map {sides}>{named}{layer}</map>")
         (tmp_path / "t.tsx").write_text('<tileset tilewidth="8">' + '<tile id="1"/>' * tiles + "</tileset>")
-        with pytest.raises(MapError, match=wanted):
+        with pytest.raises(MapError, match=expected):
             import_map(path)

@@ -48,7 +48,7 @@ def array() -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "wanted"),
+    ("name", "content", "expected"),
     [
         ("a.json", b"", "empty"),
         ("a.json", json.dumps(MAP, indent=1).encode(), "a map of robocov already: robocov check"),
@@ -93,10 +93,10 @@ def array() -> bytes:
     ],
     ids=lambda value: value if isinstance(value, str) else "-",
 )  # fmt: skip
-def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, wanted: str) -> None:
+def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, expected: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(MapError, match=wanted) as caught:
+    with pytest.raises(MapError, match=expected) as caught:
         detect_format(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)

@@ -103,10 +103,10 @@ HOLED = Polygon(box(0, 0, 10, 10).exterior, [box(2, 2, 6, 6).exterior])
 def test_holes_are_excluded_from_the_union(tmp_path: Path, others: list[Polygon], excluded: Any) -> None:
     # as JuPedSim takes excluded areas out of the union of all accessible ones
     areas = [HOLED, *others]
-    wanted = shapely.union_all([Polygon(area.exterior) for area in areas]) - excluded
+    expected = shapely.union_all([Polygon(area.exterior) for area in areas]) - excluded
     for text in (shapely.GeometryCollection(areas).wkt, "\n".join(area.wkt for area in areas[::-1])):
         free = read(tmp_path, "wkt", text).free
-        assert free.symmetric_difference(wanted).area < 1e-6
+        assert free.symmetric_difference(expected).area < 1e-6
 
 
 def test_many_holes_under_many_polygons_are_refused(tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_obstacles_are_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         ("", ": no closed outline and no line, expected a drawing"),
         ("PLOYGON((0 0, 1 1))", ":1:1: expected one of POINT, LINESTRING"),
@@ -202,13 +202,13 @@ def test_obstacles_are_asked_for(tmp_path: Path) -> None:
         ("POLYGON((٠ 0, 1 1, 2 2, 0 0))", ":1:10: expected a point"),
     ],
 )
-def test_what_is_no_text_is_refused_with_its_place(tmp_path: Path, text: str, wanted: str) -> None:
+def test_what_is_no_text_is_refused_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "plan.wkt"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(MapError) as caught:
         IMPORTERS["wkt"].read(path, ReadOptions())
     assert str(caught.value).startswith(str(path))
-    assert wanted in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

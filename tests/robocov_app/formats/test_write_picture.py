@@ -20,9 +20,9 @@ def test_black_and_white_and_what_it_says_of_itself(tmp_path: Path) -> None:
         assert image.mode == "1"
         assert json.loads(image.info["robocov"]) == {"cell_m": 0.5, "origin_m": [2.5, -2.5]}
         assert image.info["Title"] == "Zimmer α"
-        wanted = np.zeros((4, 6), dtype=bool)
-        wanted[1:3, 1:5] = True
-        np.testing.assert_array_equal(np.asarray(image), wanted)
+        expected = np.zeros((4, 6), dtype=bool)
+        expected[1:3, 1:5] = True
+        np.testing.assert_array_equal(np.asarray(image), expected)
 
 
 @pytest.mark.parametrize("name", ["museum", "city", "cave"])

@@ -31,7 +31,7 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
         "image": "corner.pgm", "mode": "trinary", "resolution": 0.5, "origin": [-0.5, -0.5, 0.0],
         "negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196,
     }  # fmt: skip
-    wanted = """
+    drawing = """
         ######????
         #....#????
         #....#????
@@ -47,7 +47,7 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
     values = {"#": 0, ".": 254, "?": 205}
     assert pixels(tmp_path / "corner.pgm").tolist() != []
     found = pixels(tmp_path / "corner.pgm")
-    expected = np.array([[values[c] for c in line] for line in wanted])
+    expected = np.array([[values[c] for c in line] for line in drawing])
     expected[6, 2], expected[6, 3] = 254, 0
     np.testing.assert_array_equal(found, expected)
     assert report.area == CORNER.free_area
