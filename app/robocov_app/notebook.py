@@ -107,7 +107,7 @@ def plot_environment(
     from robocov_app.figures import runs
 
     _check_axes(axes)
-    return _get_axes(runs.plot_environment(environment, axes, theme, size), axes)
+    return _get_axes(runs.plot_environment(environment, axes, theme=theme, size=size), axes)
 
 
 def plot_record(
@@ -151,8 +151,8 @@ def plot_record(
     figure = runs.plot_trajectories(
         record,
         axes,
-        theme,
-        colors,
+        theme=theme,
+        colors=colors,
         size=size,
         mean_distance=mean_distance,
         mean_time=mean_time,
@@ -201,7 +201,7 @@ def plot_history(
 
     _check_axes(axes)
     curve = (label, controller, history.time, history.mean_distance)
-    return _get_axes(runs.plot_cost([curve], axes, theme, size, title), axes)
+    return _get_axes(runs.plot_cost([curve], axes, theme=theme, size=size, title=title), axes)
 
 
 def plot_result(
@@ -256,7 +256,7 @@ def plot_result(
     field = DistanceField(FieldLattice(sites), result)
     moment = Moment(environment, team, field, environment.name, facts)
     if axes is None:
-        return plot_coverage([], [moment], theme, size, "Coverage cost").axes[-1]
+        return plot_coverage([], [moment], theme=theme, size=size).axes[-1]
     plot_distances(moment, axes, theme)
     return axes
 
@@ -297,7 +297,9 @@ def plot_comparison(
         raise ParameterError("axes: expected None, because a comparison has one panel for each run")
     mean_distances = [float(history.mean_distance[-1]) for history in comparison.histories.values()]
     records = list(comparison.records.values())
-    figure = runs.plot_comparison(records, theme, colors, size, mean_distances=mean_distances)
+    figure = runs.plot_comparison(
+        records, theme=theme, colors=colors, size=size, mean_distances=mean_distances
+    )
     return figure.axes[-1]
 
 

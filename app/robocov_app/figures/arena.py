@@ -245,7 +245,7 @@ def _draw_final_positions(
             fills.append(theme.robots[hues[robot]])
     numbers = (present + 1).tolist()
     positions = record.positions[-1][present]
-    radii = draw_robots(axes, positions, record.team.radius[present], fills, theme, numbers)
+    radii = draw_robots(axes, positions, record.team.radius[present], fills, theme, numbers=numbers)
     return dict(zip(present.tolist(), radii, strict=True))
 
 
@@ -297,6 +297,7 @@ def draw_robots(
     radius: Array,
     fills: Sequence[Color],
     theme: Theme,
+    *,
     numbers: Sequence[int] | None = None,
 ) -> list[float]:
     """Draw robots as discs with numbers.

@@ -78,7 +78,7 @@ class Moment:
     time: float = 0.0
 
     @classmethod
-    def last_of(
+    def build_final(
         cls,
         record: Record,
         field: DistanceField,
@@ -149,18 +149,22 @@ class _Arrangement:
         Middle of the scale of colors.
     bar_min_left : float
         Nothing of the scale of colors is to the left of this.
+    is_below : bool
+        Whether the maps are below the curves.
     """
 
     curves: PageBox
     maps: PageBox
     bar_row: float
     bar_min_left: float
+    is_below: bool
 
 
 @plain_style()
 def plot_coverage(
     curves: Sequence[Curve],
     moments: Sequence[Moment],
+    *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost",
@@ -196,22 +200,11 @@ def plot_coverage(
     extent = _enclose(moments)
     limit = _choose_limit(moments)
     handles = _build_handles(moments, theme)
-    is_beside = bool(curves) and len(moments) == 1 and extent.aspect < MAX_ASPECT_BESIDE
-    is_below = bool(curves) and not is_beside
-    page = FigurePage(size or (DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE if size is None else None)
-    maps_fraction = 0.5 if is_beside else 1.0
-    footer_start = (1.0 - maps_fraction) * page.size[0] + page.margin
-    footer_height = page.measure_footer(handles, footer_start)
-    maps_width = maps_fraction * page.size[0] - 2 * page.margin
-    if size is None:
-        height = _choose_height(page, extent, len(moments), maps_width, footer_height, is_below=is_below)
-        page = FigurePage((page.size[0], height), theme, _DEFAULT_SCALE)
-    if is_below:
-        arrangement = _arrange_below(page, maps_width, footer_height, has_fixed_size=size is not None)
-    else:
-        arrangement = _arrange_beside(page, maps_fraction, footer_height, has_curves=bool(curves))
-    bar_left = _draw_bar(page, limit, arrangement.maps, arrangement.bar_row, arrangement.bar_min_left)
-    title_end = page.size[0] if is_below else bar_left
+    page, arrangement = _create_page(
+        theme, size, extent, handles, map_count=len(moments), has_curves=bool(curves)
+    )
+    bar_left = _draw_bar(page, limit, arrangement)
+    title_end = page.size[0] if arrangement.is_below else bar_left
     page.write_title(title, 26, title_end - 2 * page.margin)
     if curves:
         has_density = any(describe_density(moment.environment) for moment in moments)
@@ -219,6 +212,32 @@ def plot_coverage(
     boxes = _draw_maps(page, moments, extent, limit, arrangement.maps)
     page.draw_footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
     return page.figure
+
+
+def _create_page(
+    theme: Theme,
+    size: tuple[int, int] | None,
+    extent: _Extent,
+    handles: Sequence[Artist],
+    *,
+    map_count: int,
+    has_curves: bool,
+) -> tuple[FigurePage, _Arrangement]:
+    """Create a page of a size, or one as high as its maps need, and arrange curves and maps on it."""
+    is_beside = has_curves and map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE
+    is_below = has_curves and not is_beside
+    scale = _DEFAULT_SCALE if size is None else None
+    page = FigurePage(size or (DEFAULT_WIDTH_PX, 1000), theme, scale)
+    maps_fraction = 0.5 if is_beside else 1.0
+    footer_start = (1.0 - maps_fraction) * page.size[0] + page.margin
+    footer_height = page.measure_footer(handles, footer_start)
+    maps_width = maps_fraction * page.size[0] - 2 * page.margin
+    if size is None:
+        height = _choose_height(page, extent, map_count, maps_width, footer_height, is_below=is_below)
+        page = FigurePage((page.size[0], height), theme, _DEFAULT_SCALE)
+    if is_below:
+        return page, _arrange_below(page, maps_width, footer_height, has_fixed_size=size is not None)
+    return page, _arrange_beside(page, maps_fraction, footer_height, has_curves=has_curves)
 
 
 def _enclose(moments: Sequence[Moment]) -> _Extent:
@@ -262,6 +281,7 @@ def _arrange_below(
         maps=(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
         bar_row=curves_end + 24 * scale,
         bar_min_left=page.margin,
+        is_below=True,
     )
 
 
@@ -279,6 +299,7 @@ def _arrange_beside(
         maps=(maps_left, head, maps_width, height - head - footer_height),
         bar_row=_BAR_ROW * scale,
         bar_min_left=0.5 * width if has_curves else maps_left,
+        is_below=False,
     )
 
 
@@ -301,7 +322,7 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     # Small axes may be saved large.
     enlargement = max(MIN_SIZE_PX[0] / extent.width, 1.0)
     box = (0.0, 0.0, enlargement * extent.width, enlargement * extent.height)
-    _draw_moment(axes, moment, limit, theme, box, enlargement * scale)
+    _draw_moment(axes, moment, limit, theme, box=box, scale=enlargement * scale)
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
     heat = theme.build_heat_table(256)[:, None]
@@ -380,7 +401,7 @@ def _draw_maps(
     panels = _arrange_panels(room, len(moments), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
     for moment, (box, caption_width) in zip(moments, panels, strict=True):
         axes = page.add_map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
-        _draw_moment(axes, moment, limit, page.theme, box, scale)
+        _draw_moment(axes, moment, limit, page.theme, box=box, scale=scale)
         left, top, _, _ = box
         title_row = top - 35 * scale
         facts_row = top - 14 * scale
@@ -416,7 +437,9 @@ def _arrange_panels(
     return panels
 
 
-def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: PageBox, scale: float) -> None:
+def _draw_moment(
+    axes: Axes, moment: Moment, limit: float, theme: Theme, *, box: PageBox, scale: float
+) -> None:
     """Draw distances, the borders of geodesic cells, the map and the robots in axes of a box, px."""
     low_x, high_x = axes.get_xlim()
     low_y, high_y = axes.get_ylim()
@@ -425,7 +448,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Pa
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
     zoom = DOTS_PER_PIXEL * box[2] / (high_x - low_x)
-    pixels = _paint_distances(moment.field, x, y, limit, theme, zoom, scale)
+    pixels = _paint_distances(moment.field, x, y, limit, theme, zoom=zoom, border_width=_BORDER_WIDTH * scale)
     image = axes.imshow(
         pixels,
         extent=(low_x, high_x, low_y, high_y),
@@ -437,15 +460,22 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Pa
     arena.draw_map(axes, moment.environment, theme, has_density=False, time=moment.time)
     positions = moment.field.result.positions
     fills = [theme.final] * len(positions)
-    arena.draw_robots(axes, positions, moment.team.radius, fills, theme, moment.numbers)
+    arena.draw_robots(axes, positions, moment.team.radius, fills, theme, numbers=moment.numbers)
 
 
 def _paint_distances(
-    field: DistanceField, x: Array, y: Array, limit: float, theme: Theme, zoom: float, scale: float
+    field: DistanceField,
+    x: Array,
+    y: Array,
+    limit: float,
+    theme: Theme,
+    *,
+    zoom: float,
+    border_width: float,
 ) -> NDArray[np.uint8]:
     """Return the colors of distances and of borders at (w,) x and (h,) y, m, as (h, w, 3)."""
     pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * 9)]
-    width = DOTS_PER_PIXEL * _BORDER_WIDTH * scale
+    width = DOTS_PER_PIXEL * border_width
     borders = field.compute_borders(x, y, width / zoom)
     opacity = compute_line_opacities(borders, zoom, width)[:, None]
     border_pixels = (borders.rows, borders.columns)
@@ -454,25 +484,25 @@ def _paint_distances(
     return pixels
 
 
-def _draw_bar(page: FigurePage, limit: float, maps: PageBox, middle: float, min_left: float) -> float:
+def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> float:
     """Draw the scale of colors above the right edge of the maps.
+
+    Its label is left out if there is not enough space.
 
     Parameters
     ----------
     page : FigurePage
     limit : float, m
         End of the scale.
-    maps : PageBox
-    middle : float, px
-        Its row.
-    min_left : float, px
-        The label is left out if it would be to the left of this.
+    arrangement : _Arrangement
 
     Returns
     -------
     float
         Where the scale, or its label, starts, px.
     """
+    maps = arrangement.maps
+    middle = arrangement.bar_row
     theme = page.theme
     scale = page.scale
     right = maps[0] + maps[2] - 14 * scale
@@ -491,7 +521,7 @@ def _draw_bar(page: FigurePage, limit: float, maps: PageBox, middle: float, min_
     )
     left = right - width - 12 * scale
     label_width = page.measure_text(_BAR_LABEL)
-    if left - label_width <= min_left:
+    if left - label_width <= arrangement.bar_min_left:
         return left
     page.write(_BAR_LABEL, left, middle - 4 * scale, align="right")
     return left - label_width

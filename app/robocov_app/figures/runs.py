@@ -45,6 +45,7 @@ _CAPTION_GAP = 16
 def plot_environment(
     environment: Environment,
     axes: Axes | None = None,
+    *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
 ) -> Figure:
@@ -67,7 +68,7 @@ def plot_environment(
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
         handles = arena.build_map_handles(environment, theme)
-        axes = _create_map_page(environment, theme, size, environment.name, facts, handles)
+        axes = _create_map_page(environment, theme, size, handles, title=environment.name, facts=facts)
     else:
         arena.set_meter_axes(axes, environment, theme)
     arena.draw_map(axes, environment, theme)
@@ -78,6 +79,7 @@ def plot_environment(
 def plot_trajectories(
     record: Record,
     axes: Axes | None = None,
+    *,
     theme: Theme | str = LIGHT,
     colors: ColorScheme = "paper",
     size: tuple[int, int] | None = None,
@@ -112,7 +114,7 @@ def plot_trajectories(
             [_format_cost(record, mean_distance, mean_time), _format_time(record), _format_robots(record)]
         )
         handles = arena.build_run_handles(record, theme, colors)
-        axes = _create_map_page(record.environment, theme, size, title, facts, handles)
+        axes = _create_map_page(record.environment, theme, size, handles, title=title, facts=facts)
     else:
         arena.set_meter_axes(axes, record.environment, theme)
     arena.draw_run(axes, record, theme, colors)
@@ -157,6 +159,7 @@ class _Captions:
 @plain_style()
 def plot_comparison(
     records: Sequence[Record],
+    *,
     theme: Theme | str = LIGHT,
     colors: ColorScheme = "paper",
     size: tuple[int, int] | None = None,
@@ -200,7 +203,6 @@ def plot_comparison(
         height = np.clip(height, _MIN_HEIGHT_PX, _MAX_COMPARISON_HEIGHT_PX)
         page = FigurePage((page.size[0], int(height)), theme, _SHEET_SCALE)
     caption_width = captions.max_joined_width if is_one_line else captions.max_width
-    footer_height = page.measure_footer(handles)
     panels = page.arrange_panels(
         len(records),
         columns,
@@ -208,7 +210,7 @@ def plot_comparison(
         caption_width=caption_width,
         caption_height=above,
         top=top,
-        bottom=footer_height,
+        bottom=page.measure_footer(handles),
     )
     for number, (box, room) in enumerate(panels):
         axes = page.add_map_axes(box, low_x, low_y, high_x, high_y)
@@ -218,16 +220,19 @@ def plot_comparison(
             _write_one_line(page, captions, number, box, right)
         else:
             _write_two_lines(page, captions, number, box, room)
-    first_box, room = panels[0]
-    if captions.shared:
-        row = first_box[1] - above - 20 * scale
-        page.write(
-            captions.shared, first_box[0], row, points=HEADING, bold=True, max_width=page.content_width
-        )
-    min_width = room if is_one_line else 0.0
+    first_box = panels[0].box
+    _write_heading(page, captions.shared, first_box, above + 20 * scale)
+    min_width = panels[0].caption_width if is_one_line else 0.0
     footer_boxes = [(x, y, max(width, min_width), height) for (x, y, width, height), _ in panels]
     page.draw_footer(handles, footer_boxes, first_box[2] / (high_x - low_x))
     return page.figure
+
+
+def _write_heading(page: FigurePage, text: str, first_box: PageBox, up: float) -> None:
+    """Write the heading of several panels some pixels above the first one, if there is one."""
+    if text:
+        left, top, _, _ = first_box
+        page.write(text, left, top - up, points=HEADING, bold=True, max_width=page.content_width)
 
 
 def _build_captions(
@@ -288,6 +293,7 @@ def _write_two_lines(page: FigurePage, captions: _Captions, number: int, box: Pa
 def plot_cost(
     curves: Sequence[Curve],
     axes: Axes | None = None,
+    *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost over time",
@@ -352,9 +358,10 @@ def _create_map_page(
     environment: Environment,
     theme: Theme,
     size: tuple[int, int] | None,
+    handles: Sequence[Artist],
+    *,
     title: str,
     facts: str,
-    handles: Sequence[Artist],
 ) -> Axes:
     """Create a page with one map, a title and facts above it, and the legend below."""
     low_x, low_y, high_x, high_y = environment.region.bounds
@@ -458,9 +465,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
         arena.draw_map(axes, environment, theme)
         page.write(environment.name, box[0], box[1] - 12 * scale, bold=True, max_width=room)
     first_box, _ = panels[0]
-    if title:
-        row = first_box[1] - above - 18 * scale
-        page.write(title, first_box[0], row, points=HEADING, bold=True, max_width=page.content_width)
+    _write_heading(page, title, first_box, above + 18 * scale)
     page.draw_footer(handles, [box for box, _ in panels], first_box[2] / map_width)
     return page.figure
 

@@ -251,20 +251,19 @@ def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comp
     if is_comparison:
         return plot_comparison(
             [run.record for run in runs],
-            video.color_theme,
-            video.colors,
-            video.size,
-            mean_distances,
-            [run.final_time for run in runs],
+            theme=video.color_theme,
+            colors=video.colors,
+            size=video.size,
+            mean_distances=mean_distances,
+            mean_times=[run.final_time for run in runs],
         )
     return plot_trajectories(
         runs[0].record,
-        None,
-        video.color_theme,
-        video.colors,
-        video.size,
-        mean_distances[0],
-        runs[0].final_time,
+        theme=video.color_theme,
+        colors=video.colors,
+        size=video.size,
+        mean_distance=mean_distances[0],
+        mean_time=runs[0].final_time,
     )
 
 
@@ -276,10 +275,10 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
     return plot_coverage(
         _build_curves(runs, "mean_distance"),
         build_final_moments(runs, cost),
-        settings.video.color_theme,
-        settings.video.size,
-        f"Coverage cost  ·  {record.environment.name}  ·  {robots}",
-        _build_curves(runs, "mean_time"),
+        theme=settings.video.color_theme,
+        size=settings.video.size,
+        title=f"Coverage cost  ·  {record.environment.name}  ·  {robots}",
+        times=_build_curves(runs, "mean_time"),
     )
 
 
@@ -331,5 +330,5 @@ def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]
         rows = np.flatnonzero(is_available)
         field = DistanceField(FieldLattice(final_cost.sites), final_cost(positions[rows]))
         mean_distance = float(run.history.mean_distance[-1])
-        moments.append(Moment.last_of(record, field, mean_distance, rows, run.final_time))
+        moments.append(Moment.build_final(record, field, mean_distance, rows, run.final_time))
     return moments

@@ -109,4 +109,4 @@ def save_distance_figure(
     field = DistanceField(FieldLattice(cost.sites), cost(positions, speeds))
     robots = format_count(len(team), "robot")
     moment = Moment(cost.environment, team, field, cost.environment.name, f"{robots}, {mean}")
-    save_figure(plot_coverage([], [moment], theme, title=title), path)
+    save_figure(plot_coverage([], [moment], theme=theme, title=title), path)

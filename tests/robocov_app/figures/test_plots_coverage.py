@@ -25,7 +25,7 @@ def moment_of(environment, n=5, seed=0):
     cost = COSTS[environment.name]
     record = run_of(environment, n, seed=seed)
     positions = environment.start("spread").sample(n, seed)
-    return Moment.last_of(record, DistanceField(FieldLattice(cost.sites), cost(positions)), 1.234)
+    return Moment.build_final(record, DistanceField(FieldLattice(cost.sites), cost(positions)), 1.234)
 
 
 def curves(count):
@@ -99,7 +99,7 @@ def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
 )
 def test_the_colors_are_those_of_the_scale(theme, tmp_path):
     moment = moment_of(HALL)
-    figure = plot_coverage([], [moment], theme, (800, 640))
+    figure = plot_coverage([], [moment], theme=theme, size=(800, 640))
     save_figure(figure, tmp_path / "a.png")
     pixels = np.array(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
     (axes,) = [axes for axes in figure.axes if not axes.axison]
