@@ -63,7 +63,7 @@ def editor(theme: str, name: str) -> None:
     launcher = EditorLauncher(path, HERE, theme=theme, size=SIZE, headless=True)
     with launcher.window() as window:
         editor = window.editor
-        editor.apply(add_rectangle(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
+        editor.apply(add_rectangle(editor.sketch, [(15.6, 7.0), (17.9, 7.6)]))
         window.panel.show_tab("object")
         window.run_frame(0.5)
         to = window.canvas.to_pixel
