@@ -126,16 +126,16 @@ def build_contest(
     Contest
     """
     gains = contenders.collect_gain_sets(participants)
-    options = {
-        **_build_common_options(plan),
-        "controllers": tuple(gains),
-        "gains": gains,
-        "starts": starts,
-        "seeds": seeds,
-        "metrics": True,
-        **changes,
-    }
-    return Contest(Study(maps=tuple(maps), **options), tuple(participants))
+    study = Study(
+        maps=tuple(maps),
+        controllers=tuple(gains),
+        gains=gains,
+        starts=starts,
+        seeds=seeds,
+        metrics=True,
+        **(_build_common_options(plan) | changes),
+    )
+    return Contest(study, tuple(participants))
 
 
 def _build_common_options(plan: Plan) -> dict[str, Any]:
