@@ -1,4 +1,4 @@
-"""A map with one of everything, and changes of it."""
+"""A map with an obstacle, a start and a key of every kind, and changes of it."""
 
 from __future__ import annotations
 
@@ -47,15 +47,18 @@ DOCUMENT: dict[str, Any] = {
 SCHEMA = jsonschema.Draft202012Validator(build_map_schema())
 
 
-def changed(*path: Any, document: dict[str, Any] = DOCUMENT) -> dict[str, Any]:
-    """Return the document with the value at a path (all but the last argument) replaced or deleted."""
-    *steps, value = path
+def edit(*path_and_value: Any, document: dict[str, Any] = DOCUMENT) -> dict[str, Any]:
+    """Return a copy of the document in which the value at a path is replaced or deleted.
+
+    The last argument is the new value, or DELETED, and the arguments before it are the path.
+    """
+    *path, value = path_and_value
     result = copy.deepcopy(document)
-    place: Any = result
-    for step in steps[:-1]:
-        place = place[step]
+    parent: Any = result
+    for key in path[:-1]:
+        parent = parent[key]
     if value is DELETED:
-        del place[steps[-1]]
+        del parent[path[-1]]
     else:
-        place[steps[-1]] = value
+        parent[path[-1]] = value
     return result

@@ -143,9 +143,8 @@ def test_robots_out_of_range_do_not_affect_the_estimates(seed: int) -> None:
 
 
 def test_neighbors_are_assumed_closer_by_noise_and_age() -> None:
-    known, estimates, _ = drive_along_paths(
-        build_straight_paths(3, 60), Conditions(position_noise=0.1, delay=0.5)
-    )
+    conditions = Conditions(position_noise=0.1, delay=0.5)
+    known, estimates, _ = drive_along_paths(build_straight_paths(3, 60), conditions)
     robot, other = known.neighbors.list_pairs()
     close = assume_closer_neighbors(known, estimates)
     assert known.reported_positions is not None

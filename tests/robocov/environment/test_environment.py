@@ -15,7 +15,7 @@ SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 
 
 @pytest.mark.parametrize("radius", [0.005, 0.05, 0.5, 5.0, 50.0])
-def test_a_circle_is_a_polygon_of_at_most_a_millimeter_of_sagitta(radius: float) -> None:
+def test_polygons_of_circles_deviate_by_at_most_a_millimeter(radius: float) -> None:
     polygon = CircleObstacle((1.0, 2.0), radius).polygon
     center = shapely.Point(1.0, 2.0)
     assert radius - center.distance(polygon.exterior) <= 1e-3 + 1e-12
@@ -33,13 +33,14 @@ def test_a_closed_wall_has_no_notch() -> None:
     assert ring.area == pytest.approx(10.2**2 - 9.8**2)
 
 
-def test_the_boundary_may_run_either_way_round() -> None:
-    forward, backward = Environment("a", SQUARE), Environment("a", SQUARE[::-1])
-    assert forward.free_area == backward.free_area == 100.0
-    assert backward.free.geoms[0].exterior.is_ccw
+def test_the_boundary_may_have_either_orientation() -> None:
+    counterclockwise = Environment("a", SQUARE)
+    clockwise = Environment("a", SQUARE[::-1])
+    assert counterclockwise.free_area == clockwise.free_area == 100.0
+    assert clockwise.free.geoms[0].exterior.is_ccw
 
 
-def test_free_space_of_overlapping_and_protruding_obstacles() -> None:
+def test_overlapping_and_protruding_obstacles_are_counted_once() -> None:
     environment = Environment(
         "x",
         SQUARE,
@@ -52,39 +53,41 @@ def test_free_space_of_overlapping_and_protruding_obstacles() -> None:
         ),
     )
     assert environment.free_area == pytest.approx(100 - (10 + 8 - 2) - (4 - 0.5))
-    assert len(environment.free.geoms) == 2, "the hole of the last obstacle is a room of its own"
-    areas = [part.area for part in environment.free.geoms]
+    # The hole of the last obstacle is a separate component.
+    assert len(environment.free.geoms) == 2
+    areas = [component.area for component in environment.free.geoms]
     assert areas == sorted(areas, reverse=True)
 
 
 @pytest.mark.parametrize(
-    ("wall", "first"),
+    ("wall", "lower_left"),
     [((2, 0, 4, 10), (4, 0)), ((6, 0, 8, 10), (0, 0)), ((4, 0, 6, 10), (0, 0)), ((0, 4, 10, 6), (0, 0))],
 )
-def test_of_rooms_the_largest_is_the_first_and_of_equal_ones_the_lower_left(wall, first) -> None:
+def test_components_are_sorted_by_area_and_then_from_the_lower_left(wall, lower_left) -> None:
     corners = shapely.get_coordinates(shapely.box(*wall))[:4].tolist()
     rooms = Environment("rooms", SQUARE, (PolygonObstacle(tuple(map(tuple, corners))),)).free.geoms
-    assert rooms[0].bounds[:2] == first
+    assert rooms[0].bounds[:2] == lower_left
 
 
 def test_another_density_has_other_masses_and_the_same_geometry() -> None:
     plain = Environment("plain", SQUARE)
     assert plain.free_masses.tolist() == [100.0]
-    twin = plain.with_density(Uniform(3.0))
-    assert twin.free is plain.free and twin.free_masses.tolist() == [300.0]
-    assert plain.has_same_geometry(twin)
+    weighted = plain.with_density(Uniform(3.0))
+    assert weighted.free is plain.free
+    assert weighted.free_masses.tolist() == [300.0]
+    assert plain.has_same_geometry(weighted)
     assert not plain.has_same_geometry(Environment("plain", SQUARE, (CircleObstacle((5.0, 5.0), 1.0),)))
 
 
 @settings(max_examples=60)
 @given(st.lists(st.tuples(st.floats(-1, 11), st.floats(-1, 11), st.floats(0.05, 3)), max_size=6))
-def test_free_and_blocked_tile_the_region(discs: list[tuple[float, float, float]]) -> None:
+def test_free_and_blocked_space_tile_the_region(discs: list[tuple[float, float, float]]) -> None:
     environment = Environment("x", SQUARE, tuple(CircleObstacle((x, y), r) for x, y, r in discs))
     assert environment.free_area + environment.blocked.area == pytest.approx(100.0, rel=1e-6)
     assert shapely.intersection(environment.free, environment.blocked).area < 1e-6
 
 
-def test_outside_a_non_convex_boundary_counts_as_an_obstacle(cluttered: Environment) -> None:
+def test_the_region_outside_a_concave_boundary_is_blocked(cluttered: Environment) -> None:
     assert cluttered.region.area == pytest.approx(87.5)
     assert cluttered.blocked.contains(shapely.Point(2.0, 6.0))
 
@@ -98,11 +101,11 @@ def test_starts_are_found_by_name(cluttered: Environment) -> None:
 
 
 def test_environments_are_equal_by_content() -> None:
-    one = Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.5),), extra={"k": [1]})
-    other = Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.5),), extra={"k": [1]})
-    assert one == other
-    assert hash(one) == hash(other)
-    assert one != Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.6),))
+    first = Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.5),), extra={"k": [1]})
+    second = Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.5),), extra={"k": [1]})
+    assert first == second
+    assert hash(first) == hash(second)
+    assert first != Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.6),))
 
 
 def test_region_is_the_convex_hull_without_collinear_vertices() -> None:

@@ -20,14 +20,14 @@ from robocov.errors import MapError
 from robocov.mapfile import build_map_schema, dump_map, from_json, parse_map, to_json
 
 HALL = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
-places = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
-lines = st.lists(places, min_size=2, max_size=6, unique=True).filter(
+points = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
+lines = st.lists(points, min_size=2, max_size=6, unique=True).filter(
     lambda points: np.ptp(np.array(points), axis=0).max() > 0.1
 )
 repeats = st.sampled_from(["loop", "back-and-forth"])
 
 
-def test_a_loop_closes_and_a_line_turns_back() -> None:
+def test_a_loop_closes_and_a_path_back_and_forth_returns() -> None:
     square = ObstaclePath(((0, 0), (2, 0), (2, 1), (0, 1)), 0.5)
     assert square.period == 12.0
     assert square.compute_displacement(0.0).tolist() == [0, 0]
@@ -41,7 +41,7 @@ def test_a_loop_closes_and_a_line_turns_back() -> None:
 
 
 @given(lines, st.floats(0.01, 5), repeats, st.floats(0, 1e4), st.floats(0, 10))
-def test_it_never_goes_faster_than_its_speed_and_comes_back(
+def test_obstacles_keep_their_speed_and_return_after_a_period(
     points: list[tuple[float, float]], speed: float, repeat: Repeat, time: float, later: float
 ) -> None:
     path = ObstaclePath(tuple(points), speed, repeat)
@@ -50,17 +50,19 @@ def test_it_never_goes_faster_than_its_speed_and_comes_back(
     np.testing.assert_allclose(
         path.compute_displacement(time + path.period), path.compute_displacement(time), atol=1e-6
     )
-    # it is on its line
-    at = path.compute_displacement(time) + points[0]
-    ends = [*points, points[0]] if repeat == "loop" else points
-    nearest = min(compute_distance_to_segment(at, np.array(a), np.array(b)) for a, b in pairwise(ends))
-    assert nearest < 1e-8
+    # The obstacle is on its path.
+    position = path.compute_displacement(time) + points[0]
+    vertices = [*points, points[0]] if repeat == "loop" else points
+    distances = [
+        compute_distance_to_segment(position, np.array(a), np.array(b)) for a, b in pairwise(vertices)
+    ]
+    assert min(distances) < 1e-8
 
 
 def compute_distance_to_segment(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     along = b - a
-    part = np.clip(((point - a) @ along) / max(float(along @ along), 1e-300), 0, 1)
-    return float(np.hypot(*(point - a - part * along)))
+    fraction = np.clip(((point - a) @ along) / max(float(along @ along), 1e-300), 0, 1)
+    return float(np.hypot(*(point - a - fraction * along)))
 
 
 def build_moving_hall() -> Environment:
@@ -89,7 +91,8 @@ def test_the_map_at_a_time_has_obstacles_at_their_current_positions() -> None:
     desk, wall = now.obstacles[2:]
     assert isinstance(desk, PolygonObstacle)
     assert isinstance(wall, WallObstacle)
-    assert desk.vertices == ((1, 4), (2, 4), (2, 5))  # after two turns
+    # After two periods the desk is back at its initial position.
+    assert desk.vertices == ((1, 4), (2, 4), (2, 5))
     assert wall.points == ((8, 5), (9, 5))
     for time in (0.0, 1.3, 4.0):
         assert environment.at(time).free_area == pytest.approx(environment.free_area, abs=1e-4)
@@ -105,18 +108,18 @@ def test_periodic_obstacles_return_exactly_including_holes() -> None:
     for turns in range(1, 30):
         assert hall.at(1.0 + turns * path.period) == hall.at(1.0)
     (shape,) = hall.at(1.0).obstacles
-    by = np.round(path.compute_displacement(1.0), 9)
-    assert shape.holes == (tuple((x + by[0], y + by[1]) for x, y in hole),)
+    dx, dy = np.round(path.compute_displacement(1.0), 9)
+    assert shape.holes == (tuple((x + dx, y + dy) for x, y in hole),)
 
 
-def test_where_nothing_moves_the_map_is_always_itself() -> None:
+def test_maps_without_moving_obstacles_do_not_depend_on_time() -> None:
     hall = Environment("hall", HALL, (CircleObstacle((2, 1), 0.5),))
     assert not hall.has_moving_obstacles
     assert hall.at(7.0) is hall
     assert hall.static is hall
 
 
-def test_a_file_keeps_it() -> None:
+def test_written_paths_are_read_unchanged() -> None:
     environment = build_moving_hall()
     assert parse_map(dump_map(environment), "m.json") == environment
     assert to_json(environment)["obstacles"][1]["path"] == {
@@ -163,7 +166,7 @@ def test_mistakes_in_a_path_are_reported(path: object, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_the_schema_knows_paths() -> None:
+def test_the_schema_checks_paths() -> None:
     jsonschema = pytest.importorskip("jsonschema")
     schema = jsonschema.Draft202012Validator(build_map_schema())
     document = to_json(build_moving_hall())

@@ -26,14 +26,15 @@ def test_robots_start_clear_of_walls_and_of_each_other(
         points = cluttered.start(name).sample(n, seed, radius)
     except StartError as error:
         assert f"but {n} were requested" in str(error)
-        assert np.pi * radius**2 * n > 0.5 * np.pi * 0.8**2, "refused though there is room"
+        # Requests are rejected only if there is little space.
+        assert np.pi * radius**2 * n > 0.5 * np.pi * 0.8**2
         return
     assert points.shape == (n, 2)
     shape = shapely.points(points)
     assert shapely.contains(cluttered.free, shape).all()
     assert shapely.distance(cluttered.free.boundary, shape).min() >= radius
-    apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(n)
-    assert n == 1 or apart.min() >= 2 * radius
+    distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(n)
+    assert n == 1 or distances.min() >= 2 * radius
     if name == "corner":
         assert np.hypot(*(points - [1.0, 1.0]).T).max() <= 0.8 + 1e-9
 
@@ -45,19 +46,19 @@ def test_the_same_seed_gives_the_same_positions(cluttered: Environment) -> None:
 
 
 def test_positions_are_those_of_the_last_version(cluttered: Environment) -> None:
-    """Saved studies name starts and seeds: 24 discs that are hard to place say how all of it is drawn."""
+    """Saved studies contain starts and seeds, so positions must not change."""
     start = Start("wide", DiscStart((2.5, 2.5), 1.0), SQUARE)
-    drawn = [[1.9774691843, 2.9420289396], [3.157775734, 2.2890007007], [2.7120956862, 1.5850145627]]
-    np.testing.assert_allclose(start.sample(24, 5)[[0, 11, 23]], drawn, atol=1e-9)
+    expected = [[1.9774691843, 2.9420289396], [3.157775734, 2.2890007007], [2.7120956862, 1.5850145627]]
+    np.testing.assert_allclose(start.sample(24, 5)[[0, 11, 23]], expected, atol=1e-9)
     assert not np.array_equal(start.sample(2, 5), start.sample(3, 5)[:2])
 
 
 def test_a_tight_start_is_filled_by_a_lattice() -> None:
-    """75 discs of radius 0.1 m fill 75 % of a disc of radius 1 m: far more than darts can place."""
+    """75 discs of radius 0.1 m fill 75 % of a disc of radius 1 m. Random darts cannot place so many."""
     start = Start("tight", DiscStart((5.0, 5.0), 0.9), SQUARE)
     points = start.sample(62, seed=0)
-    apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)
-    assert apart.min() >= 0.2
+    distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)
+    assert distances.min() >= 0.2
     with pytest.raises(
         StartError, match=r"start 'tight': room for about \d+ robots of radius 0.1 m, but 200 were requested"
     ):
@@ -67,9 +68,9 @@ def test_a_tight_start_is_filled_by_a_lattice() -> None:
 def test_uniform_starts_cover_the_free_space(cluttered: Environment) -> None:
     points = np.concatenate([cluttered.start("uniform").sample(40, seed) for seed in range(20)])
     quarter = shapely.box(5, 5, 10, 10)
-    share = shapely.contains_xy(quarter, points[:, 0], points[:, 1]).mean()
+    fraction = shapely.contains_xy(quarter, points[:, 0], points[:, 1]).mean()
     expected = cluttered.free.intersection(quarter).area / cluttered.free_area
-    assert share == pytest.approx(expected, abs=0.06)
+    assert fraction == pytest.approx(expected, abs=0.06)
 
 
 @pytest.mark.parametrize(
@@ -91,40 +92,40 @@ def test_given_positions_may_touch_walls_and_each_other() -> None:
     assert len(start.sample(2, radius=0.25)) == 2
 
 
-def test_given_positions_are_taken_in_their_order() -> None:
+def test_given_positions_are_used_in_order() -> None:
     start = Start("given", PointsStart(((1.0, 1.0), (2.0, 1.0), (3.0, 1.0))), SQUARE)
     np.testing.assert_array_equal(start.sample(2, seed=9), [[1.0, 1.0], [2.0, 1.0]])
 
 
-def test_a_start_without_room_says_so() -> None:
+def test_a_start_without_space_is_reported() -> None:
     with pytest.raises(StartError, match=r"start 'slit': no room for a robot of radius 0.1 m"):
         Start("slit", DiscStart((5.0, 5.0), 0.5), shapely.box(0, 4.95, 10, 5.05)).sample(1)
 
 
-@pytest.mark.parametrize("spec", [DiscStart((5.0, 5.0), 0.9), DiscStart((0.0, 0.0), 1.5)])
-def test_the_capacity_of_a_start_does_not_depend_on_the_request(spec: DiscStart) -> None:
-    start = Start("tight", spec, SQUARE)
+@pytest.mark.parametrize("disc", [DiscStart((5.0, 5.0), 0.9), DiscStart((0.0, 0.0), 1.5)])
+def test_the_capacity_of_a_start_does_not_depend_on_the_request(disc: DiscStart) -> None:
+    start = Start("tight", disc, SQUARE)
     capacity = start.estimate_capacity(0.1)
-    assert Start("tight", spec, SQUARE).estimate_capacity(0.1) == capacity
-    told = set()
+    assert Start("tight", disc, SQUARE).estimate_capacity(0.1) == capacity
+    messages = set()
     for n, seed in ((capacity + 10, 0), (capacity + 10, 1), (2 * capacity, 0), (5000, 3)):
-        with pytest.raises(StartError, match=f"room for about {capacity} robots") as refused:
+        with pytest.raises(StartError, match=f"room for about {capacity} robots") as caught:
             start.sample(n, seed, 0.1)
-        told.add(str(refused.value).replace(f"but {n} were", ""))
-    assert len(told) == 1
-    assert "Try fewer or smaller robots, start 'uniform' (room for about" in told.pop()
+        messages.add(str(caught.value).replace(f"but {n} were", ""))
+    assert len(messages) == 1
+    assert "Try fewer or smaller robots, start 'uniform' (room for about" in messages.pop()
     for seed in range(4):
         assert start.sample(capacity, seed, 0.1).shape == (capacity, 2)
 
 
-def test_in_a_narrow_passage_darts_are_counted() -> None:
-    """Lattices lose there; the number is what can be drawn."""
+def test_the_capacity_of_a_narrow_passage_is_that_of_random_darts() -> None:
+    """Lattices hold fewer robots here."""
     start = Start("slit", DiscStart((5.0, 5.0), 4.0), shapely.box(0, 4.85, 10, 5.15))
     capacity = start.estimate_capacity(0.1)
     assert capacity >= 20
     assert len(start.sample(capacity, seed=7)) == capacity
 
 
-def test_a_uniform_start_is_no_way_out_of_itself() -> None:
+def test_a_uniform_start_does_not_suggest_itself() -> None:
     with pytest.raises(StartError, match=r"Try fewer or smaller robots or another map\.$"):
         Start("uniform", UniformStart(), shapely.box(0, 0, 1, 1)).sample(500)

@@ -1,4 +1,4 @@
-"""Where moving obstacles come by, against points that are really carried along."""
+"""The area that a moving obstacle sweeps, compared with the obstacle at many times."""
 
 from __future__ import annotations
 
@@ -26,26 +26,25 @@ POINTS = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=4, unique=Tr
 
 @pytest.mark.slow
 @given(POINTS, st.sampled_from(["loop", "back-and-forth"]))
-def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
+def test_the_swept_area_is_the_union_of_the_obstacle_over_time(points, repeat) -> None:
     path = ObstaclePath(points, 0.5, repeat)
     area = compute_swept_area(FRAME.polygon, path)
     times = np.linspace(0.0, path.period, 200)
-    met = shapely.union_all(
-        [shift_obstacle(FRAME, path.compute_displacement(time)).polygon for time in times]
-    )
-    assert met.difference(area.buffer(1e-6)).area < 1e-6  # nothing is missing
+    shapes = [shift_obstacle(FRAME, path.compute_displacement(time)).polygon for time in times]
+    union = shapely.union_all(shapes)
+    assert union.difference(area.buffer(1e-6)).area < 1e-6
     step = 0.5 * path.period / 199
-    assert area.difference(met.buffer(step + 1e-6)).area < 1e-6  # nor is there more
+    assert area.difference(union.buffer(step + 1e-6)).area < 1e-6
 
 
-def test_what_passes_from_hole_to_hole_is_met() -> None:
+def test_a_bar_between_two_holes_sweeps_them() -> None:
     frame = shapely.box(0, 0, 10, 4) - shapely.box(1, 1, 4, 3) - shapely.box(5, 1, 9, 3)
     area = compute_swept_area(frame, ObstaclePath(((0.0, 0.0), (-2.5, 0.0)), 1.0))
-    assert area.covers(shapely.box(1.5, 1, 4, 3)), "the bar between them comes by"
+    assert area.covers(shapely.box(1.5, 1, 4, 3))
     assert area.area == pytest.approx(12.5 * 4 - 2 * (1.5 - 1 + 9 - 2.5 - 5))
 
 
-def test_a_hole_is_filled_only_as_far_as_its_rim_comes() -> None:
+def test_a_hole_is_swept_only_as_far_as_its_rim_moves() -> None:
     wide = PolygonObstacle(((0, 0), (4, 0), (4, 4), (0, 4)), (((1, 1), (3, 1), (3, 3), (1, 3)),))
     area = compute_swept_area(wide.polygon, ObstaclePath(((0, 0), (0.5, 0)), 1.0))
     assert area.area == pytest.approx(4.5 * 4 - 1.5 * 2)
@@ -53,25 +52,27 @@ def test_a_hole_is_filled_only_as_far_as_its_rim_comes() -> None:
 
 @pytest.mark.parametrize("points", [(), ((1, 1),), ((1, 1), (1, 1))])
 @pytest.mark.parametrize("repeat", ["loop", "back-and-forth"])
-def test_a_path_that_leads_nowhere_leaves_it_where_it_is(points, repeat) -> None:
+def test_a_path_without_length_sweeps_only_the_obstacle(points, repeat) -> None:
     assert compute_swept_area(FRAME.polygon, ObstaclePath(points, 1.0, repeat)).equals(FRAME.polygon)
 
 
-def test_what_is_only_touched_is_not_in_the_way() -> None:
+def test_obstacles_that_only_touch_the_swept_area_do_not_overlap_it() -> None:
     area = compute_swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
     others = {
-        "before": shapely.box(2, -0.1, 2.2, 0.1),
-        "beside": shapely.box(1, 0.5, 2, 1),
-        "off": shapely.box(8, 8, 9, 9),
+        "on the path": shapely.box(2, -0.1, 2.2, 0.1),
+        "touching": shapely.box(1, 0.5, 2, 1),
+        "distant": shapely.box(8, 8, 9, 9),
     }
-    met, beyond = find_overlaps(area, others)
-    assert list(met) == ["before"] and beyond is None
-    assert met["before"].equals(others["before"])
+    overlaps, area_outside = find_overlaps(area, others)
+    assert list(overlaps) == ["on the path"]
+    assert area_outside is None
+    assert overlaps["on the path"].equals(others["on the path"])
     assert find_overlaps(area, {}) == ({}, None)
 
 
 def test_obstacles_that_leave_the_boundary_are_reported() -> None:
     area = compute_swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
-    _, beyond = find_overlaps(area, {}, shapely.box(-1, -1, 4, 1))
-    assert beyond is not None and beyond.bounds == pytest.approx((4.0, -0.5, 4.5, 0.5), abs=1e-2)
+    _, area_outside = find_overlaps(area, {}, shapely.box(-1, -1, 4, 1))
+    assert area_outside is not None
+    assert area_outside.bounds == pytest.approx((4.0, -0.5, 4.5, 0.5), abs=1e-2)
     assert find_overlaps(area, {}, shapely.box(-1, -1, 5, 1)) == ({}, None)

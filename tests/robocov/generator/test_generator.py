@@ -22,8 +22,8 @@ from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov.mapfile.check import check_map
 
 SIDES = st.sampled_from([8.0, 10, 12.5, 20.0])
-ASKED = {
-    # what there is always a layout for
+REQUEST_RANGES = {
+    # A layout exists for all numbers of obstacles and areas in these ranges.
     "polygons": (st.integers(1, 8), st.floats(0.03, 0.18)),
     "blocks": (st.integers(1, 16), st.floats(0.1, 0.3)),
     "rooms": (st.integers(1, 9), st.floats(0.04, 0.15)),
@@ -35,7 +35,7 @@ ASKED = {
 @st.composite
 def draw_requests(draw):
     kind = draw(st.sampled_from(list(GENERATORS)))
-    count, area = ASKED[kind]
+    count, area = REQUEST_RANGES[kind]
     return {
         "seed": draw(st.integers(0, 2**40)),
         "kind": kind,
@@ -57,8 +57,17 @@ def list_coordinates(environment):
         else:
             yield from (*obstacle.center, obstacle.radius)
     for start in ("corner", "centre"):
-        spec = environment.starts[start]
-        yield from (*spec.center, spec.radius)
+        disc = environment.starts[start]
+        yield from (*disc.center, disc.radius)
+
+
+def assert_obstacles_are_apart(environment, gap):
+    """Assert that obstacles keep a distance from each other and from the boundary."""
+    boundary = environment.boundary_polygon
+    shapes = [obstacle.polygon for obstacle in environment.obstacles]
+    assert all(first.distance(second) >= gap - 1e-9 for first, second in combinations(shapes, 2))
+    assert all(shape.distance(boundary.exterior) >= gap - 1e-9 for shape in shapes)
+    assert all(boundary.contains(shape) for shape in shapes)
 
 
 @settings(max_examples=160)
@@ -67,28 +76,28 @@ def list_coordinates(environment):
 @example({"seed": 3, "kind": "blocks", "obstacles": 12, "area": 0.45, "gap": 0.5, "side": 10})
 @example({"seed": 3, "kind": "rooms", "obstacles": 12, "area": 0.15, "gap": 0.6, "side": 10.0})
 @example({"seed": 1, "kind": "polygons", "obstacles": 3, "area": 0.1, "gap": 0.25, "side": 1.5})
-def test_maps_have_the_requested_properties(words):
-    environment = generate_map(**words)
-    gap = words["gap"]
-    width, height = words.get("width", words.get("side")), words.get("height", words.get("side"))
-    whole = shapely.box(0, 0, width, height)
-    assert environment.boundary_polygon.equals(whole)
+def test_maps_have_the_requested_properties(request_parameters):
+    environment = generate_map(**request_parameters)
+    gap = request_parameters["gap"]
+    side = request_parameters.get("side")
+    width = request_parameters.get("width", side)
+    height = request_parameters.get("height", side)
+    boundary = shapely.box(0, 0, width, height)
+    assert environment.boundary_polygon.equals(boundary)
 
-    solid = shapely.union_all([obstacle.polygon for obstacle in environment.obstacles]) & whole
-    assert solid.area / whole.area == pytest.approx(words["area"], abs=AREA_TOLERANCE + 1e-6)
+    solid = shapely.union_all([obstacle.polygon for obstacle in environment.obstacles]) & boundary
+    area = request_parameters["area"]
+    assert solid.area / boundary.area == pytest.approx(area, abs=AREA_TOLERANCE + 1e-6)
 
-    # a disc as wide as the gap gets everywhere, and round every obstacle: nothing closes as it grows
+    # A disc as wide as the gap can move everywhere and around every obstacle.
     (free,) = environment.free.geoms
     for radius in (0.102, gap / 2 - 1e-5):
         room = free.buffer(-radius)
         assert isinstance(room, shapely.Polygon)
         assert len(room.interiors) == len(free.interiors)
-    if words["kind"] in ("polygons", "blocks"):
-        assert len(environment.obstacles) == words["obstacles"]
-        shapes = [obstacle.polygon for obstacle in environment.obstacles]
-        assert all(one.distance(other) >= gap - 1e-9 for one, other in combinations(shapes, 2))
-        assert all(shape.distance(whole.exterior) >= gap - 1e-9 for shape in shapes)
-        assert all(whole.contains(shape) for shape in shapes)
+    if request_parameters["kind"] in ("polygons", "blocks"):
+        assert len(environment.obstacles) == request_parameters["obstacles"]
+        assert_obstacles_are_apart(environment, gap)
 
     report = check_map(environment)
     assert report.warnings == ()
@@ -108,18 +117,19 @@ def test_maps_may_be_large(kind):
 
 @settings(max_examples=20)
 @given(draw_requests())
-def test_saved_maps_are_the_same(tmp_path_factory, words):
-    environment = generate_map(**words)
+def test_saved_maps_are_loaded_unchanged(tmp_path_factory, request_parameters):
+    environment = generate_map(**request_parameters)
     path = tmp_path_factory.mktemp("maps") / "generated.json"
     save_map(environment, path)
     assert load_map(path) == environment
     assert environment.extra["generator"] == {
-        **{key: words[key] for key in ("kind", "seed", "obstacles", "area")},
-        **{f"{key}_m": words[key] for key in ("gap", "width", "height")},
+        **{key: request_parameters[key] for key in ("kind", "seed", "obstacles", "area")},
+        **{f"{key}_m": request_parameters[key] for key in ("gap", "width", "height")},
     }
-    assert str(words["seed"]) in environment.name
-    for word in (words["kind"], f"seed {words['seed']}", f"{words['gap']:g} m"):
-        assert word in f"{environment.name} {environment.description}"
+    seed = request_parameters["seed"]
+    assert str(seed) in environment.name
+    for text in (request_parameters["kind"], f"seed {seed}", f"{request_parameters['gap']:g} m"):
+        assert text in f"{environment.name} {environment.description}"
 
 
 @pytest.mark.slow
@@ -129,15 +139,15 @@ def test_starts_have_room_for_a_team(kind):
         environment = generate_map(seed, kind=kind)
         corner = environment.starts["corner"]
         assert environment.free.contains(shapely.Point(corner.center).buffer(corner.radius))
-        off = np.abs(np.array(corner.center) - [[0, 0], [10, 0], [0, 10], [10, 10]]).max(axis=1)
-        assert corner.radius < off.min() <= 1.3
-        middle = np.hypot(*(np.array(environment.starts["centre"].center) - 5.0))
-        assert middle <= 3.0 * np.sqrt(2.0) + 0.01
+        offsets = np.array(corner.center) - [[0, 0], [10, 0], [0, 10], [10, 10]]
+        assert corner.radius < np.abs(offsets).max(axis=1).min() <= 1.3
+        center_distance = np.hypot(*(np.array(environment.starts["centre"].center) - 5.0))
+        assert center_distance <= 3.0 * np.sqrt(2.0) + 0.01
         for name in environment.starts:
             assert environment.start(name).sample(8, seed=seed).shape == (8, 2)
 
 
-def test_the_same_seed_gives_the_same_map_and_another_seed_another():
+def test_equal_seeds_give_equal_maps_and_different_seeds_different_ones():
     for kind in GENERATORS:
         maps = [generate_map(seed, kind=kind) for seed in range(3)]
         assert [generate_map(seed, kind=kind) for seed in range(3)] == maps
@@ -149,7 +159,7 @@ def compute_digest(environment):
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
+    ("parameters", "expected"),
     [
         ({"seed": 3, "kind": "polygons"}, "0ab3e86eeef56acd"),
         ({"seed": 11, "kind": "polygons"}, "dec3ebd69dcb27a0"),
@@ -188,9 +198,9 @@ def compute_digest(environment):
         ),
     ],
 )
-def test_maps_of_earlier_studies_do_not_change(words, expected):
-    """Bit for bit: a seed in a paper must give the same map in every version."""
-    assert compute_digest(generate_map(**words)) == expected
+def test_maps_of_earlier_studies_do_not_change(parameters, expected):
+    """A seed in a paper must give the same map in every version, bit for bit."""
+    assert compute_digest(generate_map(**parameters)) == expected
 
 
 @pytest.mark.slow
@@ -201,18 +211,16 @@ def test_maps_do_not_depend_on_the_process():
         "from robocov.mapfile import dump_map\n"
         "sys.stdout.write(''.join(dump_map(generate_map(5, kind=kind)) for kind in GENERATORS))"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == "".join(dump_map(generate_map(5, kind=kind)) for kind in GENERATORS)
+    process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert process.stdout == "".join(dump_map(generate_map(5, kind=kind)) for kind in GENERATORS)
 
 
 def test_parameters_may_be_numpy_scalars():
     plain = generate_map(4, obstacles=5, area=0.125, gap=0.5, side=8.0)
-    assert (
-        generate_map(
-            np.int64(4), obstacles=np.int32(5), area=np.float64(0.125), gap=np.float32(0.5), side=np.int64(8)
-        )
-        == plain
+    environment = generate_map(
+        np.int64(4), obstacles=np.int32(5), area=np.float64(0.125), gap=np.float32(0.5), side=np.int64(8)
     )
+    assert environment == plain
 
 
 @pytest.mark.slow
@@ -220,9 +228,9 @@ def test_the_shapes_of_polygons_are_mixed():
     counts = {"convex": 0, 6: 0, 8: 0}
     for seed in range(60):
         for obstacle in generate_map(seed, obstacles=5, area=0.2).obstacles:
-            convex = obstacle.polygon.convex_hull.area - obstacle.polygon.area < 0.05
-            counts["convex" if convex else len(obstacle.vertices)] += 1
-    # of 300, with chances of 0.6, 0.2 and 0.2
+            is_convex = obstacle.polygon.convex_hull.area - obstacle.polygon.area < 0.05
+            counts["convex" if is_convex else len(obstacle.vertices)] += 1
+    # The probabilities for each of 300 polygons are 0.6, 0.2 and 0.2.
     assert 150 < counts["convex"] < 210
     assert 35 < counts[6] < 95
     assert 30 < counts[8] < 85
@@ -241,7 +249,7 @@ def test_rooms_have_walls_doors_and_furniture():
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("parameters", "message"),
     [
         ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
         ({"seed": 1.5}, "seed: expected a whole number of at least 0, got 1.5"),
@@ -260,14 +268,14 @@ def test_rooms_have_walls_doors_and_furniture():
         ({"height": None, "side": True}, "side: expected a number from 1 to 1000, got True"),
     ],
 )
-def test_parameters_out_of_range_are_named(words, message):
+def test_parameters_out_of_range_are_named(parameters, message):
     with pytest.raises(ParameterError) as caught:
-        generate_map(**{"seed": 0, **words})
+        generate_map(**{"seed": 0, **parameters})
     assert str(caught.value).startswith(message)
 
 
 @pytest.mark.parametrize(
-    "words",
+    "parameters",
     [
         {"kind": "polygons", "obstacles": 200, "area": 0.5},
         pytest.param({"kind": "polygons", "obstacles": 12, "area": 0.35}, marks=pytest.mark.slow),
@@ -280,53 +288,57 @@ def test_parameters_out_of_range_are_named(words, message):
         {"kind": "caves", "obstacles": 4, "area": 0.02},
     ],
 )
-def test_impossible_requests_are_rejected(words):
+def test_impossible_requests_are_rejected(parameters):
     with pytest.raises(ParameterError) as caught:
-        generate_map(0, **words)
+        generate_map(0, **parameters)
     assert str(caught.value).startswith(
-        f"area: no layout of {words['obstacles']} {GENERATORS[words['kind']].counted} was found "
-        f"that blocks {words['area']:g} of "
+        f"area: no layout of {parameters['obstacles']} {GENERATORS[parameters['kind']].counted} was found "
+        f"that blocks {parameters['area']:g} of "
     )
 
 
-def square(x, y, side=1.0):
+def build_square(x, y, side=1.0):
     return PolygonObstacle(((x, y), (x + side, y), (x + side, y + side), (x, y + side)))
 
 
 @pytest.mark.parametrize(
-    ("layout", "area", "good"),
+    ("layout", "area", "is_valid"),
     [
-        ([square(3, 3), square(4.6, 3)], 0.02, True),
-        ([square(3, 3), square(4.5, 3)], 0.02, False),  # a narrow gap
-        ([square(3, 3), square(6, 3, 1.3)], 0.02, False),  # too much
-        ([square(3, 3), square(6, 3, 0.5)], 0.02, False),  # too little
-        ([square(3, 3), square(3.5, 3), square(3, 3.5)], 0.03, False),  # overlaps do not count twice
-        ([square(3, 3), square(3.5, 3), square(3, 3.5)], 0.0175, True),
-        ([square(3, 3), PolygonObstacle(((6, 6), (7, 7), (7, 6), (6, 7)))], 0.015, False),  # not valid
+        ([build_square(3, 3), build_square(4.6, 3)], 0.02, True),
+        ([build_square(3, 3), build_square(4.5, 3)], 0.02, False),  # a narrow gap
+        ([build_square(3, 3), build_square(6, 3, 1.3)], 0.02, False),  # too much
+        ([build_square(3, 3), build_square(6, 3, 0.5)], 0.02, False),  # too little
+        (
+            [build_square(3, 3), build_square(3.5, 3), build_square(3, 3.5)],
+            0.03,
+            False,
+        ),  # overlaps count once
+        ([build_square(3, 3), build_square(3.5, 3), build_square(3, 3.5)], 0.0175, True),
+        ([build_square(3, 3), PolygonObstacle(((6, 6), (7, 7), (7, 6), (6, 7)))], 0.015, False),  # not valid
         ([WallObstacle(((4.8, 0), (4.8, 10)), 0.2)], 0.02, False),  # two components
         ([WallObstacle(((4.8, 0), (4.8, 9.41)), 0.2)], 0.02, False),
         ([WallObstacle(((4.8, 0), (4.8, 9.39)), 0.2)], 0.02, True),
         (None, 0.02, False),
     ],
 )
-def test_layouts_of_registered_kinds_are_checked(layout, area, good, monkeypatch):
-    drawn = []
+def test_layouts_of_registered_kinds_are_checked(layout, area, is_valid, monkeypatch):
+    numbers = []
 
     def build_layout(request, corner, rng):
-        drawn.append(rng.random())
+        numbers.append(rng.random())
         return layout
 
-    mine = replace(GENERATORS["polygons"], layout=build_layout, counted="things")
-    monkeypatch.setitem(generator.GENERATORS, "mine", mine)
-    if good:
-        environment = generate_map(0, kind="mine", area=area)
+    custom_kind = replace(GENERATORS["polygons"], layout=build_layout, counted="blocks")
+    monkeypatch.setitem(generator.GENERATORS, "custom", custom_kind)
+    if is_valid:
+        environment = generate_map(0, kind="custom", area=area)
         assert environment.obstacles == tuple(layout)
-        assert environment.name == "mine 0"
+        assert environment.name == "custom 0"
     else:
-        with pytest.raises(ParameterError, match="of 6 things was found"):
-            generate_map(0, kind="mine", area=area)
-        # every attempt has random numbers of its own
-        assert len(set(drawn)) == len(drawn) > 1
+        with pytest.raises(ParameterError, match="of 6 blocks was found"):
+            generate_map(0, kind="custom", area=area)
+        # Each attempt has different random numbers.
+        assert len(set(numbers)) == len(numbers) > 1
 
 
 def test_every_kind_has_a_description_of_one_line():

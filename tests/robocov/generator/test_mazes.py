@@ -17,6 +17,7 @@ from robocov.generator.mazes import find_inner_walls, grow_passages, trace_trail
 
 
 def count_components(count: int, pairs: list[tuple[int, int]]) -> int:
+    """Return the number of connected components of `count` nodes that are joined in pairs."""
     group = list(range(count))
     for i, j in pairs:
         group = [group[i] if number == group[j] else number for number in group]
@@ -35,40 +36,52 @@ def test_passages_connect_all_cells_without_loops(columns: int, rows: int, seed:
     pairs = []
     for i, k, right in np.argwhere(passages).tolist():
         # A vertical wall is between a cell and the one to its left.
-        other = (i, k - 1) if right else (i - 1, k)
-        pairs.append((number[i, k], number[other]))
+        neighbor = (i, k - 1) if right else (i - 1, k)
+        pairs.append((number[i, k], number[neighbor]))
     assert count_components(columns * rows, pairs) == 1
 
 
-@settings(max_examples=60)
-@given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), max_size=40))
-def test_trails_contain_every_wall_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
-    pieces = {((x, y), (x + 1, y) if flat else (x, y + 1)) for x, y, flat in drawn}
+def build_forest(pieces: set) -> set:
+    """Return pieces of walls without closed rings, since no maze encloses a cell."""
     posts = sorted({post for piece in pieces for post in piece})
-    # No maze has closed rings, which would enclose cells.
     forest: set = set()
     for piece in sorted(pieces):
         pairs = [(posts.index(a), posts.index(b)) for a, b in (*forest, piece)]
         if count_components(len(posts), pairs) == len(posts) - len(pairs):
             forest.add(piece)
-    found = []
+    return forest
+
+
+def split_into_pieces(trail: list[tuple[int, int]]) -> list[tuple]:
+    """Return the pieces of walls between adjacent posts along a trail."""
+    pieces = []
+    for (x, y), (u, v) in itertools.pairwise(trail):
+        assert (x == u) != (y == v)
+        steps = max(abs(u - x), abs(v - y))
+        line = [(x + (u - x) * k // steps, y + (v - y) * k // steps) for k in range(steps + 1)]
+        pieces += [tuple(sorted(pair)) for pair in itertools.pairwise(line)]
+    return pieces
+
+
+@settings(max_examples=60)
+@given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), max_size=40))
+def test_trails_contain_every_wall_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
+    forest = build_forest({((x, y), (x + 1, y) if flat else (x, y + 1)) for x, y, flat in drawn})
+    pieces = []
     walls = np.zeros((7, 7, 2), dtype=bool)
     for (x, y), (u, _) in forest:
         walls[x, y, u - x] = True
     for trail in trace_trails(walls):
-        for (x, y), (u, v) in itertools.pairwise(trail):
-            assert (x == u) != (y == v)
-            steps = max(abs(u - x), abs(v - y))
-            line = [(x + (u - x) * k // steps, y + (v - y) * k // steps) for k in range(steps + 1)]
-            found += [tuple(sorted(pair)) for pair in itertools.pairwise(line)]
+        pieces += split_into_pieces(trail)
         # There is a bend at every post between the ends.
         for a, b, c in zip(trail, trail[1:], trail[2:], strict=False):
             assert (b[0] - a[0]) * (c[1] - b[1]) != (b[1] - a[1]) * (c[0] - b[0])
-    assert len(found) == len(set(found))
-    assert set(found) == forest
+    assert len(pieces) == len(set(pieces))
+    assert set(pieces) == forest
 
 
-def corridors(environment: Environment) -> tuple[float, set[float]]:
+def summarize_walls(environment: Environment) -> tuple[int, set[float]]:
+    """Return the number of walls and their widths."""
     walls = [wall for wall in environment.obstacles if isinstance(wall, WallObstacle)]
     assert len(walls) == len(environment.obstacles)
     return len(walls), {wall.width for wall in walls}
@@ -77,7 +90,7 @@ def corridors(environment: Environment) -> tuple[float, set[float]]:
 @pytest.mark.parametrize("seed", range(8))
 def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> None:
     environment = generate_map(seed, kind="mazes", obstacles=64, area=0.15)
-    count, (thickness,) = corridors(environment)
+    count, (thickness,) = summarize_walls(environment)
     gap = find_narrowest_gap(environment.free)
     assert gap is not None
     # Eight corridors and seven walls side by side, on whole centimeters.
@@ -94,17 +107,14 @@ def test_mazes_have_dead_ends_and_loops() -> None:
         # The free space has one hole for each loop.
         assert 1 <= len(free.interiors) <= 8
         (thickness,) = {wall.width for wall in environment.obstacles}  # type: ignore[union-attr]
-        lines = [(10.0 + thickness) / 6 * k - thickness / 2.0 for k in range(7)]
-        middle = (np.array(lines[1:]) + lines[:-1]) / 2.0
+        pitch = (10.0 + thickness) / 6
+        centers = pitch * (np.arange(6) + 0.5) - thickness / 2.0
         solid = shapely.union_all([wall.polygon for wall in environment.obstacles])
-        pitch, inside = (10.0 + thickness) / 6, shapely.box(0, 0, 10, 10)
+        blocked = solid.buffer(0.02) | (shapely.box(-1, -1, 11, 11) - shapely.box(0, 0, 10, 10))
         sides = pitch / 2.0 * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
         walls_around = [
-            sum(
-                solid.buffer(0.02).contains(Point(side)) or not inside.contains(Point(side))
-                for side in at + sides
-            )
-            for at in map(np.array, itertools.product(middle, middle))
+            int(shapely.contains_xy(blocked, *(center + sides).T).sum())
+            for center in np.stack(np.meshgrid(centers, centers), axis=-1).reshape(-1, 2)
         ]
         assert walls_around.count(4) == 0
         assert walls_around.count(3) >= 1
@@ -117,7 +127,7 @@ def test_mazes_have_dead_ends_and_loops() -> None:
 def test_the_grid_has_about_the_requested_number_of_cells(
     obstacles: int, width: float, height: float, cells: tuple[int, int]
 ) -> None:
-    found: tuple[set[int], set[int]] = (set(), set())
+    lines: tuple[set[int], set[int]] = (set(), set())
     for seed in range(6):
         environment = generate_map(
             seed, kind="mazes", obstacles=obstacles, area=0.1, width=width, height=height
@@ -129,8 +139,8 @@ def test_the_grid_has_about_the_requested_number_of_cells(
                 pitch = ((width, height)[axis] + wall.width) / cells[axis]  # type: ignore[union-attr]
                 line = (a[axis] + wall.width / 2.0) / pitch  # type: ignore[union-attr]
                 assert line == pytest.approx(round(line), abs=0.01)
-                found[axis].add(round(line))
-    assert found == (set(range(1, cells[0])), set(range(1, cells[1])))
+                lines[axis].add(round(line))
+    assert lines == (set(range(1, cells[0])), set(range(1, cells[1])))
 
 
 @pytest.mark.slow

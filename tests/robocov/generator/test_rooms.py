@@ -12,6 +12,16 @@ from robocov.generator.rooms import draw_floor_plan
 THICKNESS = 0.1
 
 
+def list_rooms_reached_from_the_first(plan):
+    """Return the indices of the rooms that doors connect to the first one."""
+    reached = {0}
+    for _ in plan.rooms:
+        for door in plan.doors:
+            if reached & set(door.rooms):
+                reached.update(door.rooms)
+    return reached
+
+
 @given(st.integers(0, 2**32), st.integers(1, 30), st.floats(0.3, 0.8), st.sampled_from([10, 15.5, 24.0]))
 def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
     request = Request(count, 0.1, gap, width, 12.0)
@@ -24,10 +34,7 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
     # A disc as wide as the gap fits into every room without its walls.
     assert all(min(room.sides) - THICKNESS >= gap for room in plan.rooms)
 
-    reached = {0}
-    for _ in plan.rooms:
-        reached |= {room for door in plan.doors for room in door.rooms if reached & set(door.rooms)}
-    assert len(reached) == count
+    assert len(list_rooms_reached_from_the_first(plan)) == count
 
     solid = shapely.union_all([wall.polygon for wall in plan.build_walls()])
     for door in plan.doors:
@@ -35,10 +42,10 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
         opening = door.wall.build_piece(door.start, door.end, THICKNESS).polygon
         assert opening.area == pytest.approx((door.end - door.start) * THICKNESS)
         assert opening.intersection(solid).area < 1e-9
-        one, other = (rooms[k] for k in door.rooms)
-        # Half of the opening lies in either room.
-        assert opening.intersection(one).area == pytest.approx(opening.area / 2)
-        assert opening.intersection(other).area == pytest.approx(opening.area / 2)
+        # Half of the opening lies in each of the two rooms.
+        first, second = door.rooms
+        assert opening.intersection(rooms[first]).area == pytest.approx(opening.area / 2)
+        assert opening.intersection(rooms[second]).area == pytest.approx(opening.area / 2)
     # Only doors connect the rooms.
     openings = [
         door.wall.build_piece(door.start, door.end, THICKNESS).polygon.buffer(1e-9) for door in plan.doors
@@ -47,16 +54,16 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
     assert len(shapely.get_parts(closed)) == count
 
 
-def test_some_plans_have_a_corridor():
+def test_about_half_of_the_plans_have_a_corridor():
     request = Request(8, 0.1, 0.6, 12.0, 10.0)
     plans = [draw_floor_plan(request, THICKNESS, np.random.default_rng(seed)) for seed in range(60)]
-    through = [
+    has_corridor = [
         any(room.sides[0] == 12.0 and room.sides[1] < 1.6 for room in plan.rooms)
         for plan in plans
         if plan is not None
     ]
-    assert len(through) > 50
-    assert 0.25 < np.mean(through) < 0.75
+    assert len(has_corridor) > 50
+    assert 0.25 < np.mean(has_corridor) < 0.75
 
 
 def test_there_is_no_plan_if_rooms_would_be_too_small():

@@ -1,4 +1,4 @@
-"""Every bundled map is clean, reads well and has room for its teams."""
+"""Bundled maps have no warnings, readable descriptions and space for teams."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from robocov.mapfile import build_map_schema, dump_map, list_bundled_maps, load_
 from robocov.mapfile.check import check_map
 
 NAMES = sorted(list_bundled_maps())
-NARROW = {"gaps": 0.3}
+MIN_GAPS = {"gaps": 0.3}
+"""Widths of the narrowest gaps of maps with narrow gaps on purpose, m."""
 
 
-def test_the_maps_that_the_documentation_names() -> None:
+def test_all_maps_in_the_documentation_are_bundled() -> None:
     assert {
         "square", "pentagon", "blocks-a", "blocks-b", "rooms", "office", "city", "trap", "warehouse",
         "l-shape", "courtyard", "corridor", "gaps", "campus",
@@ -25,16 +26,16 @@ def test_the_maps_that_the_documentation_names() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_clean(name: str) -> None:
+def test_bundled_maps_have_no_warnings(name: str) -> None:
     report = check_map(load_map(name))
     assert report.warnings == ()
     assert len(report.components) == 1
     if report.narrowest_gap is not None:
-        assert report.narrowest_gap.width >= NARROW.get(name, 0.5) - 1e-9
+        assert report.narrowest_gap.width >= MIN_GAPS.get(name, 0.5) - 1e-9
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_described(name: str) -> None:
+def test_bundled_maps_have_names_descriptions_and_starts(name: str) -> None:
     environment = load_map(name)
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", name)
     assert environment.name.lower().replace(" ", "-") == name
@@ -45,7 +46,7 @@ def test_it_is_described(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_in_the_form_that_the_editor_writes(name: str) -> None:
+def test_bundled_maps_are_formatted_like_written_maps(name: str) -> None:
     text = list_bundled_maps()[name].read_text(encoding="utf-8")
     assert dump_map(load_map(name)) == text
     assert max(len(line) for line in text.splitlines()) < 1000
@@ -53,7 +54,7 @@ def test_it_is_in_the_form_that_the_editor_writes(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_six_robots_fit_at_every_start_and_see_clear_of_walls(name: str) -> None:
+def test_six_robots_fit_at_every_start_clear_of_walls(name: str) -> None:
     environment = load_map(name)
     for start in environment.starts:
         points = shapely.points(environment.start(start).sample(6, seed=1))
@@ -75,21 +76,22 @@ def test_every_kind_of_obstacle_occurs() -> None:
     assert any(isinstance(obstacle, PolygonObstacle) and obstacle.holes for obstacle in obstacles)
 
 
-def test_which_are_convex() -> None:
+def test_only_two_maps_are_convex() -> None:
     for name in NAMES:
         environment = load_map(name)
-        free_of_obstacles = environment.region.area - environment.free_area < 1e-9
-        assert free_of_obstacles == (name in {"square", "pentagon"}), name
+        is_convex = environment.region.area - environment.free_area < 1e-9
+        assert is_convex == (name in {"square", "pentagon"}), name
     assert load_map("l-shape").area < load_map("l-shape").region.area
 
 
 def test_the_two_block_maps_share_their_given_starts() -> None:
-    first, second = load_map("blocks-a"), load_map("blocks-b")
+    first = load_map("blocks-a")
+    second = load_map("blocks-b")
     for name in ("paper", "other"):
-        spec = first.starts[name]
-        assert isinstance(spec, PointsStart)
-        assert len(spec.positions) == 6
-        assert second.starts[name] == spec
+        start = first.starts[name]
+        assert isinstance(start, PointsStart)
+        assert len(start.positions) == 6
+        assert second.starts[name] == start
     assert first.starts["paper"] != first.starts["other"]
     assert first.region.bounds == second.region.bounds == (0.0, 0.0, 10.0, 10.0)
     for environment in (first, second):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from example_map import DOCUMENT, SCHEMA, changed
+from example_map import DOCUMENT, SCHEMA, edit
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
@@ -74,8 +74,9 @@ def test_a_byte_order_mark_is_ignored() -> None:
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_boundary_may_have_either_orientation_and_be_closed(order: int) -> None:
     ring = DOCUMENT["boundary"][::order]
-    for given_ring in (ring, [*ring, ring[0]]):
-        environment = from_json(changed("boundary", given_ring))
+    closed_ring = [*ring, ring[0]]
+    for boundary in (ring, closed_ring):
+        environment = from_json(edit("boundary", boundary))
         assert environment.area == 60.0
         assert from_json(to_json(environment)) == environment
 
@@ -100,15 +101,15 @@ def test_the_document_is_not_shared_with_the_environment() -> None:
 # Round trips
 
 
-def is_close(one: Any, other: Any) -> bool:
-    """Return whether two documents say the same but for rounding errors of numbers."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        return list(one) == list(other) and all(is_close(one[key], other[key]) for key in one)
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(is_close, one, other))
-    if isinstance(one, float) or isinstance(other, float):
-        return math.isclose(one, other, rel_tol=1e-14, abs_tol=1e-14)
-    return bool(one == other)
+def is_close(first: Any, second: Any) -> bool:
+    """Return whether two documents are equal up to rounding errors of numbers."""
+    if isinstance(first, dict) and isinstance(second, dict):
+        return list(first) == list(second) and all(is_close(first[key], second[key]) for key in first)
+    if isinstance(first, list) and isinstance(second, list):
+        return len(first) == len(second) and all(map(is_close, first, second))
+    if isinstance(first, float) or isinstance(second, float):
+        return math.isclose(first, second, rel_tol=1e-14, abs_tol=1e-14)
+    return bool(first == second)
 
 
 coordinates = st.floats(-12.0, 12.0).map(lambda value: round(value, 9)) | st.integers(-12, 12)
@@ -122,7 +123,7 @@ json_values = st.recursive(
 
 @st.composite
 def rings(draw: st.DrawFn, center: tuple[float, float], low: float, high: float) -> list[list[float]]:
-    """Draw a star-shaped ring: one vertex in each of some sectors, so that it never crosses itself."""
+    """Draw a star-shaped ring with one vertex in each sector, so that it does not cross itself."""
     count = draw(st.integers(4, 8))
     ring = []
     for k in range(count):
@@ -135,7 +136,8 @@ def rings(draw: st.DrawFn, center: tuple[float, float], low: float, high: float)
 @st.composite
 def obstacle_documents(draw: st.DrawFn) -> dict[str, Any]:
     kind = draw(st.sampled_from(["polygon", "circle", "wall"]))
-    x, y = draw(coordinates), draw(coordinates)
+    x = draw(coordinates)
+    y = draw(coordinates)
     document: dict[str, Any] = {"kind": kind}
     if kind == "polygon":
         ring = draw(rings((x, y), 0.2, 2.0))
@@ -181,7 +183,7 @@ def environments(draw: st.DrawFn) -> Environment:
     try:
         return from_json(document)
     except MapError as error:
-        # whether a start happens to be free, and a wall to have a length, is left to chance
+        # Starts may be blocked and walls may have no length by chance.
         reason = str(error)
     by_chance = reason.startswith("map: starts") or "at least 1 mm" in reason
     assume(not by_chance)
@@ -192,12 +194,12 @@ def environments(draw: st.DrawFn) -> Environment:
 @given(environments())
 def test_written_maps_are_read_unchanged(environment: Environment) -> None:
     text = dump_map(environment)
-    again = parse_map(text.encode(), "again")
-    assert is_close(to_json(again), to_json(environment))
-    assert parse_map(dump_map(again), "once more") == again
-    assert list(again.starts) == list(environment.starts)
-    assert list(again.extra) == list(environment.extra)
-    assert dump_map(again) == text
+    loaded = parse_map(text.encode(), "loaded")
+    assert is_close(to_json(loaded), to_json(environment))
+    assert parse_map(dump_map(loaded), "reloaded") == loaded
+    assert list(loaded.starts) == list(environment.starts)
+    assert list(loaded.extra) == list(environment.extra)
+    assert dump_map(loaded) == text
     assert from_json(to_json(environment)) == environment
     SCHEMA.validate(json.loads(text))
 
@@ -206,7 +208,7 @@ def test_a_document_is_written_back_unchanged() -> None:
     assert to_json(from_json(DOCUMENT)) == DOCUMENT
 
 
-def test_the_layout_of_a_written_map() -> None:
+def test_written_maps_have_one_line_for_each_object() -> None:
     lines = dump_map(from_json(DOCUMENT)).splitlines()
     assert '  "boundary": [[0, 0], [10, 0], [10, 6], [0, 6]],' in lines
     assert '    {"kind": "circle", "center": [7, 2], "radius": 0.5},' in lines
@@ -242,13 +244,14 @@ ROUND: dict[str, Any] = {
         ("starts", "given", "positions", 0),
     ],
 )
-@pytest.mark.parametrize("off", [0.001, 1e-9, 0.0123456789])
-def test_a_moved_vertex_changes_one_line(path: tuple[Any, ...], off: float) -> None:
+@pytest.mark.parametrize("shift", [0.001, 1e-9, 0.0123456789])
+def test_a_moved_vertex_changes_one_line(path: tuple[Any, ...], shift: float) -> None:
     value: Any = ROUND
-    for step in path:
-        value = value[step]
-    moved = changed(*path, [value[0] + off, value[1] - off], document=ROUND)
-    before, after = (dump_map(from_json(item)).splitlines() for item in (ROUND, moved))
+    for key in path:
+        value = value[key]
+    moved = edit(*path, [value[0] + shift, value[1] - shift], document=ROUND)
+    before = dump_map(from_json(ROUND)).splitlines()
+    after = dump_map(from_json(moved)).splitlines()
     assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
 
 
@@ -284,9 +287,9 @@ def test_numbers_are_as_short_as_possible(value: float, text: str) -> None:
 def test_numbers_written_by_hand_are_kept(number: Any) -> None:
     ring = f"[[{number}, 0], [1000, 0], [1000, 1000], [0, 1000]]"
     text = f'{{"format": "robocov-map", "version": 1, "name": "x", "boundary": {ring}}}'
-    mine = parse_map(text, "mine")
-    assert mine.boundary[0][0] == float(number)
-    assert parse_map(dump_map(mine), "again").boundary == mine.boundary
+    environment = parse_map(text, "handwritten")
+    assert environment.boundary[0][0] == float(number)
+    assert parse_map(dump_map(environment), "again").boundary == environment.boundary
 
 
 @pytest.mark.parametrize("tiny", [1e-320, 5e-324, -1e-310, 1e-160])
@@ -308,12 +311,12 @@ def test_tiny_numbers_are_written_as_zero(tiny: float) -> None:
 
 
 def test_unknown_content_of_extra_is_kept() -> None:
-    environment = from_json(changed("extra", {"mine": [0.1 + 0.2]}))
+    environment = from_json(edit("extra", {"mine": [0.1 + 0.2]}))
     assert parse_map(dump_map(environment), "again").extra == {"mine": [0.1 + 0.2]}
 
 
 def test_documents_keep_every_bit_so_that_runs_can_be_repeated() -> None:
-    environment = from_json(changed("obstacles", 1, "radius", 0.1 + 0.2))
+    environment = from_json(edit("obstacles", 1, "radius", 0.1 + 0.2))
     assert to_json(environment)["obstacles"][1]["radius"] == 0.1 + 0.2
     assert from_json(to_json(environment)) == environment
 

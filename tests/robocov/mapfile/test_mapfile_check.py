@@ -1,4 +1,4 @@
-"""The map check: measures against exact values, and a warning for each likely mistake."""
+"""The map check: exact measures, and a warning for each likely mistake."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robocov.mapfile import from_json
 from robocov.mapfile.check import MapReport, check_map, describe_vertex_count
 
 
-def room(*obstacles: dict[str, Any], boundary: Any = None, starts: Any = None) -> Environment:
+def build_room(*obstacles: dict[str, Any], boundary: Any = None, starts: Any = None) -> Environment:
     return from_json(
         {
             "format": "robocov-map",
@@ -28,14 +28,14 @@ def room(*obstacles: dict[str, Any], boundary: Any = None, starts: Any = None) -
     )
 
 
-def block(x: float, y: float, width: float, height: float) -> dict[str, Any]:
+def build_block(x: float, y: float, width: float, height: float) -> dict[str, Any]:
     ring = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
     return {"kind": "polygon", "vertices": ring}
 
 
-def test_measures() -> None:
-    environment = room(
-        block(4, 2, 2, 2) | {"holes": [[[4.5, 2.5], [5.5, 2.5], [5.5, 3.5], [4.5, 3.5]]]},
+def test_the_measures_of_a_map_are_exact() -> None:
+    environment = build_room(
+        build_block(4, 2, 2, 2) | {"holes": [[[4.5, 2.5], [5.5, 2.5], [5.5, 3.5], [4.5, 3.5]]]},
         {"kind": "wall", "points": [[8, 0], [8, 2]], "width": 0.5},
         {"kind": "circle", "center": [2, 1], "radius": 0.2},
     )
@@ -59,96 +59,107 @@ def test_the_warning_about_many_vertices_has_the_time(count: int, expected: str)
 
 def test_many_vertices_are_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robocov.mapfile.check.MANY_VERTICES", 7)
-    report = check_map(room(block(4, 2, 2, 2)))
+    report = check_map(build_room(build_block(4, 2, 2, 2)))
     assert report.vertex_count == 8
     assert report.warnings[0].startswith("This map has many vertices (8): ")
 
 
 def test_a_clean_map_has_no_warnings() -> None:
-    assert check_map(room(block(4, 2, 2, 2))).warnings == ()
+    assert check_map(build_room(build_block(4, 2, 2, 2))).warnings == ()
 
 
 def list_warnings(environment: Environment) -> list[str]:
     return list(check_map(environment).warnings)
 
 
-def test_a_gap_that_no_robot_passes() -> None:
-    environment = room(block(4, 0, 1, 2.9), block(4, 3.05, 1, 3))
+def test_a_gap_that_no_robot_can_pass_is_a_warning() -> None:
+    environment = build_room(build_block(4, 0, 1, 2.9), build_block(4, 3.05, 1, 3))
     assert list_warnings(environment) == [
         "the gap between [4, 2.9] and [4, 3.05] is 0.15 m wide: a robot of radius 0.1 m cannot pass"
     ]
     assert check_map(environment, radius=0.07).warnings == ()
 
 
-def test_sealed_rooms_and_pockets() -> None:
+def test_sealed_rooms_and_pockets_are_warnings() -> None:
     # The wall leaves 24 m² in the west and 30 m² in the east. Half of the pocket of 0.05 m by 1 m is filled.
-    environment = room(block(4, 0, 1, 6), block(0.05, 0, 1, 1), block(0, 1, 1.05, 1), block(0, 0, 0.05, 0.5))
+    environment = build_room(
+        build_block(4, 0, 1, 6),
+        build_block(0.05, 0, 1, 1),
+        build_block(0, 1, 1.05, 1),
+        build_block(0, 0, 0.05, 0.5),
+    )
     first, second = list_warnings(environment)
     assert first.startswith("sealed room of 21.9 m² around [")
     assert second == "1 sealed pocket smaller than a robot, 0.025 m² in total"
 
 
-def test_an_obstacle_outside() -> None:
+def test_an_obstacle_outside_the_boundary_is_a_warning() -> None:
     outside = {"kind": "circle", "center": [20, 2], "radius": 0.5, "name": "tree"}
-    assert list_warnings(room(block(4, 2, 1, 1), outside)) == [
+    assert list_warnings(build_room(build_block(4, 2, 1, 1), outside)) == [
         "obstacles[1] (tree) is entirely outside the boundary"
     ]
-    assert list_warnings(room(block(10, 2, 1, 1))) == ["obstacles[0] is entirely outside the boundary"]
-    assert list_warnings(room(block(9.5, 2, 1, 1))) == []
+    assert list_warnings(build_room(build_block(10, 2, 1, 1))) == [
+        "obstacles[0] is entirely outside the boundary"
+    ]
+    assert list_warnings(build_room(build_block(9.5, 2, 1, 1))) == []
 
 
-def test_paths_through_fixed_obstacles() -> None:
-    def moving(*points: tuple[float, float], **others: Any) -> dict[str, Any]:
+def test_paths_through_fixed_obstacles_are_warnings() -> None:
+    def build_moving_circle(*points: tuple[float, float], **others: Any) -> dict[str, Any]:
         path = {"points": points, "speed": 0.5, **others}
         return {"kind": "circle", "center": [1, 1], "radius": 0.3, "name": "cart", "path": path}
 
-    racks = [block(3, 0.5, 0.5, 1), block(5, 0.5, 0.5, 1) | {"name": "rack"}]
-    assert list_warnings(room(*racks, moving((1, 1), (1, 5)))) == []
-    assert list_warnings(room(*racks, moving((1, 1), (2.6, 1)))) == []  # The path ends before the first rack.
-    assert list_warnings(room(*racks, moving((1, 1), (9, 1)))) == [
+    racks = [build_block(3, 0.5, 0.5, 1), build_block(5, 0.5, 0.5, 1) | {"name": "rack"}]
+    assert list_warnings(build_room(*racks, build_moving_circle((1, 1), (1, 5)))) == []
+    # This path ends before the first rack.
+    assert list_warnings(build_room(*racks, build_moving_circle((1, 1), (2.6, 1)))) == []
+    assert list_warnings(build_room(*racks, build_moving_circle((1, 1), (9, 1)))) == [
         "obstacles[2] (cart) moves through obstacles[0], obstacles[1] (rack)"
     ]
     # A loop goes straight back from the last point.
-    around = moving((1, 1), (1, 3), (9, 3), (9, 1))
-    assert list_warnings(room(*racks, around)) == [
+    around = build_moving_circle((1, 1), (1, 3), (9, 3), (9, 1))
+    assert list_warnings(build_room(*racks, around)) == [
         "obstacles[2] (cart) moves through obstacles[0], obstacles[1] (rack)"
     ]
-    there_and_back = moving((1, 1), (1, 3), (9, 3), (9, 1), repeat="back-and-forth")
-    assert list_warnings(room(*racks, there_and_back)) == []
-    assert list_warnings(room(moving((1, 1), (9.8, 1)))) == ["obstacles[0] (cart) moves through the boundary"]
-    many = [block(x, 0.5, 0.5, 1) for x in (2, 3, 4, 5, 6)]
-    assert list_warnings(room(*many, moving((1, 1), (9, 1)))) == [
+    around_the_racks = build_moving_circle((1, 1), (1, 3), (9, 3), (9, 1), repeat="back-and-forth")
+    assert list_warnings(build_room(*racks, around_the_racks)) == []
+    assert list_warnings(build_room(build_moving_circle((1, 1), (9.8, 1)))) == [
+        "obstacles[0] (cart) moves through the boundary"
+    ]
+    many = [build_block(x, 0.5, 0.5, 1) for x in (2, 3, 4, 5, 6)]
+    assert list_warnings(build_room(*many, build_moving_circle((1, 1), (9, 1)))) == [
         "obstacles[5] (cart) moves through obstacles[0], obstacles[1], obstacles[2] and 2 more"
     ]
-    # An obstacle that moves itself may have gone by then.
-    assert list_warnings(room(moving((1, 1), (9, 1)), moving((1, 1), (8, 1)))) == []
+    # Another moving obstacle may be elsewhere at that time.
+    circles = [build_moving_circle((1, 1), (9, 1)), build_moving_circle((1, 1), (8, 1))]
+    assert list_warnings(build_room(*circles)) == []
 
 
-def test_vertices_given_twice() -> None:
-    twice = block(4, 2, 1, 1)
-    twice["vertices"].insert(2, list(twice["vertices"][2]))
+def test_duplicate_vertices_are_warnings() -> None:
+    block = build_block(4, 2, 1, 1)
+    block["vertices"].insert(2, list(block["vertices"][2]))
     closed = [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]
-    assert list_warnings(room(twice, boundary=closed)) == [
+    assert list_warnings(build_room(block, boundary=closed)) == [
         "boundary[4] and the next vertex are at the same position",
         "obstacles[0].vertices[2] and the next vertex are at the same position",
     ]
     loop = {"kind": "wall", "points": [[4, 2], [5, 2], [5, 3], [4, 2]], "width": 0.1}
-    assert not any("same position" in line for line in list_warnings(room(loop)))
+    assert not any("same position" in line for line in list_warnings(build_room(loop)))
 
 
-def test_given_positions_without_room() -> None:
+def test_positions_that_are_too_close_are_a_warning() -> None:
     starts = {"tight": {"kind": "points", "positions": [[1, 1], [1.1, 1]]}}
-    (line,) = list_warnings(room(starts=starts))
+    (line,) = list_warnings(build_room(starts=starts))
     assert "start 'tight': positions[0] and positions[1] are 0.1 m apart" in line
 
 
-def test_capacity_is_about_what_fits() -> None:
+def test_capacities_are_close_to_the_number_of_robots_that_fit() -> None:
     starts = {
         "disc": {"kind": "disc", "center": [2, 2], "radius": 0.8},
         "half": {"kind": "disc", "center": [0, 2], "radius": 0.8},
         "given": {"kind": "points", "positions": [[1, 1], [2, 1], [3, 1]]},
     }
-    environment = room(starts=starts)
+    environment = build_room(starts=starts)
     capacity = {start.name: start.capacity for start in check_map(environment).starts}
     assert capacity["given"] == 3
     assert capacity["half"] < 0.6 * capacity["disc"]
@@ -159,20 +170,23 @@ def test_capacity_is_about_what_fits() -> None:
 
 
 def test_the_report_is_json() -> None:
-    report = check_map(room(block(4, 1, 2, 2), starts={"all": {"kind": "uniform"}}))
+    report = check_map(build_room(build_block(4, 1, 2, 2), starts={"all": {"kind": "uniform"}}))
     document = json.loads(json.dumps(report.to_dict()))
     assert document["free_area_m2"] == 56.0
     assert document["narrowest_gap_m"] == 1.0
     assert document["starts"]["all"]["kind"] == "uniform"
     assert isinstance(report, MapReport)
-    assert json.loads(json.dumps(check_map(room()).to_dict()))["narrowest_gap_m"] is None
+    assert json.loads(json.dumps(check_map(build_room()).to_dict()))["narrowest_gap_m"] is None
 
 
 def test_the_range_of_overlapping_peaks_ends_at_their_largest_value():
-    near = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0), Gaussian((4.0, 3.0), 2.0, sigma=1.0)), 0.5)
+    overlapping = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0), Gaussian((4.0, 3.0), 2.0, sigma=1.0)), 0.5)
     x = np.linspace(0.0, 10.0, 1001)
     points = np.column_stack([x, np.full(1001, 3.0)])
-    for density, largest in ((near, near.evaluate(points).max()), (Gaussians(near.peaks[:1], 0.5), 2.5)):
-        ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-        report = check_map(Environment("heavy", ring, density=density))
-        assert report.density_range == pytest.approx((0.5, largest), abs=1e-5)
+    ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+    report = check_map(Environment("overlapping", ring, density=overlapping))
+    max_value = overlapping.evaluate(points).max()
+    assert report.density_range == pytest.approx((0.5, max_value), abs=1e-5)
+    single = Gaussians(overlapping.peaks[:1], 0.5)
+    report = check_map(Environment("single", ring, density=single))
+    assert report.density_range == pytest.approx((0.5, 2.5), abs=1e-5)

@@ -1,4 +1,4 @@
-"""Densities in maps: read, refused with their place, written and read again; pictures beside a map."""
+"""Densities in map files: reading, writing, error messages, and images in the folder of a map."""
 
 from __future__ import annotations
 
@@ -25,33 +25,37 @@ def build_document(density) -> dict:
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
-def test_round_trip(density, tmp_path):
-    environment = Environment("weighed", RING, density=density)
+def test_written_densities_are_read_unchanged(density, tmp_path):
+    environment = Environment("weighted", RING, density=density)
     document = to_json(environment)
     SCHEMA.validate(document)
     assert from_json(document) == environment
     assert parse_map(dump_map(environment), "again").density == density
-    save_map(environment, tmp_path / "weighed.json")
-    assert load_map(tmp_path / "weighed.json") == environment
+    save_map(environment, tmp_path / "weighted.json")
+    assert load_map(tmp_path / "weighted.json") == environment
     assert "density" not in to_json(Environment("plain", RING))
 
 
-def test_optional_keys():
+def test_optional_keys_have_defaults():
     assert from_json(build_document({"kind": "uniform"})).density == Uniform(1.0)
     peaks = [{"center": [1, 2], "sigma": 0.5, "weight": 3}]
     density = from_json(build_document({"kind": "gaussians", "peaks": peaks})).density
-    assert isinstance(density, Gaussians) and density.floor == 0.0
+    assert isinstance(density, Gaussians)
+    assert density.floor == 0.0
     density = from_json(build_document({"kind": "polygons", "areas": []})).density
-    assert isinstance(density, WeightedPolygons) and density.background == 1.0
+    assert isinstance(density, WeightedPolygons)
+    assert density.background == 1.0
     density = from_json(build_document({"kind": "raster", "rows": [[1, 2], [3, 4]]})).density
-    assert isinstance(density, Raster) and density.extent == (0.0, 0.0, 10.0, 6.0)
-    assert density.values.tolist() == [[3.0, 4.0], [1.0, 2.0]]  # the file has the top row first
+    assert isinstance(density, Raster)
+    assert density.extent == (0.0, 0.0, 10.0, 6.0)
+    # The top row is the first one in the file.
+    assert density.values.tolist() == [[3.0, 4.0], [1.0, 2.0]]
     assert density.interpolation == "bilinear"
     assert from_json(build_document(None)).density is None
 
 
 def test_each_row_of_a_raster_is_a_line():
-    text = dump_map(Environment("weighed", RING, density=Raster(np.eye(2), (0.0, 0.0, 10.0, 6.0), "cells")))
+    text = dump_map(Environment("weighted", RING, density=Raster(np.eye(2), (0.0, 0.0, 10.0, 6.0), "cells")))
     assert '    "rows": [\n      [0, 1],\n      [1, 0]\n    ]' in text
 
 
@@ -60,7 +64,7 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
 
 
 @pytest.mark.parametrize(
-    ("density", "words"),
+    ("density", "expected"),
     [
         (3, "density: expected an object whose kind is one of uniform, gaussians, polygons, raster, got 3"),
         ({}, "density.kind: missing"),
@@ -152,12 +156,14 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_mistakes_are_reported_with_their_path(density, words):
+def test_mistakes_are_reported_with_their_path(density, expected):
     with pytest.raises(MapError) as caught:
         from_json(build_document(density), "mine.json")
-    start, _, end = words.partition(".* ")
+    start, _, end = expected.partition(".* ")
     message = str(caught.value)
-    assert message.startswith("mine.json: ") and start in message and end in message
+    assert message.startswith("mine.json: ")
+    assert start in message
+    assert end in message
     assert "\n" not in message
 
 
@@ -166,11 +172,12 @@ def test_mistakes_in_a_file_have_line_and_column():
     with pytest.raises(MapError) as caught:
         parse_map(text, "mine.json")
     line = text.splitlines()[caught.value.line - 1]
-    assert '"sigma": -1' in line and str(caught.value).startswith(f"mine.json:{caught.value.line}:")
+    assert '"sigma": -1' in line
+    assert str(caught.value).startswith(f"mine.json:{caught.value.line}:")
 
 
 def test_tiny_weights_are_read_as_zero():
-    """Otherwise they would be zero after having been written and read again."""
+    """Otherwise they would become zero when a map is written and read again."""
     for density in (
         {"kind": "uniform", "weight": 1e-16},
         {"kind": "raster", "rows": [[1e-12, 0]]},
@@ -179,12 +186,13 @@ def test_tiny_weights_are_read_as_zero():
         with pytest.raises(MapError, match="expected at least one weight above 0, got none"):
             from_json(build_document(density))
     tiny = from_json(build_document({"kind": "raster", "rows": [[1e-12, 1]]}))
-    assert tiny.density.min_value == 0.0 and parse_map(dump_map(tiny), "again") == tiny
+    assert tiny.density.min_value == 0.0
+    assert parse_map(dump_map(tiny), "again") == tiny
     flat = {"kind": "polygons", "areas": [{**AREA, "vertices": [[0, 0], [9, 0], [9, 5], [0, 1e-320]]}]}
     assert from_json(build_document(flat)).free_masses.sum() == pytest.approx(60.0 + 4.0 * 22.5)
 
 
-# pictures
+# Images
 
 
 def write_map(folder: Path, picture: str, **more) -> Path:
@@ -194,11 +202,11 @@ def write_map(folder: Path, picture: str, **more) -> Path:
 
 
 def write_image(path: Path, rows, mode: str = "L") -> None:
-    kind = np.uint16 if mode == "I;16" else np.uint8
-    Image.fromarray(np.array(rows, dtype=kind)).save(path)
+    dtype = np.uint16 if mode == "I;16" else np.uint8
+    Image.fromarray(np.array(rows, dtype=dtype)).save(path)
 
 
-def test_an_image_next_to_the_map(tmp_path):
+def test_images_next_to_the_map_are_read_as_rasters(tmp_path):
     write_image(tmp_path / "phi.png", [[0, 255], [51, 102]])
     density = load_map(write_map(tmp_path, "phi.png", black=1, white=6)).density
     assert isinstance(density, Raster)
@@ -206,7 +214,8 @@ def test_an_image_next_to_the_map(tmp_path):
     (tmp_path / "more").mkdir()
     write_image(tmp_path / "more" / "deep.png", [[0, 65535]], "I;16")
     density = load_map(write_map(tmp_path, "more/deep.png", extent=[0, 0, 10, 6])).density
-    assert isinstance(density, Raster) and density.values.tolist() == [[0.0, 1.0]]
+    assert isinstance(density, Raster)
+    assert density.values.tolist() == [[0.0, 1.0]]
     Image.fromarray(np.full((2, 2, 3), 255, dtype=np.uint8)).save(tmp_path / "color.png")
     assert load_map(write_map(tmp_path, "color.png")).density.values.min() == 1.0
     (tmp_path / "phi.pgm").write_bytes(b"P5 2 1 255\n\x00\xff")
@@ -217,7 +226,8 @@ def test_images_are_written_as_rows(tmp_path):
     write_image(tmp_path / "phi.png", [[0, 200], [7, 102]])
     environment = load_map(write_map(tmp_path, "phi.png", black=0.1, white=5))
     document = to_json(environment)
-    assert "picture" not in document["density"] and from_json(document) == environment
+    assert "picture" not in document["density"]
+    assert from_json(document) == environment
     save_map(environment, tmp_path / "again.json")
     (tmp_path / "phi.png").unlink()
     assert load_map(tmp_path / "again.json") == environment

@@ -28,27 +28,22 @@ from robocov.voronoi import partition_by_travel_time
 def record(cluttered: Environment) -> Record:
     team = Team.homogeneous(4, communication_range=3.0)
     starts = cluttered.start().sample(4, seed=2)
-    return Simulation(cluttered, Rapf(k_rep=0.2, attraction_limit=None), starts, team, 0.02).run(
-        2.0, start="corner", seed=2
-    )
+    simulation = Simulation(cluttered, Rapf(k_rep=0.2, attraction_limit=None), starts, team, 0.02)
+    return simulation.run(2.0, start="corner", seed=2)
 
 
 def test_a_saved_record_can_be_loaded(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path, {"mean_distance_m": 1.0})
-    again = Record.load(tmp_path)
+    loaded = Record.load(tmp_path)
     for name in ARRAYS:
-        assert getattr(again, name).tobytes() == getattr(record, name).tobytes()
-    assert again.environment == record.environment
-    assert again.gains == get_gain_values(Rapf(k_rep=0.2, attraction_limit=None))
-    assert again.gains["attraction_limit"] is None and again.gains["target"] == "centroid"
-    assert (again.controller, again.label, again.start, again.seed, again.dt) == (
-        "rapf",
-        "RAPF",
-        "corner",
-        2,
-        0.02,
-    )
-    assert again.team.to_dict() == record.team.to_dict()
+        assert getattr(loaded, name).tobytes() == getattr(record, name).tobytes()
+    assert loaded.environment == record.environment
+    assert loaded.gains == get_gain_values(Rapf(k_rep=0.2, attraction_limit=None))
+    assert loaded.gains["attraction_limit"] is None
+    assert loaded.gains["target"] == "centroid"
+    assert (loaded.controller, loaded.label) == ("rapf", "RAPF")
+    assert (loaded.start, loaded.seed, loaded.dt) == ("corner", 2, 0.02)
+    assert loaded.team.to_dict() == record.team.to_dict()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["record.npz", "run.json"]
 
 
@@ -76,26 +71,29 @@ def test_snapshots_of_the_record_equal_those_of_the_run(record: Record, cluttere
     )
     for _ in range(17):
         simulation.step()
-    live, saved = simulation.observe_and_decide(), record.snapshot(17)
-    assert live.time == saved.time
-    np.testing.assert_array_equal(live.positions, saved.positions)
-    np.testing.assert_array_equal(live.decision.forces, saved.decision.forces)
-    np.testing.assert_array_equal(live.decision.goals, saved.decision.goals)
-    assert [list(live.seen.neighbors.list_neighbors(i)) for i in range(4)] == [
-        list(saved.seen.neighbors.list_neighbors(i)) for i in range(4)
-    ]
+    expected = simulation.observe_and_decide()
+    snapshot = record.snapshot(17)
+    assert snapshot.time == expected.time
+    np.testing.assert_array_equal(snapshot.positions, expected.positions)
+    np.testing.assert_array_equal(snapshot.decision.forces, expected.decision.forces)
+    np.testing.assert_array_equal(snapshot.decision.goals, expected.decision.goals)
+    for i in range(4):
+        neighbors = snapshot.seen.neighbors.list_neighbors(i)
+        assert list(neighbors) == list(expected.seen.neighbors.list_neighbors(i))
 
 
-def test_samples_of_a_record_refer_to_the_robots_that_worked_then(empty: Environment) -> None:
+def test_samples_of_a_record_refer_to_the_robots_that_worked_at_that_time(empty: Environment) -> None:
     team = replace(Team.homogeneous(3), max_speed=np.array([0.3, 0.6, 1.5]))
-    starts, failing = [[2.0, 2.0], [4.0, 2.0], [3.0, 4.0]], Conditions(failures=((1, 0.1),))
-    made = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=failing).run(0.2)
-    assert made.has_travel_time_cells and not replace(made, team=Team.homogeneous(3)).has_travel_time_cells
-    assert made.snapshot(-1).seen.neighbors.list_pairs()[0].tolist() == [1, 2]
-    expected = partition_by_travel_time(made.positions[-1, 1:], team.max_speed[1:], empty.region)
-    assert made.cells().mass.tolist() == expected.mass.tolist()
-    for part in (made.until(0.1), made.thin(10.0)):
-        assert not any(np.shares_memory(getattr(part, name), getattr(made, name)) for name in ARRAYS)
+    starts = [[2.0, 2.0], [4.0, 2.0], [3.0, 4.0]]
+    conditions = Conditions(failures=((1, 0.1),))
+    record = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=conditions).run(0.2)
+    assert record.has_travel_time_cells
+    assert not replace(record, team=Team.homogeneous(3)).has_travel_time_cells
+    assert record.snapshot(-1).seen.neighbors.list_pairs()[0].tolist() == [1, 2]
+    expected = partition_by_travel_time(record.positions[-1, 1:], team.max_speed[1:], empty.region)
+    assert record.cells().mass.tolist() == expected.mass.tolist()
+    for excerpt in (record.until(0.1), record.thin(10.0)):
+        assert not any(np.shares_memory(getattr(excerpt, name), getattr(record, name)) for name in ARRAYS)
 
 
 def test_gains_of_individual_controllers_are_recorded(empty: Environment) -> None:
@@ -106,8 +104,8 @@ def test_gains_of_individual_controllers_are_recorded(empty: Environment) -> Non
         def force(self, own: object) -> list[float]:
             return [self.pull, 0.0]
 
-    made = Simulation(empty, IndividualControllerAdapter(Drift(pull=0.25)), [[2.0, 2.0]]).run(0.1)
-    assert made.gains == {"pull": 0.25}
+    record = Simulation(empty, IndividualControllerAdapter(Drift(pull=0.25)), [[2.0, 2.0]]).run(0.1)
+    assert record.gains == {"pull": 0.25}
 
 
 def test_records_of_controllers_without_goals_have_no_goals(empty: Environment) -> None:
@@ -123,9 +121,9 @@ def test_a_stopped_run_equals_a_shorter_run(empty: Environment) -> None:
         recorder.add(snapshot)
         if snapshot.time > 1.0:
             break
-    whole = Simulation(empty, Rapf(), empty.start().sample(3)).run(10.0)
-    part = recorder.record()
-    np.testing.assert_array_equal(part.positions, whole.positions[: len(part)])
+    complete = Simulation(empty, Rapf(), empty.start().sample(3)).run(10.0)
+    stopped = recorder.record()
+    np.testing.assert_array_equal(stopped.positions, complete.positions[: len(stopped)])
 
 
 def edit_document(*path: str | int, to: object = None):
@@ -149,11 +147,13 @@ def edit_arrays(**changes):
     """Return a function that applies functions to arrays in the ``record.npz`` of a folder."""
 
     def damage(folder: Path) -> None:
-        with np.load(folder / "record.npz") as found:
-            arrays = {name: changes[name](found[name]) if name in changes else found[name] for name in found}
-        np.savez(
-            folder / "record.npz", **{name: values for name, values in arrays.items() if values is not None}
-        )
+        with np.load(folder / "record.npz") as archive:
+            arrays = dict(archive)
+        for name, change in changes.items():
+            arrays[name] = change(arrays[name])
+            if arrays[name] is None:
+                del arrays[name]
+        np.savez(folder / "record.npz", **arrays)
 
     return damage
 
@@ -294,37 +294,37 @@ def test_damaged_folders_are_rejected(record: Record, tmp_path: Path, damage, me
 
 
 def test_additions_of_later_versions_are_ignored(record: Record, tmp_path: Path) -> None:
-    """And what earlier ones did not write yet may be missing."""
+    """Keys that earlier versions did not write may be missing."""
     record.save(tmp_path)
     for path in (("mood",), ("controller", "label"), ("team", "color_rgb"), ("session", "weather")):
         edit_document(*path, to={"fine": [1, None]})(tmp_path)
     for name in ("lattice", "versions", "summary", "starts_m", "duration_s"):
         edit_document(name)(tmp_path)
     edit_arrays()(tmp_path)
-    with np.load(tmp_path / "record.npz") as found:
-        np.savez_compressed(tmp_path / "record.npz", **found, moods=np.arange(3))
-    again = Record.load(tmp_path)
-    assert again.positions.tobytes() == record.positions.tobytes()
-    assert again.session == {"weather": {"fine": [1, None]}}
+    with np.load(tmp_path / "record.npz") as archive:
+        np.savez_compressed(tmp_path / "record.npz", **archive, moods=np.arange(3))
+    loaded = Record.load(tmp_path)
+    assert loaded.positions.tobytes() == record.positions.tobytes()
+    assert loaded.session == {"weather": {"fine": [1, None]}}
 
 
 def test_loading_a_run_does_not_load_its_controller(record: Record, tmp_path: Path) -> None:
     replace(record, controller="somewhere/mine.py:Mine").save(tmp_path)
-    again = Record.load(tmp_path)
-    assert (again.controller, again.label) == ("somewhere/mine.py:Mine", "Mine")
+    loaded = Record.load(tmp_path)
+    assert (loaded.controller, loaded.label) == ("somewhere/mine.py:Mine", "Mine")
 
 
 def test_the_mask_of_working_robots_is_read_only(record: Record) -> None:
-    """A view of it is in each moment."""
-    there = replace(record, conditions=Conditions(failures=((1, 0.5),)))
-    for mask in (there.working, there.present, there.snapshot(3).working, record.working):
+    """Snapshots contain views of the mask."""
+    failing = replace(record, conditions=Conditions(failures=((1, 0.5),)))
+    for mask in (failing.working, failing.present, failing.snapshot(3).working, record.working):
         with pytest.raises(ValueError, match="read-only"):
             mask[...] = False
 
 
 @dataclass(frozen=True)
-class Reusing:
-    """Gives what it remembers as forces, goals and terms, and changes it in place."""
+class ReusingController:
+    """A controller that changes its memory in place and returns it as forces, goals and terms."""
 
     name = label = "reusing"
     summary = ""
@@ -341,7 +341,7 @@ class TestReusedArrays:
     """A controller may use the same array for all of its decisions."""
 
     def test_every_step_is_recorded(self, empty: Environment) -> None:
-        record = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02).run(0.2)
+        record = Simulation(empty, ReusingController(), empty.start().sample(2), dt=0.02).run(0.2)
         steps = 0.01 * np.arange(1, 12)
         for values in (record.forces, record.goals):
             np.testing.assert_allclose(values, np.broadcast_to(steps[:, None, None], values.shape))
@@ -351,24 +351,30 @@ class TestReusedArrays:
         recorder = Recorder(empty, simulation.team, simulation.controller, simulation.dt)
         decision = Decision(np.ones((2, 2)), np.ones((2, 2)))
         recorder.add(Snapshot(simulation.observe(), decision))
-        decision.forces[:] = decision.goals[:] = 7.0
+        decision.forces[:] = 7.0
+        decision.goals[:] = 7.0
         assert (recorder.record().forces == 1.0).all()
         assert (recorder.record().goals == 1.0).all()
 
     def test_snapshots_do_not_change_later(self, empty: Environment) -> None:
-        simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
-        kept = [(snapshot, deepcopy(snapshot)) for snapshot in simulation.snapshots(0.1)]
-        for snapshot, then in kept:
-            np.testing.assert_array_equal(snapshot.decision.forces, then.decision.forces)
-            np.testing.assert_array_equal(snapshot.decision.terms["attraction"], then.decision.forces)
+        simulation = Simulation(empty, ReusingController(), empty.start().sample(2), dt=0.02)
+        snapshots = []
+        copies = []
+        for snapshot in simulation.snapshots(0.1):
+            snapshots.append(snapshot)
+            copies.append(deepcopy(snapshot))
+        for snapshot, copy in zip(snapshots, copies, strict=True):
+            np.testing.assert_array_equal(snapshot.decision.forces, copy.decision.forces)
+            np.testing.assert_array_equal(snapshot.decision.terms["attraction"], copy.decision.forces)
 
     def test_a_copy_continues_identically_also_after_the_decision(self, empty: Environment) -> None:
-        simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
+        simulation = Simulation(empty, ReusingController(), empty.start().sample(2), dt=0.02)
         simulation.step()
         assert simulation.observe_and_decide().decision.forces.max() == pytest.approx(0.02)
-        for twin in (simulation.copy(), simulation.with_changes(), simulation.with_memory(simulation.memory)):
-            twin.step()
-            assert twin.observe_and_decide().decision.forces.max() == pytest.approx(0.03)
+        copies = [simulation.copy(), simulation.with_changes(), simulation.with_memory(simulation.memory)]
+        for copy in copies:
+            copy.step()
+            assert copy.observe_and_decide().decision.forces.max() == pytest.approx(0.03)
         simulation.step()
         assert simulation.observe_and_decide().decision.forces.max() == pytest.approx(0.03)
 
@@ -376,29 +382,29 @@ class TestReusedArrays:
 def test_files_are_complete_or_missing(tmp_path: Path) -> None:
     target = tmp_path / "result.txt"
     target.write_text("old")
-    with pytest.raises(RuntimeError), replace_file(target) as part:
-        part.write_text("half")
+    with pytest.raises(RuntimeError), replace_file(target) as partial_file:
+        partial_file.write_text("half")
         raise RuntimeError
     assert target.read_text() == "old"
     with (
         pytest.raises(OutputError, match=r"result.txt: cannot be written: No space left on device"),
-        replace_file(target) as part,
+        replace_file(target) as partial_file,
     ):
-        part.write_text("half")
+        partial_file.write_text("half")
         raise OSError(28, os.strerror(28))
     assert [path.name for path in tmp_path.iterdir()] == ["result.txt"]
-    with replace_file(target) as part:
-        part.write_text("new")
+    with replace_file(target) as partial_file:
+        partial_file.write_text("new")
     assert target.read_text() == "new"
     with (
         pytest.raises(OutputError, match="cannot be written"),
-        replace_file(tmp_path / "no" / "x.txt") as part,
+        replace_file(tmp_path / "no" / "x.txt") as partial_file,
     ):
-        part.write_text("")
+        partial_file.write_text("")
 
 
-class TestMoments:
-    def test_a_thinned_record_contains_samples_of_the_whole_one(self, record: Record) -> None:
+class TestSamples:
+    def test_a_thinned_record_contains_samples_of_the_complete_one(self, record: Record) -> None:
         thin = record.thin(5.0)
         assert thin.time == pytest.approx(np.arange(11) * 0.2)
         for name in ARRAYS:
@@ -425,12 +431,13 @@ class TestMoments:
     def test_a_thinned_record_is_saved_and_sampled(self, record: Record, tmp_path: Path) -> None:
         thin = record.thin(5.0)
         thin.save(tmp_path)
-        again = Record.load(tmp_path)
-        assert again.positions.tobytes() == thin.positions.tobytes()
-        # costs are asked for at the same times as those of the whole record
+        loaded = Record.load(tmp_path)
+        assert loaded.positions.tobytes() == thin.positions.tobytes()
+        # Costs are computed at the same times as those of the complete record.
         for rate in (1.0, 2.5, 5.0):
-            times = [run.time[select_sampled_moments(run, rate)].tolist() for run in (record, again)]
-            assert times[0] == times[1]
+            times = record.time[select_sampled_moments(record, rate)]
+            loaded_times = loaded.time[select_sampled_moments(loaded, rate)]
+            assert loaded_times.tolist() == times.tolist()
 
     @pytest.mark.parametrize("rate", [-1.0, np.inf, np.nan])
     def test_invalid_rates_are_rejected(self, record: Record, rate: float) -> None:
@@ -439,30 +446,31 @@ class TestMoments:
         ):
             record.thin(rate)
 
-    def test_the_sample_at_a_time(self, record: Record) -> None:
+    def test_the_nearest_sample_to_a_time_is_returned(self, record: Record) -> None:
         assert record.at(1.0).time == 1.0
         assert record.at(1.008).time == 1.0
         assert record.at(1.012).time == pytest.approx(1.02)
-        assert record.thin(0.0).at(1.0).time == 0.0, "of two as near the earlier"
+        # The earlier one of two equally near samples is returned.
+        assert record.thin(0.0).at(1.0).time == 0.0
         np.testing.assert_array_equal(record.at(2.0).positions, record.positions[-1])
         for time in (-0.1, 2.1, np.nan):
             with pytest.raises(ParameterError, match="time: expected a number from 0 to 2 s"):
                 record.at(time)
 
-    def test_until_gives_the_run_that_was_stopped_then(self, record: Record) -> None:
-        part = record.until(1.0)
-        again = Simulation(
-            record.environment, Rapf(k_rep=0.2, attraction_limit=None), record.positions[0], record.team, 0.02
-        ).run(1.0)
+    def test_until_returns_the_record_of_a_shorter_run(self, record: Record) -> None:
+        excerpt = record.until(1.0)
+        controller = Rapf(k_rep=0.2, attraction_limit=None)
+        simulation = Simulation(record.environment, controller, record.positions[0], record.team, 0.02)
+        expected = simulation.run(1.0)
         for name in ARRAYS:
-            assert getattr(part, name).tobytes() == getattr(again, name).tobytes()
+            assert getattr(excerpt, name).tobytes() == getattr(expected, name).tobytes()
         assert record.until(99.0).time.tolist() == record.time.tolist()
         for time in (-0.1, np.nan):
             with pytest.raises(ParameterError, match="time: expected a number of at least 0 s"):
                 record.until(time)
 
 
-class TestFrame:
+class TestDataFrame:
     def test_the_data_frame_contains_every_number_once(self, record: Record) -> None:
         frame = record.to_pandas()
         assert list(frame.columns) == [
@@ -473,13 +481,13 @@ class TestFrame:
         assert frame.index.equals(frame.reset_index().index)
         assert not frame.duplicated(["time_s", "robot"]).any()
         assert frame["robot"].dtype == np.int64
-        for moment, robot in ((0, 0), (0, 3), (57, 1), (100, 3)):
-            (row,) = frame[(frame.time_s == record.time[moment]) & (frame.robot == robot)].to_numpy()
-            wanted = [getattr(record, name)[moment, robot] for name in ARRAYS[1:]]
-            np.testing.assert_array_equal(row, [record.time[moment], robot, *np.concatenate(wanted)])
+        for sample, robot in ((0, 0), (0, 3), (57, 1), (100, 3)):
+            (row,) = frame[(frame.time_s == record.time[sample]) & (frame.robot == robot)].to_numpy()
+            values = np.concatenate([getattr(record, name)[sample, robot] for name in ARRAYS[1:]])
+            np.testing.assert_array_equal(row, [record.time[sample], robot, *values])
 
     def test_the_data_frame_is_tidy(self, record: Record) -> None:
-        """What is asked of it every day: one robot's path, and the team by robots."""
+        """The path of one robot and a column for each robot are selected in one step."""
         frame = record.to_pandas()
         path = frame[frame.robot == 2][["x_m", "y_m"]].to_numpy()
         np.testing.assert_array_equal(path, record.positions[:, 2])
@@ -514,17 +522,22 @@ def test_the_repr_is_short(record: Record, empty: Environment) -> None:
 
 def test_records_of_unicycles_contain_their_headings(cluttered: Environment, tmp_path: Path) -> None:
     team = Team.homogeneous(3, kinematics="unicycle", turning_rate=2.0)
-    made = Simulation(cluttered, Rapf(), cluttered.start().sample(3, seed=2), team).run(1.0)
-    made.save(tmp_path)
-    again = Record.load(tmp_path)
-    assert made.steering is not None and again.steering is not None
-    assert made.steering.tobytes() == again.steering.tobytes() and made.steering[-1].any()
-    assert again.team.track_width.tolist() == team.track_width.tolist() and again.team.turning_rate[0] == 2.0
-    assert (again.snapshot(7).steering == made.steering[7]).all()
-    assert len(again.thin(5.0).steering) == len(again.thin(5.0).time) == 6  # type: ignore[arg-type]
-    frame = pytest.importorskip("pandas") and made.to_pandas()
+    record = Simulation(cluttered, Rapf(), cluttered.start().sample(3, seed=2), team).run(1.0)
+    record.save(tmp_path)
+    loaded = Record.load(tmp_path)
+    assert record.steering is not None
+    assert loaded.steering is not None
+    assert record.steering.tobytes() == loaded.steering.tobytes()
+    assert record.steering[-1].any()
+    assert loaded.team.track_width.tolist() == team.track_width.tolist()
+    assert loaded.team.turning_rate[0] == 2.0
+    assert (loaded.snapshot(7).steering == record.steering[7]).all()
+    thin = loaded.thin(5.0)
+    assert len(thin.steering) == len(thin.time) == 6  # type: ignore[arg-type]
+    pytest.importorskip("pandas")
+    frame = record.to_pandas()
     assert list(frame)[-2:] == ["heading_rad", "turning_rate_rad_s"]
-    assert frame.heading_rad.iloc[-1] == made.steering[-1, -1, 0]
+    assert frame.heading_rad.iloc[-1] == record.steering[-1, -1, 0]
     arrays = dict(np.load(tmp_path / "record.npz"))
     del arrays["steering"]
     np.savez(tmp_path / "record.npz", **arrays)

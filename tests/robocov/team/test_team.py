@@ -11,7 +11,7 @@ from robocov.errors import ParameterError
 from robocov.team import Team
 
 
-def test_a_homogeneous_team_has_the_papers_limits() -> None:
+def test_a_homogeneous_team_has_the_limits_of_the_paper() -> None:
     team = Team.homogeneous(6)
     assert len(team) == 6
     assert (team.mass == 1.0).all()
@@ -23,7 +23,7 @@ def test_a_homogeneous_team_has_the_papers_limits() -> None:
         st.tuples(st.floats(0.01, 1), st.one_of(st.just(np.inf), st.floats(0, 50))), min_size=1, max_size=9
     )
 )
-def test_a_team_survives_json(robots: list[tuple[float, float]]) -> None:
+def test_teams_are_unchanged_by_json(robots: list[tuple[float, float]]) -> None:
     n = len(robots)
     team = Team(
         radius=np.array([r for r, _ in robots]),
@@ -34,13 +34,13 @@ def test_a_team_survives_json(robots: list[tuple[float, float]]) -> None:
         sensing_range=np.full(n, 3.0),
         communication_range=np.array([c for _, c in robots]),
     )
-    again = Team.from_dict(team.to_dict())
+    loaded = Team.from_dict(team.to_dict())
     for name in Team.__slots__:
-        np.testing.assert_array_equal(getattr(again, name), getattr(team, name))
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(team, name))
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("limits", "message"),
     [
         ({"radius": 0.0}, r"team.radius: expected a number from 0.001 to 1000, got 0.0 m"),
         ({"max_speed": -1.0}, r"team.max_speed: expected .* got -1.0 m/s"),
@@ -49,12 +49,12 @@ def test_a_team_survives_json(robots: list[tuple[float, float]]) -> None:
         ({"communication_range": -2.0}, r"or null for no limit, got -2.0 m"),
     ],
 )
-def test_limits_out_of_range_are_rejected(wrong: dict[str, float], message: str) -> None:
+def test_limits_out_of_range_are_rejected(limits: dict[str, float], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        Team.homogeneous(3, **wrong)
+        Team.homogeneous(3, **limits)
 
 
-def test_teams_have_robots_and_one_value_for_each() -> None:
+def test_teams_without_robots_or_with_missing_values_are_rejected() -> None:
     with pytest.raises(ParameterError, match="robots: expected a whole number of at least 1, got 0"):
         Team.homogeneous(0)
     ones = np.ones(2)

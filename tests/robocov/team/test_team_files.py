@@ -18,7 +18,7 @@ count = 2
 max_speed = 1.5
 communication_range = "null"
 
-[[group]]          # slow ones
+[[group]]          # slow robots
 count = 3
 max_speed = 0.5
 radius = 0.2
@@ -32,7 +32,7 @@ def write_file(folder: Path, text: str, name: str = "team.toml") -> Path:
     return path
 
 
-def test_groups_become_rows_in_their_order(tmp_path: Path) -> None:
+def test_robots_have_the_order_of_their_groups(tmp_path: Path) -> None:
     team = read_team(write_file(tmp_path, TEAM))
     assert team.max_speed.tolist() == [1.5, 1.5, 0.5, 0.5, 0.5]
     assert team.radius.tolist() == [0.1, 0.1, 0.2, 0.2, 0.2]
@@ -42,14 +42,14 @@ def test_groups_become_rows_in_their_order(tmp_path: Path) -> None:
     assert not Team.homogeneous(3).has_mixed_speeds
 
 
-def test_json_is_the_same(tmp_path: Path) -> None:
+def test_teams_may_be_json(tmp_path: Path) -> None:
     groups = [{"count": 1, "sensing_range": None}, {"count": 1, "mass": 2.5}]
     team = read_team(write_file(tmp_path, json.dumps({"group": groups}), "team.json"))
     assert team.sensing_range.tolist() == [np.inf, 3.0]
     assert team.mass.tolist() == [1.0, 2.5]
 
 
-def test_groups_take_missing_values_from_the_defaults(tmp_path: Path) -> None:
+def test_missing_values_of_groups_are_the_defaults(tmp_path: Path) -> None:
     team = read_team(write_file(tmp_path, TEAM), {"radius": 0.3, "viscosity": 1.0, "sensing_range": None})
     assert team.radius.tolist() == [0.3, 0.3, 0.2, 0.2, 0.2]
     assert team.viscosity.tolist() == [1.0] * 5
@@ -70,9 +70,10 @@ def test_groups_take_missing_values_from_the_defaults(tmp_path: Path) -> None:
         max_size=5,
     )
 )
-def test_teams_survive_the_way_to_json_and_back(groups: list[dict[str, float]]) -> None:
+def test_teams_of_groups_are_unchanged_by_json(groups: list[dict[str, float]]) -> None:
     team = build_team(groups, ("group",))
-    assert team.radius.tolist() == [each["radius"] for each in groups for _ in range(int(each["count"]))]
+    expected = np.repeat([group["radius"] for group in groups], [group["count"] for group in groups])
+    assert team.radius.tolist() == expected.tolist()
     assert Team.from_dict(team.to_dict()).to_dict() == team.to_dict()
 
 
@@ -105,13 +106,13 @@ def test_teams_survive_the_way_to_json_and_back(groups: list[dict[str, float]]) 
     ],
 )
 def test_mistakes_in_team_files_are_reported(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(InputError, match=message) as told:
+    with pytest.raises(InputError, match=message) as caught:
         read_team(write_file(tmp_path, text))
-    assert "\n" not in str(told.value)
-    assert str(told.value).startswith(str(tmp_path / "team.toml"))
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "team.toml"))
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_unreadable_files_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(RobocovError, match="no such file"):
         read_team(tmp_path / "none.toml")
     with pytest.raises(RobocovError, match=r"bad.json"):
