@@ -129,9 +129,11 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
     if lost_doors:
         shapes.leave_out("door", "in no wall of this level", lost_doors)
     projected = convert_to_meters([*geometries, *door_lines], shapes, DEGREES)
-    elements = [FloorElement(role, geometry) for role, geometry in zip(roles, projected, strict=False)]
-    openings = [_build_opening(door_line) for door_line in projected[len(geometries) :]]
-    return elements + [FloorElement("opening", opening) for opening in openings]
+    shapes_in_meters = projected[: len(geometries)]
+    doors_in_meters = projected[len(geometries) :]
+    elements = [FloorElement(role, shape) for role, shape in zip(roles, shapes_in_meters, strict=True)]
+    elements += [FloorElement("opening", _build_opening(door)) for door in doors_in_meters]
+    return elements
 
 
 def _build_geometry(data: OsmData, element: OsmElement, role: Role, shapes: Shapes) -> SourceGeometry | None:

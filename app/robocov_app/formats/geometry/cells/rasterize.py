@@ -229,7 +229,8 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
     islands, _ = ndimage.label(free)
     areas = np.bincount(islands.ravel())[1:] * grid.cell**2
     large = np.flatnonzero(areas >= _MIN_PART_AREA_M2)
-    if len(parts) == 0 or len(parts) == len(large) == 1:
+    is_single_part_whole = len(parts) == len(large) == 1
+    if len(parts) == 0 or is_single_part_whole:
         return ""
     centers = _find_island_cells(islands, large, grid)
     pieces = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centers)), minlength=len(parts))

@@ -135,10 +135,10 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
         return []
     ends = [shapely.get_point(lines, 0), shapely.get_point(lines, -1)]
     points = np.concatenate(ends)
-    index, near = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
-    # Of all ends that are close, the first one in the file counts.
+    index, neighbor = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
+    # All ends that are close to each other move to the first one in the file.
     first = np.full(len(points), len(points))
-    np.minimum.at(first, index, near)
+    np.minimum.at(first, index, neighbor)
     joined = shapely.get_coordinates(points[first])
     result = []
     for k, line in enumerate(lines):

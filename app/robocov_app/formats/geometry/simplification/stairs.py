@@ -151,7 +151,7 @@ def _find_cut_corners(drawing: RingVertices, lines: _StairLines, tolerance: Arra
     after = drawing.after
     before = drawing.before
     length = drawing.lengths
-    # Neither end of the side may be one that stays.
+    # A side is only cut if both of its ends may move.
     allowed = np.minimum(tolerance, tolerance[after])
     is_long = length > 4 * allowed
     positions, sine = intersect_lines(

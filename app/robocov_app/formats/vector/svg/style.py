@@ -1,5 +1,6 @@
 """Style of SVG elements: style sheets, inheritance, visibility and colors."""
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -244,7 +245,7 @@ def parse_opacity(text: str) -> float:
         value = float(text.rstrip("%"))
     except ValueError:
         return 1.0
-    if value != value:  # nan
+    if math.isnan(value):
         return 1.0
     if text.endswith("%"):
         value /= 100.0
