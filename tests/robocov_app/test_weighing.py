@@ -103,7 +103,7 @@ def test_a_report_shows_and_tells_it(maps, capsys, tmp_path) -> None:
         told(capsys, "report", out)
         page = (tmp_path / name / "report.html").read_text()
         is_heavy = name == "heavy"
-        assert ("Final mean distance to the nearest robot, weighed by φ: " in page) == is_heavy
+        assert ("Final mean distance to the nearest robot, weighted by φ: " in page) == is_heavy
         assert ("density φ, 0.5 to 4.5" in page) == is_heavy
         assert ("data:image/png;base64," in page) == is_heavy
 

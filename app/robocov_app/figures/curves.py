@@ -27,7 +27,7 @@ Curve: TypeAlias = tuple[str, str, Array, Array]
 
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"
-WEIGHED = "mean distance to the nearest robot, weighed by φ (m)"
+WEIGHED = "mean distance to the nearest robot, weighted by φ (m)"
 
 _MIN_EXPONENT_VALUE = 1e7
 _MIN_THOUSANDS_VALUE = 1e4

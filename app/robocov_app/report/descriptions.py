@@ -91,7 +91,7 @@ def _describe_costs(environment: Environment, history: CostHistory) -> list[str]
     if not np.isfinite([first, final]).all():
         return []
     verb = "falls" if final < first else "goes"
-    weighted = ", weighed by φ," if describe_density(environment) else ""
+    weighted = ", weighted by φ," if describe_density(environment) else ""
     sentences = [
         f"The mean distance to the nearest robot{weighted} {verb} from {first:.3f} m to {final:.3f} m."
     ]

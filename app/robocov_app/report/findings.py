@@ -70,7 +70,7 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
         if run.final_distance > lowest > 0:
             text += f" (+{100 * (run.final_distance / lowest - 1):.0f} %)"
         texts.append(text)
-    weighted = ", weighed by φ" if format_densities(result) else ""
+    weighted = ", weighted by φ" if format_densities(result) else ""
     return f"Final mean distance to the nearest robot{weighted}: {', '.join(texts)}."
 
 
