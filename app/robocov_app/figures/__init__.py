@@ -1,1 +1,1 @@
-"""Plots as matplotlib figures, for papers and screens: pages of an exact size, and what is drawn on them."""
+"""Plots as matplotlib figures, for papers and screens, on pages of an exact size."""

@@ -40,7 +40,7 @@ _PLAIN_STYLE: Any = {
 
 @contextmanager
 def plain_style() -> Iterator[None]:
-    """Let matplotlib draw the same whatever style the user has set.
+    """Let matplotlib draw the same in every style that the user may have set.
 
     A dollar sign does not start a formula, and glyphs that the font does not have cause no warning. It is
     also a decorator: ``@plain_style()``.

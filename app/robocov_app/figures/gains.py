@@ -130,7 +130,7 @@ def plot_gain_grid(grid: GainGrid, size: tuple[int, int]) -> Figure:
 
 @plain_style()
 def draw_gain_grid(axes: Axes, grid: GainGrid, theme: Theme) -> None:
-    """Draw a grid of two gains as a heat map with numbers, of which the lowest is bold.
+    """Draw a grid of two gains as a heat map with numbers. The lowest one is bold.
 
     Parameters
     ----------

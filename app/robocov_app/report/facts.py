@@ -1,4 +1,4 @@
-"""What was run, in words: titles and facts of results and of their runs."""
+"""Titles and facts of results and of their runs, as text."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,7 +31,7 @@ def _list_names(names: Sequence[str]) -> str:
 
 
 def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
-    """List what was run.
+    """List the facts about the runs of a result.
 
     Parameters
     ----------

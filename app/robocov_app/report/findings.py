@@ -1,4 +1,4 @@
-"""The outcome of a result in words: main findings, problems of the robots, and runs that are missing."""
+"""The outcome of a result as text: main findings, problems of the robots, and missing runs."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -137,7 +137,7 @@ def draw_run(
     width, height : float, px
         Maximum size.
     has_numbers : bool
-        Whether robots bear their numbers.
+        Whether robots are numbered.
     is_hidden : bool
         Whether the picture is hidden from screen readers, since a text next to it says the same.
 

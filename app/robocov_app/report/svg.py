@@ -181,7 +181,7 @@ class _SmallCopy:
 
 
 def _shorten_path(path: str) -> str:
-    """Return path data with rounded numbers, and without spaces at letters."""
+    """Return path data with rounded numbers, and without spaces next to commands."""
     words = []
     for word in path.split():
         is_number = _NUMBER.fullmatch(word) is not None

@@ -18,7 +18,7 @@ TUNED_SUFFIX = " (tuned)"
 """Follows the label of a controller whose gains were chosen on other runs than those in the group."""
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _MAX_GAIN_SUFFIX_CHARS = 12
-"""Maximum length of a suffix that is the name and the value of a gain. Longer ones become letters."""
+"""Maximum length of a suffix that is the name and the value of a gain. A longer one becomes a letter."""
 
 
 @dataclass(frozen=True, eq=False)

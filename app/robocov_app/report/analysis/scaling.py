@@ -11,7 +11,7 @@ from robocov_app.figures.statistics import group_by
 from robocov_app.report.results.result import ReportedResult, ReportedRun
 
 Scales: TypeAlias = Mapping[ReportedRun, float]
-"""What the final mean distance of each run is divided by, m."""
+"""Divisor of the final mean distance of each run, m."""
 
 
 def compute_medians(

@@ -24,7 +24,7 @@ from robocov_app.report.svg import inline_svg
 from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
 
 _MAX_MISSING_FRACTION = 0.5
-"""Two gains of which more combinations are missing were sampled from ranges, not tried on a grid."""
+"""Two gains with more missing combinations were sampled from ranges, not tried on a grid."""
 
 
 class _Parameter(NamedTuple):

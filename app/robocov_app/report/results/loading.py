@@ -143,7 +143,7 @@ def _build_run(saved_run: SavedRun, content: Mapping[str, Any]) -> ReportedRun:
 
 
 def _collect_run_facts(saved_run: SavedRun, content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a report says about all runs of a comparison, from one of them."""
+    """Return the facts about all runs of a comparison, read from one of them."""
     facts: dict[str, Any] = {
         "duration_s": float(saved_run.record.time[-1]),
         "dt_s": saved_run.record.dt,
@@ -317,7 +317,7 @@ def _collect_gain_texts(
 
 
 def _read_figures(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
-    """Return the figures of a run from its summary; those that are missing from its cost over time."""
+    """Return the figures of a run from its summary, and missing ones from its cost over time."""
     values = summary if isinstance(summary, dict) else {}
     figures: dict[str, float | None] = {}
     for name in FIGURE_NAMES:
