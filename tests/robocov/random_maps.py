@@ -18,8 +18,8 @@ def build_box(x0, y0, x1, y1):
     return PolygonObstacle(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
 
 
-def polygons(rng, count):
-    """Slanted quadrilaterals that may overlap."""
+def build_polygons(rng, count):
+    """Return quadrilaterals in any orientation that may overlap."""
     angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, (count, 4)), axis=1)
     radius = rng.uniform(0.2, 1.0, (count, 1)) * np.sqrt(10.0 / count)
     offsets = (radius * np.exp(1j * angle)).view(float).reshape(count, 4, 2)
@@ -28,17 +28,18 @@ def polygons(rng, count):
     return [PolygonObstacle(tuple(map(tuple, ring))) for ring in rings[has_area].tolist()]
 
 
-def blocks(rng, count):
-    """Boxes on a coarse grid: many lines in common, shared edges, touching corners."""
+def build_blocks(rng, count):
+    """Return boxes on a coarse grid that share lines, edges and corners."""
     low = rng.integers(0, 16, (count, 2)) / 2
     high = low + rng.integers(1, 4, (count, 2)) / 2
     return [build_box(*pair) for pair in np.hstack([low, high]).tolist()]
 
 
-def maze(rng, count):
-    """Thin walls between the rooms of a perfect maze."""
+def build_maze(rng, count):
+    """Return thin walls between the rooms of a perfect maze."""
     side = max(2, int(np.sqrt(count)))
-    step, width = SIDE / side, 0.02
+    step = SIDE / side
+    width = 0.02
     linked = set()
     stack = [(0, 0)]
     visited = {(0, 0)}
@@ -67,8 +68,8 @@ def maze(rng, count):
     return walls
 
 
-def comb(rng, count):
-    """Long teeth with narrow slits between them."""
+def build_comb(rng, count):
+    """Return long teeth with narrow slits between them."""
     count = min(count, 12)
     edges = np.linspace(0.5, 7.5, count + 1)
     slit = rng.choice([1e-5, 1e-3, 0.1])
@@ -76,8 +77,8 @@ def comb(rng, count):
     return [*teeth, build_box(0.5, 6.5, 7.5 - slit, 7.0)][: count + int(rng.integers(2))]
 
 
-def needles(rng, count):
-    """Thin triangles."""
+def build_needles(rng, count):
+    """Return thin triangles."""
     tip = rng.uniform(0.0, SIDE, (count, 2))
     length = rng.normal(size=(count, 2))
     width = length[:, ::-1] * [-1, 1] * 0.01
@@ -86,27 +87,32 @@ def needles(rng, count):
     return [PolygonObstacle(tuple(map(tuple, ring))) for ring in rings[has_area].tolist()]
 
 
-def circles(rng, count):
+def build_circles(rng, count):
     count = max(count // 8, 1)
-    return [
-        CircleObstacle((x, y), radius)
-        for x, y, radius in zip(
-            *rng.uniform(0.0, SIDE, (2, count)), rng.uniform(0.05, 0.8, count), strict=True
-        )
-    ]
+    x, y = rng.uniform(0.0, SIDE, (2, count))
+    radius = rng.uniform(0.05, 0.8, count)
+    return [CircleObstacle((x[k], y[k]), radius[k]) for k in range(count)]
 
 
-def rooms(rng, count):
-    """Walls across the whole map, some sealed, some with a door."""
+def build_rooms(rng, count):
+    """Return walls across the map with and without doors, and polygons between them."""
     walls = [build_box(x, 0.0, x + 0.2, SIDE - rng.choice([0.0, 0.6])) for x in (2.0, 4.0, 6.0)]
-    return [*walls, *polygons(rng, max(count - 3, 1))]
+    return [*walls, *build_polygons(rng, max(count - 3, 1))]
 
 
-KINDS = {build.__name__: build for build in (polygons, blocks, maze, comb, needles, circles, rooms)}
+KINDS = {
+    "polygons": build_polygons,
+    "blocks": build_blocks,
+    "maze": build_maze,
+    "comb": build_comb,
+    "needles": build_needles,
+    "circles": build_circles,
+    "rooms": build_rooms,
+}
 
 
 def build_random_map(kind, count, seed, scale=1.0, shift=(0.0, 0.0)):
-    """Return a map of a kind with about `count` obstacles, or None if hardly anything is free."""
+    """Return a map of a kind with about `count` obstacles, or None if there is little free space."""
     rng = np.random.default_rng(seed)
     boundary = SQUARE if seed % 3 else BAYS
     plain = Environment("drawn", boundary, tuple(KINDS[kind](rng, count)))

@@ -18,7 +18,10 @@ def test_groups_of_equal_values(values):
 
 
 @given(st.lists(st.tuples(st.integers(-5, 5), st.integers(0, 4)), max_size=20))
-def test_ranges(parts):
-    first, count = (np.array([part[k] for part in parts], dtype=np.intp) for k in (0, 1))
-    expected = [number for begin, size in parts for number in range(begin, begin + size)]
+def test_concatenated_ranges_agree_with_those_of_python(ranges):
+    first = np.array([start for start, _ in ranges], dtype=np.intp)
+    count = np.array([size for _, size in ranges], dtype=np.intp)
+    expected = []
+    for start, size in ranges:
+        expected += range(start, start + size)
     assert concatenate_ranges(first, count).tolist() == expected

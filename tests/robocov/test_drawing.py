@@ -1,4 +1,4 @@
-"""The library's side of drawing: it finds a backend, hands on what it was given, and needs none."""
+"""Drawing in the library: it finds a backend, passes all arguments on, and works without one."""
 
 from __future__ import annotations
 

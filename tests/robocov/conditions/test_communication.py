@@ -272,7 +272,7 @@ def test_robots_decide_by_reports_and_not_by_true_positions(controller_type: typ
     "controller_type", CONTROLLERS.values(), ids=lambda controller_type: str(controller_type.name)
 )
 def test_reports_affect_decisions(controller_type: type) -> None:
-    """Robot 1 is told that robot 2 is close. Only robots that share maps notice that elsewhere."""
+    """A message to robot 1 reports that robot 2 is close. It affects other robots only if maps are shared."""
     positions = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
     neighbors = Neighbors.from_ranges(positions, np.full(3, 20.0))
     _, other = neighbors.list_pairs()

@@ -52,7 +52,7 @@ def run_until(simulation: Simulation, time: float) -> None:
 
 
 @pytest.fixture(scope="module")
-def finished() -> Simulation:
+def final_simulation() -> Simulation:
     simulation = build_simulation()
     for _ in range(1000):
         simulation.step()
@@ -60,26 +60,26 @@ def finished() -> Simulation:
 
 
 @pytest.mark.slow
-def test_the_team_spreads_to_both_rooms_and_covers_more_than_with_rapf(finished: Simulation) -> None:
+def test_the_team_spreads_to_both_rooms_and_covers_more_than_with_rapf(final_simulation: Simulation) -> None:
     cost = CoverageCost(ROOMS, lattice=32)
     rapf = Simulation(ROOMS, Rapf(), CORNER, dt=0.05)
     for _ in range(1000):
         rapf.step()
-    assert cost(finished.positions).mean_distance < 0.9 * cost(rapf.positions).mean_distance
-    assert (finished.positions[:, 0] > 4.1).sum() == 2
+    assert cost(final_simulation.positions).mean_distance < 0.9 * cost(rapf.positions).mean_distance
+    assert (final_simulation.positions[:, 0] > 4.1).sum() == 2
 
 
-def test_the_team_comes_to_rest(finished: Simulation) -> None:
-    simulation = finished.copy()
+def test_the_team_comes_to_rest(final_simulation: Simulation) -> None:
+    simulation = final_simulation.copy()
     for _ in range(80):
         simulation.step()
-    assert np.abs(simulation.positions - finished.positions).max() < 0.05
+    assert np.abs(simulation.positions - final_simulation.positions).max() < 0.05
 
 
 @pytest.mark.slow
-def test_robots_plan_again_when_all_others_have_come_to_rest(finished: Simulation) -> None:
+def test_robots_plan_again_when_all_others_have_come_to_rest(final_simulation: Simulation) -> None:
     """Only then they may relocate, although nothing else has changed."""
-    assert all(state.motion.is_idle and state.basis.is_quiet for state in finished.memory.states)
+    assert all(state.motion.is_idle and state.basis.is_quiet for state in final_simulation.memory.states)
 
 
 @pytest.mark.slow

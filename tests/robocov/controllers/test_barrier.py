@@ -209,12 +209,14 @@ def test_velocities_of_neighbors_are_derived_from_their_positions() -> None:
     )
     ahead = np.array([[10.0, 0.0], [0.0, 0.0]])
 
-    def compute_allowed(previous_x: float) -> float:
+    def compute_allowed_force(previous_x: float) -> float:
         previous = replace(here, positions=np.array([[3.0, 5.0], [previous_x, 5.0]]), time=1.0 - 1 / 60)
         _, memory = controller.certify(previous, controller.begin(SQUARE.region, team), ahead)
         return float(controller.certify(here, memory, ahead)[0][0, 0])
 
-    approaching, standing, leaving = (compute_allowed(3.4 - speed / 60) for speed in (-0.3, 0.0, 0.3))
+    approaching = compute_allowed_force(3.4 + 0.3 / 60)
+    standing = compute_allowed_force(3.4)
+    leaving = compute_allowed_force(3.4 - 0.3 / 60)
     assert approaching < standing < leaving
     # The certificate by hand: alpha 1.6 for each robot, D_s 0.25, the root rounded over 1 mm.
     root = np.sqrt(2 * 3.2)
@@ -222,8 +224,9 @@ def test_velocities_of_neighbors_are_derived_from_their_positions() -> None:
     assert standing == pytest.approx((20 * h**3 - 0.3 * root / (2 * np.sqrt(0.151))) / 2, rel=1e-9)
 
 
-def test_two_runs_are_equal() -> None:
+def test_runs_are_reproducible() -> None:
     rooms = load_map("rooms")
     starts = rooms.start().sample(6, seed=1)
-    first, second = (Simulation(rooms, Barrier(), starts).run(1.5) for _ in range(2))
+    first = Simulation(rooms, Barrier(), starts).run(1.5)
+    second = Simulation(rooms, Barrier(), starts).run(1.5)
     assert first.positions.tobytes() == second.positions.tobytes()

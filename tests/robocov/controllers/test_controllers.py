@@ -1,4 +1,4 @@
-"""Properties of all controllers, above all: a robot uses only what it knows."""
+"""Properties of all controllers, for example that robots use only their own information."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ def change_others(
 
 @pytest.mark.parametrize("controller", PARAMETERS)
 def test_the_information_test_can_fail(controller: Controller) -> None:
-    """What a robot knows changes its decision: the property above is not empty."""
+    """The information of a robot changes its decision, so the previous test is not trivial."""
     positions = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
     team = Team.homogeneous(3)
     seen = sample_observations(positions, np.inf, 1)

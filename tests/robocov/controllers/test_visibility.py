@@ -1,4 +1,4 @@
-"""Views, and the controllers Visibility and Boosting that maximize what is in view."""
+"""Views, and the controllers Visibility and Boosting that maximize the visible area."""
 
 from __future__ import annotations
 

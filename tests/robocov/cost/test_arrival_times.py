@@ -90,7 +90,7 @@ def test_a_fast_robot_owns_sites_that_are_nearer_to_a_slow_one() -> None:
     assert "mean time" in repr(result)
 
 
-def test_rooms_without_a_robot_are_uncovered_whatever_the_speed() -> None:
+def test_rooms_without_a_robot_are_uncovered_for_any_speed() -> None:
     halves = CoverageCost(build_environment(((0.45, 0.0), (0.55, 0.0), (0.55, 1.0), (0.45, 1.0))), lattice=20)
     result = halves([[0.2, 0.5], [0.3, 0.5]], speeds=[1.0, 2.0])
     assert np.isinf(result.times[result.owner < 0]).all()

@@ -106,11 +106,9 @@ def test_the_least_recently_used_file_is_removed_beyond_the_limit(tmp_path):
 
 def test_abandoned_temporary_files_are_removed_after_a_day(tmp_path):
     cache = ArrayCache(tmp_path)
-    stale, fresh, foreign = (
-        tmp_path / ".a.1.part.robocov",
-        tmp_path / ".b.2.part.robocov",
-        tmp_path / "mine.txt",
-    )
+    stale = tmp_path / ".a.1.part.robocov"
+    fresh = tmp_path / ".b.2.part.robocov"
+    foreign = tmp_path / "mine.txt"
     for path in (stale, fresh, foreign):
         path.write_text("")
     os.utime(stale, (time.time() - 90_000,) * 2)

@@ -45,10 +45,8 @@ def write_zeros(path: Path, arrays: int) -> None:
         for k in range(arrays):
             archive.writestr(f"a{k}.npy", stream + bytes(7_000_000 - len(stream)))
         for entry in archive.filelist:
-            entry.compress_type, entry.file_size = (
-                zipfile.ZIP_DEFLATED,
-                CLAIMED_BYTES + len(build_header(CLAIMED_BYTES)),
-            )
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.file_size = CLAIMED_BYTES + len(build_header(CLAIMED_BYTES))
 
 
 def test_files_of_numpy_are_read() -> None:

@@ -1,4 +1,4 @@
-"""Where things are in a text: against a writer that notes it while it writes."""
+"""Positions of values in a JSON text, compared with those that a writer records."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Writer:
         self._space()
         self.values[path] = len(self.text)
         if isinstance(value, (dict, list)):
-            left, right = "{}" if isinstance(value, dict) else "[]"
-            self.text += left
+            brackets = "{}" if isinstance(value, dict) else "[]"
+            self.text += brackets[0]
             steps = value if isinstance(value, dict) else range(len(value))
             for number, step in enumerate(steps):
                 self.text += "," if number else ""
@@ -48,7 +48,7 @@ class Writer:
                     self.text += ":"
                 self.write(value[step], (*path, step))
             self._space()
-            self.text += right
+            self.text += brackets[1]
         else:
             self.text += json.dumps(value, ensure_ascii=False)
         self._space()

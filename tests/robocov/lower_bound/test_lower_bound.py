@@ -34,45 +34,46 @@ PILLARS = build_room(5, 4, build_box(1, 1, 2, 3), build_box(3, 0.8, 3.6, 2.2), n
 
 
 @pytest.mark.slow
-def test_one_robot_in_a_square_is_known_exactly():
+def test_the_bound_of_one_robot_in_a_square_is_nearly_exact():
     bound = compute_lower_bound(build_room(4, 4), [[1.2, 3.1]], precision=2e-4)
-    # the mean distance in a square from its middle
-    least = CoverageCost(build_room(4, 4), 64)([[2.0, 2.0]]).mean_distance
-    assert least * (1.0 - 4e-4) < bound.mean_distance < least
-    assert least == pytest.approx(4 * 0.3825978582, rel=1e-4)
+    # This is the mean distance in a square from its center.
+    min_mean_distance = CoverageCost(build_room(4, 4), 64)([[2.0, 2.0]]).mean_distance
+    assert min_mean_distance * (1.0 - 4e-4) < bound.mean_distance < min_mean_distance
+    assert min_mean_distance == pytest.approx(4 * 0.3825978582, rel=1e-4)
     assert bound.value == pytest.approx(16.0 * bound.mean_distance)
-    assert bound.placement_mean_distance > 1.2 * least
+    assert bound.placement_mean_distance > 1.2 * min_mean_distance
     assert bound.gap == 1.0 - bound.mean_distance / bound.placement_mean_distance
 
 
-def test_two_robots_in_a_corridor():
-    corridor, places = build_room(20, 0.5), [[5.0, 0.25], [15.0, 0.25]]
-    bound = compute_lower_bound(corridor, places, lattice=200)
-    # the last bit depends on the linear algebra library
-    assert bound.placement_mean_distance == pytest.approx(
-        CoverageCost(corridor, 200)(places).mean_distance, rel=1e-14
-    )
+def test_the_bound_of_two_robots_in_a_corridor_is_nearly_exact():
+    corridor = build_room(20, 0.5)
+    positions = [[5.0, 0.25], [15.0, 0.25]]
+    bound = compute_lower_bound(corridor, positions, lattice=200)
+    # The last bit depends on the linear algebra library.
+    mean_distance = CoverageCost(corridor, 200)(positions).mean_distance
+    assert bound.placement_mean_distance == pytest.approx(mean_distance, rel=1e-14)
     assert 0.0 < bound.gap < 0.001
 
 
 @pytest.mark.parametrize("environment", [L_ROOM, PILLARS], ids=lambda environment: environment.name)
 @pytest.mark.parametrize("robots", [1, 2, 3])
-def test_it_is_just_below_the_best_of_all_teams_on_sites(environment, robots):
+def test_the_bound_is_just_below_the_best_of_all_teams_on_sites(environment, robots):
     cost = CoverageCost(environment, 9)
-    table = cost.geodesics.compute_distances(cost.points, cost.points)
-    teams = np.array(list(combinations_with_replacement(range(len(table)), robots)))
-    means = np.concatenate([table[some].min(axis=1).mean(axis=1) for some in np.array_split(teams, 60)])
+    distances = cost.geodesics.compute_distances(cost.points, cost.points)
+    teams = np.array(list(combinations_with_replacement(range(len(distances)), robots)))
+    batches = np.array_split(teams, 60)
+    means = np.concatenate([distances[batch].min(axis=1).mean(axis=1) for batch in batches])
     bound = compute_lower_bound(environment, cost.points[teams[means.argmin()]], lattice=9, radius=1e-3)
     assert bound.placement_mean_distance == pytest.approx(means.min())
     best = find_optimum(environment, robots, lattice=9, radius=0.02)
     assert bound.mean_distance <= min(best.mean_distance, means.min())
-    # the rest is the duality gap, which is larger with so few sites
+    # The duality gap is larger with few sites.
     assert bound.mean_distance > best.mean_distance * 0.93
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "robots"), [("blocks-a", 5), ("rooms", 8), ("trap", 12)])
-def test_it_is_close_to_the_optimum_on_bundled_maps(name, robots):
+def test_the_bound_is_close_to_the_optimum_on_bundled_maps(name, robots):
     environment = load_map(name)
     best = find_optimum(environment, robots, lattice=32, restarts=8)
     bound = compute_lower_bound(environment, best.positions, lattice=32)
@@ -90,16 +91,17 @@ def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvi
     cost = CoverageCost(environment, 8)
     dual = _Dual(cost, rng.choice(cost.points, 3), float(rng.choice([1e-6, 0.02])))
     # With prices for few sites, an error at one of them is not hidden by the slack of the others.
-    some = rng.random(len(dual.site_numbers)) < rng.choice([0.04, 1.0])
-    prices = np.where(some, rng.uniform(2.0, 12.0, len(dual.site_numbers)), 0.0)
+    has_price = rng.random(len(dual.site_numbers)) < rng.choice([0.04, 1.0])
+    prices = np.where(has_price, rng.uniform(2.0, 12.0, len(dual.site_numbers)), 0.0)
     triangles = dual._triangles
     for _ in range(halvings):
         triangles = halve_triangles(rng.permutation(triangles)[:30])
     _, profit, bound = dual.bound_profits(prices, triangles)
-    part = rng.dirichlet([0.5, 0.5, 0.5], (len(triangles), 12))
-    part[:, :3] = np.eye(3)
-    places = cost.geodesics.grid.to_meters(np.einsum("tpk,tkd->tpd", part, triangles).reshape(-1, 2))
-    distances = cost.geodesics.compute_distances(places, cost.points[dual.site_numbers])
+    barycentric = rng.dirichlet([0.5, 0.5, 0.5], (len(triangles), 12))
+    barycentric[:, :3] = np.eye(3)
+    grid_points = np.einsum("tpk,tkd->tpd", barycentric, triangles).reshape(-1, 2)
+    points = cost.geodesics.grid.to_meters(grid_points)
+    distances = cost.geodesics.compute_distances(points, cost.points[dual.site_numbers])
     profits = np.maximum(prices - distances, 0.0).sum(axis=1).reshape(len(triangles), 12)
     slack = 1e-9 * dual.total_weight
     assert (profits.max(axis=1) <= bound + slack).all()
@@ -109,44 +111,47 @@ def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvi
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 9))
-def test_no_team_costs_less(kind, seed, robots):
+def test_no_team_costs_less_than_the_bound(kind, seed, robots):
     environment = build_random_map(kind, 10, seed)
     if environment is None:
         return
     rng = np.random.default_rng(seed)
     cost = CoverageCost(environment, 12)
     clearance = shapely.distance(environment.free.boundary, shapely.points(cost.points))
-    inside = cost.points[clearance >= 0.05]
-    if not len(inside):
+    candidates = cost.points[clearance >= 0.05]
+    if not len(candidates):
         return
     bound = compute_lower_bound(
-        environment, rng.choice(inside, robots), lattice=12, radius=0.05, precision=0.01
+        environment, rng.choice(candidates, robots), lattice=12, radius=0.05, precision=0.01
     )
-    counted = ~np.isnan(bound.prices)
-    table = np.ascontiguousarray(cost.geodesics.compute_distances(inside, cost.points[counted]).T)
-    teams = [rng.choice(len(inside), robots) for _ in range(200)]
-    finite = np.where(np.isinf(table), 1e6, table)
-    teams += [apply_best_swaps(finite, run_lloyd(finite, team)) for team in teams[:5]]
-    assert min(table[:, team].min(axis=1).mean() for team in teams) >= bound.mean_distance
+    counted_sites = cost.points[~np.isnan(bound.prices)]
+    distances = cost.geodesics.compute_distances(candidates, counted_sites)
+    distances = np.ascontiguousarray(distances.T)
+    teams = [rng.choice(len(candidates), robots) for _ in range(200)]
+    finite_distances = np.where(np.isinf(distances), 1e6, distances)
+    teams += [apply_best_swaps(finite_distances, run_lloyd(finite_distances, team)) for team in teams[:5]]
+    assert min(distances[:, team].min(axis=1).mean() for team in teams) >= bound.mean_distance
 
 
-def test_places_near_walls_count_where_the_robot_fits():
+def test_triangles_cover_all_free_positions_near_walls():
     """The triangles cover every valid position, although GEOS buffers are not exact."""
     environment = load_map("cave")
-    cost, radius = CoverageCost(environment, 16), 0.3
+    cost = CoverageCost(environment, 16)
+    radius = 0.3
     triangles = _Dual(cost, cost.points[[0]], radius)._triangles
     polygons = shapely.polygons(cost.geodesics.grid.to_meters(triangles))
     low_x, low_y, high_x, high_y = environment.free.bounds
-    places = shapely.points(np.random.default_rng(0).uniform((low_x, low_y), (high_x, high_y), (20_000, 2)))
-    fit = shapely.contains(environment.free, places) & (
-        shapely.distance(environment.free.boundary, places) >= radius
-    )
-    assert fit.sum() > 2000
-    assert (shapely.STRtree(polygons).query_nearest(places[fit], return_distance=True)[1] < 1e-9).all()
+    positions = np.random.default_rng(0).uniform((low_x, low_y), (high_x, high_y), (20_000, 2))
+    points = shapely.points(positions)
+    is_free = shapely.contains(environment.free, points)
+    is_free &= shapely.distance(environment.free.boundary, points) >= radius
+    assert is_free.sum() > 2000
+    _, distances = shapely.STRtree(polygons).query_nearest(points[is_free], return_distance=True)
+    assert (distances < 1e-9).all()
 
 
 @pytest.mark.slow
-def test_a_density_weighs_the_sites():
+def test_sites_are_weighted_by_the_density():
     environment = L_ROOM.with_density(Gaussians((Gaussian((1.0, 3.0), weight=5.0, sigma=0.4),), floor=0.1))
     best = find_optimum(environment, 2, lattice=32, restarts=4)
     bound = compute_lower_bound(environment, best.positions, lattice=32)
@@ -157,14 +162,15 @@ def test_a_density_weighs_the_sites():
 
 @pytest.mark.slow
 def test_several_components_are_bounded_together():
-    halves = build_room(12, 4, build_box(7, 0, 7.2, 4), build_box(9.4, 0, 9.6, 4), name="three")
+    rooms = build_room(12, 4, build_box(7, 0, 7.2, 4), build_box(9.4, 0, 9.6, 4), name="three")
     for robots in (1, 2, 3, 4):
-        best = find_optimum(halves, robots, lattice=48, restarts=4)
-        bound = compute_lower_bound(halves, best.positions, lattice=48, precision=0.003)
+        best = find_optimum(rooms, robots, lattice=48, restarts=4)
+        bound = compute_lower_bound(rooms, best.positions, lattice=48, precision=0.003)
         assert bound.value == pytest.approx(bound.mean_distance * best.value / best.mean_distance)
         assert 0.0 < bound.gap < 0.01
-        counted = CoverageCost(halves, 48).points[~np.isnan(bound.prices)]
-        assert (counted[:, 0] > 9.6).any() == (robots >= 3 or best.positions[:, 0].max() > 9.6)
+        counted_sites = CoverageCost(rooms, 48).points[~np.isnan(bound.prices)]
+        covers_third_room = robots >= 3 or best.positions[:, 0].max() > 9.6
+        assert (counted_sites[:, 0] > 9.6).any() == covers_third_room
 
 
 def test_a_robot_on_each_site_costs_nothing():
@@ -175,14 +181,15 @@ def test_a_robot_on_each_site_costs_nothing():
 
 @pytest.mark.slow
 def test_the_same_call_gives_the_same_bits():
-    places = [[1.0, 1.0], [3.0, 0.5]]
-    one, other = (compute_lower_bound(L_ROOM, places, lattice=16) for _ in range(2))
-    assert one.mean_distance == other.mean_distance
-    np.testing.assert_array_equal(one.prices, other.prices)
+    positions = [[1.0, 1.0], [3.0, 0.5]]
+    first = compute_lower_bound(L_ROOM, positions, lattice=16)
+    second = compute_lower_bound(L_ROOM, positions, lattice=16)
+    assert first.mean_distance == second.mean_distance
+    np.testing.assert_array_equal(first.prices, second.prices)
 
 
 @pytest.mark.parametrize(
-    ("words", "error", "message"),
+    ("parameters", "error", "message"),
     [
         ({"radius": 0.0}, ParameterError, "radius: expected a number from 1e-06 to inf m, got 0.0"),
         (
@@ -196,9 +203,9 @@ def test_the_same_call_gives_the_same_bits():
         ({"positions": []}, InputError, "positions: expected at least one robot, got none"),
     ],
 )
-def test_invalid_parameters_are_named(words, error, message):
+def test_invalid_parameters_are_named(parameters, error, message):
     with pytest.raises(error) as caught:
-        compute_lower_bound(L_ROOM, **{"positions": [[1.0, 1.0]], "lattice": 8, **words})
+        compute_lower_bound(L_ROOM, **{"positions": [[1.0, 1.0]], "lattice": 8, **parameters})
     assert str(caught.value).startswith(message)
 
 

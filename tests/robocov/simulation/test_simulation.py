@@ -174,7 +174,7 @@ def test_records_respect_times_and_limits(cluttered: Environment) -> None:
 
 
 class FixedForces:
-    """Returns the forces that it was built with, whatever they are."""
+    """A controller that returns given forces without checking them."""
 
     name = "fixed-forces"
     label = "Fixed forces"
