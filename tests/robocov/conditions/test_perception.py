@@ -81,8 +81,8 @@ def test_copies_continue_identically(steps: int, seed: int) -> None:
         simulation.step()
     # The copy is made in the middle of a step.
     simulation.observe_and_decide()
-    twin = simulation.copy()
-    assert simulate(twin, 15) == simulate(simulation, 15)
+    copy = simulation.copy()
+    assert simulate(copy, 15) == simulate(simulation, 15)
 
 
 def test_a_simulation_rebuilt_at_an_earlier_state_repeats_the_run() -> None:

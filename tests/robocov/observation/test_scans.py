@@ -37,8 +37,8 @@ def test_scans_arrive_with_the_requested_period(cluttered: Environment) -> None:
     for _ in range(11):
         simulation.step()
     assert simulation.memory == (0.0, 0.1, 0.2)
-    twin = simulation.copy()
-    for continued in (simulation, twin):
+    copy = simulation.copy()
+    for continued in (simulation, copy):
         for _ in range(5):
             continued.step()
         assert continued.memory == (0.0, 0.1, 0.2, 0.3)

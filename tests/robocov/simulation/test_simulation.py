@@ -99,15 +99,15 @@ def test_copies_continue_identically(
     simulation = Simulation(cluttered, controller, cluttered.start().sample(6, seed=seed))
     for _ in range(branch):
         simulation.step()
-    twin = simulation.copy()
-    assert twin.time == simulation.time
+    copy = simulation.copy()
+    assert copy.time == simulation.time
     for _ in range(200):
         simulation.step()
-    assert not np.array_equal(twin.positions, simulation.positions)
+    assert not np.array_equal(copy.positions, simulation.positions)
     for _ in range(200):
-        twin.step()
-    np.testing.assert_array_equal(twin.positions, simulation.positions)
-    np.testing.assert_array_equal(twin.velocities, simulation.velocities)
+        copy.step()
+    np.testing.assert_array_equal(copy.positions, simulation.positions)
+    np.testing.assert_array_equal(copy.velocities, simulation.velocities)
 
 
 def transform(environment: Environment, matrix: np.ndarray) -> Environment:
@@ -282,12 +282,12 @@ def test_copies_have_a_memory_of_their_own(empty: Environment) -> None:
     assert (simulation.observe_and_decide().decision.memory, simulation.memory) == ([4], [3])
     assert simulation.with_changes(velocities=np.zeros((1, 2))).memory == [3]
     assert simulation.with_changes(controller=ChangesItsMemory(np.zeros((1, 2)))).memory == [0]
-    twin = simulation.copy()
+    copy = simulation.copy()
     for _ in range(5):
         simulation.step()
     for _ in range(5):
-        twin.step()
-    np.testing.assert_array_equal(twin.positions, simulation.positions)
+        copy.step()
+    np.testing.assert_array_equal(copy.positions, simulation.positions)
 
 
 class OwnCounter:
@@ -304,12 +304,12 @@ def test_copies_are_independent_of_memory_assigned_by_a_controller_for_one_robot
     simulation = Simulation(empty, OwnCounter(), [[2.0, 2.0]])
     simulation.step()
     simulation.observe_and_decide()
-    twin = simulation.copy()
+    copy = simulation.copy()
     for _ in range(4):
         simulation.step()
-        twin.step()
-    assert simulation.memory.by_robot == twin.memory.by_robot == [[5]]
-    assert twin.positions.tobytes() == simulation.positions.tobytes()
+        copy.step()
+    assert simulation.memory.by_robot == copy.memory.by_robot == [[5]]
+    assert copy.positions.tobytes() == simulation.positions.tobytes()
 
 
 def test_memory_assigned_by_a_controller_for_one_robot_reaches_its_next_step(empty: Environment) -> None:
@@ -338,9 +338,9 @@ class MassController(FixedForces):
 
 def test_a_new_density_reaches_a_controller_that_knows_the_map(empty: Environment) -> None:
     simulation = Simulation(empty, MassController(), [[2.0, 2.0]])
-    twin = simulation.with_density(empty.with_density(Uniform(3.0)))
+    copy = simulation.with_density(empty.with_density(Uniform(3.0)))
     before = simulation.observe_and_decide().decision.forces
-    after = twin.observe_and_decide().decision.forces
+    after = copy.observe_and_decide().decision.forces
     np.testing.assert_allclose(after, 3.0 * before)
     assert simulation.environment is empty
 
@@ -348,13 +348,13 @@ def test_a_new_density_reaches_a_controller_that_knows_the_map(empty: Environmen
 def test_changes_keep_the_number_of_steps(empty: Environment) -> None:
     """Times are multiples of the control period, and scans are taken in the same steps."""
     simulation = Simulation(empty, Howard(), [[2.0, 2.0], [3.0, 3.0]], dt=0.03)
-    twin = simulation.copy()
+    copy = simulation.copy()
     for _ in range(40):
         simulation.step()
-        twin.step()
-        twin = twin.with_changes()
-        assert twin.time == simulation.time
-        assert (twin.observe().scans is None) == (simulation.observe().scans is None)
+        copy.step()
+        copy = copy.with_changes()
+        assert copy.time == simulation.time
+        assert (copy.observe().scans is None) == (simulation.observe().scans is None)
 
 
 def test_a_state_has_two_finite_numbers_for_each_robot() -> None:
@@ -453,14 +453,14 @@ class TestChanges:
     def test_without_changes_a_simulation_continues_identically(self) -> None:
         original = self.build_moving()
         changed = original.with_changes()
-        twin = original.copy()
+        copy = original.copy()
         assert changed.time == original.time == pytest.approx(1.5)
         for _ in range(120):
             changed.step()
-            twin.step()
-        np.testing.assert_array_equal(changed.positions, twin.positions)
-        np.testing.assert_array_equal(changed.velocities, twin.velocities)
-        assert changed.time == twin.time
+            copy.step()
+        np.testing.assert_array_equal(changed.positions, copy.positions)
+        np.testing.assert_array_equal(changed.velocities, copy.velocities)
+        assert changed.time == copy.time
         assert original.time == pytest.approx(1.5)
 
     def test_another_controller_continues_from_the_same_state(self) -> None:
@@ -579,16 +579,16 @@ def sense_from(simulation: Simulation, positions: np.ndarray) -> bytes:
 def test_copies_share_nothing_that_changes(build: Callable[[], Simulation]) -> None:
     simulation = build()
     simulation.step()
-    twin = simulation.copy()
+    copy = simulation.copy()
     positions = simulation.positions.copy()
     working = simulation.working.copy()
     obstacle_points = sense_from(simulation, positions)
     for _ in range(60):
-        twin.step()
+        copy.step()
     np.testing.assert_array_equal(simulation.positions, positions)
     np.testing.assert_array_equal(simulation.working, working)
     assert sense_from(simulation, positions) == obstacle_points
     for _ in range(60):
         simulation.step()
-    assert simulation.positions.tobytes() == twin.positions.tobytes()
-    assert sense_from(simulation, twin.positions) == sense_from(twin, twin.positions)
+    assert simulation.positions.tobytes() == copy.positions.tobytes()
+    assert sense_from(simulation, copy.positions) == sense_from(copy, copy.positions)
