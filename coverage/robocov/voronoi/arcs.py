@@ -2,8 +2,9 @@
 
 A piece of a boundary is a row of an array, whose columns are named below. The half angle of an arc is from
 -pi/2 to pi/2, positive if the arc turns left; a half angle of zero is a segment. An arc that is almost a
-segment keeps its full precision, however large its radius is. Green's theorem needs the triangle that the
-chord spans with the origin, and the circular segment between chord and arc.
+segment keeps its full precision, however large its radius is. By Green's theorem, the moments of a cell are
+sums over its pieces: each adds those of the triangle between its chord and the origin, and those of the
+circular segment between its chord and its arc.
 """
 
 from math import comb
@@ -31,7 +32,7 @@ BEYOND = 6
 PIECE_COLUMNS = 7
 
 _MAX_SERIES_SQUARED_SINE = 0.04
-"""sin² of the half angle up to which the series is used: for small angles rounding spoils the closed form."""
+"""sin² of the half angle up to which the series is used, because the closed form loses precision there."""
 
 _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
 """Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
@@ -71,11 +72,11 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
         cross = x * v - u * y
         middle_x = 0.5 * (x + u)
         middle_y = 0.5 * (y + v)
-        # The normal points to the right of the chord, and is as long as it.
+        # The normal points to the right of the chord, and has the same length.
         normal_x = v - y
         normal_y = x - u
         squared_length = normal_x * normal_x + normal_y * normal_y
-        # The moments of the circular segment. The normal provides one more factor of length in the first one.
+        # The moments of the circular segment. The third factor of length of `first` is that of the normal.
         unit_area, unit_first, unit_polar = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
         area = unit_area * squared_length
         first = unit_first * squared_length
@@ -121,6 +122,7 @@ def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
     Parameters
     ----------
     pieces : (p, 5 or more) array
+        For the columns, see the constants at the top of the module; only the first five are used.
     max_deviation : float, m
         Maximum distance of a chord from its arc.
 

@@ -1,8 +1,8 @@
 """Boundaries of the cells of robots of different speeds: pieces of lines and circles.
 
 Relative to the generator, every curve that may bound a cell is a |q|² + b q = c, and the cell lies where
-a |q|² + b q <= c. It is a line (a = 0), a circle around the cell (a > 0), or a circle around what does not
-belong to the cell (a < 0). With b² + 4 a c = 1 the curves behave like unit vectors: their product
+a |q|² + b q <= c. It is a line (a = 0), a circle around the cell (a > 0), or a circle around an area
+outside the cell (a < 0). With b² + 4 a c = 1 the curves behave like unit vectors: their product
 g = b b' + 2 (a c' + a' c) determines how they meet. They intersect in two points if |g| < 1.
 
 With r n the point of a curve that is nearest to the generator, and its curvature k = 2 a, the parameter t of
@@ -71,8 +71,8 @@ _FIRST_IS_OUTSIDE = 1
 _SECOND_IS_OUTSIDE = 2
 """Flags: the first, or the second, of two curves is nowhere on the cell's side of the other one."""
 
-_MIN_SPARE_PIECES = 64
-"""Room for pieces at first, beyond one for each edge."""
+_SPARE_PIECES = 64
+"""Initial room for pieces, in addition to one for each edge."""
 
 _MIN_SQUARED_SINE = 1e-29
 """sin² of the angle at which two curves meet, below which rounding alone decides whether and where they do.
@@ -104,7 +104,7 @@ def trace_boundaries(
     (p, 7) array
         For the columns see `robocov.voronoi.arcs`.
     """
-    pieces = np.empty((len(edges) + _MIN_SPARE_PIECES, PIECE_COLUMNS))
+    pieces = np.empty((len(edges) + _SPARE_PIECES, PIECE_COLUMNS))
     piece_count = 0
     end_pair = 0
     end_edge = 0
@@ -130,7 +130,7 @@ def trace_boundaries(
             crossings = np.empty((curve_count, curve_count, 2))
             _find_crossings(curves[:curve_count], line_count, crossings)
             for c in range(curve_count):
-                # Each curve cuts out at most one gap, and each part is cut at most once.
+                # Each other curve cuts out at most one gap, and each part is divided at most once.
                 pieces = _make_room(pieces, piece_count, 2 * curve_count + 2)
                 piece_count = _add_parts(curves[c], crossings[c], pieces, piece_count)
     return pieces[:piece_count]
@@ -138,7 +138,7 @@ def trace_boundaries(
 
 @kernel
 def _make_room(pieces: Array, piece_count: int, room: int) -> Array:
-    """Return an array with the pieces so far and room for more; the same array if it has room."""
+    """Return an array with the pieces so far and room for more; the same array if it is large enough."""
     if piece_count + room <= len(pieces):
         return pieces
     larger = np.empty((2 * (piece_count + room), PIECE_COLUMNS))
@@ -231,7 +231,7 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
 
 @kernel
 def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
-    """Write the direction and distance of the bisector to a neighbor.
+    """Write the normal of the bisector to a neighbor, and its distance from the generator.
 
     They are not taken from the edge: it may be so short that rounding decides its direction.
     """
@@ -245,7 +245,7 @@ def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
 
 @kernel
 def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
-    """Write the direction and distance from the generator of the side of the region that an edge lies on."""
+    """Find the side of the region on which an edge lies; write its normal and distance from the generator."""
     middle_x = 0.5 * (edge[_EDGE_START_X] + edge[_EDGE_END_X])
     middle_y = 0.5 * (edge[_EDGE_START_Y] + edge[_EDGE_END_Y])
     min_offset = np.inf
@@ -285,7 +285,7 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
                 curves[other, _END] = -np.inf
             crossings[one, other, _ENTER] = enter
             crossings[one, other, _LEAVE] = leave
-            # Where a curve leaves the side of another one, that one enters its side, at the same point.
+            # At the point where `one` leaves the cell's side of `other`, `other` enters that of `one`.
             x, y = _evaluate(curves[one], leave)
             crossings[other, one, _ENTER] = _find_parameter(curves[other], x, y)
             x, y = _evaluate(curves[one], enter)
@@ -327,8 +327,8 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
         if leftward >= 0.0:
             return large / quadratic, constant / large, 0
         return constant / large, large / quadratic, 0
-    # The curves do not intersect: the function has the same sign on the whole first curve. For g >= 1, one of
-    # the curves is on the cell's side of the other one; for g <= -1, both are, or neither is.
+    # The curves do not intersect: the function has the same sign on the whole first curve. If g >= 1, one of
+    # the curves is on the cell's side of the other one; if g <= -1, both are, or neither is.
     flags = 0
     is_first_outside = quadratic + constant > 0.0
     if is_first_outside:
@@ -361,8 +361,8 @@ def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) 
         if crossings[other, _ENTER] <= crossings[other, _LEAVE]:
             start = max(start, crossings[other, _ENTER])
             end = min(end, crossings[other, _LEAVE])
-    # If the cell's side of another curve is left before it is entered, there is a gap between the two. The
-    # gaps within the interval replace the first crossings, sorted by their start.
+    # If the curve leaves the cell's side of another one before it enters it, there is a gap in between. The
+    # gaps within the interval are written over the first crossings, sorted by their start.
     gap_count = 0
     for other in range(len(crossings)):
         enter = crossings[other, _ENTER]

@@ -25,7 +25,7 @@ _MIN_TRIANGULATED_ROBOTS = 16
 
 _NO_EDGES = np.empty((0, EDGE_COLUMNS))
 _NO_MESH = np.empty((2, 0), dtype=np.int32)
-"""Stands for a triangulation if cells are clipped."""
+"""Replaces the triangulation if cells are clipped."""
 
 _AnyCells = TypeVar("_AnyCells", bound=Cells)
 
@@ -72,13 +72,13 @@ def partition(
         Communication graph. Cell i is cut only by the bisectors to the neighbors of robot i, and depends, to
         the last bit, on nothing else. By default each robot is a neighbor of all others.
     triangulation : (2, 8 n + 4) int32 array or None
-        `Cells.triangulation` of the previous partition. If the generators have moved little since, this one
-        takes a fraction of the time. Its cells are the same, to the last bit unless four generators lie on a
-        circle up to rounding.
+        `Cells.triangulation` of the previous partition. If the generators have moved only a little since
+        then, reusing it takes a fraction of the time. The cells are the same, to the last bit unless four
+        generators lie on a circle up to rounding.
     reported_positions : (m, 2) array or None, m
-        Known positions of the neighbors, in the order of ``neighbors.indices``. The cells of two
-        robots may then overlap or leave a gap, as each is based on what its own robot knows. By default the
-        true positions are known.
+        Positions of the neighbors as known to each robot, in the order of ``neighbors.indices``. The cells of
+        two robots may then overlap or leave a gap, because each is based on what its own robot knows. By
+        default robots know the true positions.
     density : Density or None
         φ of mass, centroid and moments; the cells do not depend on it. By default 1 everywhere.
 
@@ -103,15 +103,15 @@ def partition(
     if neighbors is None:
         neighbors = Neighbors(len(points))
     check_neighbors(neighbors, reported_positions, len(points))
-    known = NeighborPositions.from_graph(neighbors, reported_positions)
+    neighbor_positions = NeighborPositions.from_graph(neighbors, reported_positions)
     mesh = _create_mesh(len(points), triangulation, is_complete=neighbors.is_complete)
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
-    edge_count = _compute_cells(points, region.sides, known, mesh, cells)
+    edge_count = _compute_cells(points, region.sides, neighbor_positions, mesh, cells)
     if edge_count < 0:
         robot = -1 - edge_count
         raise InputError(f"generators[{robot}]: expected finite numbers, got {quote(points[robot].tolist())}")
-    has_triangulation_failed = mesh.shape[1] > 0 and mesh[CORNER, 0] < 0
-    if has_triangulation_failed:
+    triangulation_failed = mesh.shape[1] > 0 and mesh[CORNER, 0] < 0
+    if triangulation_failed:
         mesh = _NO_MESH.copy()
     mesh.setflags(write=False)
     voronoi_cells = VoronoiPartition(
@@ -119,7 +119,7 @@ def partition(
         mass=cells.mass,
         centroid=cells.centroid,
         triangulation=mesh if mesh.shape[1] > 0 else None,
-        _compute_edges=partial(_compute_edges, points, region.sides, known, mesh, edge_count),
+        _compute_edges=partial(_compute_edges, points, region.sides, neighbor_positions, mesh, edge_count),
     )
     return apply_density(voronoi_cells, density)
 
@@ -176,20 +176,19 @@ def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robo
 
 
 def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
-    """Replace the mass and centroid of uniform cells by those with a density.
+    """Set the density of new cells, and update their masses and centroids.
 
     Parameters
     ----------
     cells : Cells
-        New cells that are not yet in use, computed for a density of 1. They are changed in place, and their
-        arrays become read-only.
+        Cells computed for a density of 1. They are changed in place, and their arrays become read-only.
     density : Density or None
         None stands for 1 everywhere.
 
     Returns
     -------
     Cells
-        The same object.
+        The same cells.
     """
     cells.density = density
     if density is not None and density.is_uniform:
@@ -215,13 +214,13 @@ def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) 
 
 
 def _compute_edges(
-    points: Array, sides: Array, known: NeighborPositions, mesh: Mesh, edge_count: int
+    points: Array, sides: Array, neighbor_positions: NeighborPositions, mesh: Mesh, edge_count: int
 ) -> CellEdges:
-    """Compute the edges of all cells, by computing the cells again with room for their edges."""
+    """Compute the edges of all cells: the cells are computed again, this time with room for their edges."""
     edges = np.empty((edge_count, EDGE_COLUMNS))
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
     # Copies, because read-only arrays are a different type to the compiler.
-    _compute_cells(points.copy(), sides, known, mesh.copy(), cells)
+    _compute_cells(points.copy(), sides, neighbor_positions, mesh.copy(), cells)
     return CellEdges(
         start=edges[:, :EDGE_END_X].copy(),
         end=edges[:, EDGE_END_X:EDGE_CELL].copy(),

@@ -48,13 +48,14 @@ def compute_clipped_cells(
 
 @inlined_kernel
 def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: NeighborPositions, i: int) -> int:
-    """Add the neighbors of robot i at their known positions; return their number."""
+    """Add the listed neighbors of robot i at their positions as known to it; return their number."""
     neighbor_rows = workspace.neighbors
     reported_positions = neighbors.positions
+    has_reported_positions = len(reported_positions) > 0
     count = 0
     for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
         j = neighbors.indices[k]
-        if len(reported_positions) > 0:
+        if has_reported_positions:
             dx = reported_positions[k, 0] - points[i, 0]
             dy = reported_positions[k, 1] - points[i, 1]
         else:

@@ -46,7 +46,7 @@ EDGE_BEYOND = 5
 EDGE_COLUMNS = 6
 
 _SORTED_NEIGHBORS = 6
-"""Number of neighbors that cut a cell in order of distance; few others can then still cut it."""
+"""Number of neighbors that cut a cell in order of distance. After them, few others can still cut it."""
 
 
 class Workspace(NamedTuple):
@@ -103,7 +103,7 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
 
 @inlined_kernel
 def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int) -> int:
-    """Add a neighbor that may bound a cell to those of a workspace.
+    """Append a neighbor to the list of those that may bound a cell.
 
     A neighbor at the position of the generator is left out: the two do not cut each other's cells.
 
@@ -112,7 +112,7 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
     neighbors : (n, 4) array
         Changed in place; see `Workspace`.
     count : int
-        Number of neighbors before.
+        Number of neighbors in the list so far.
     dx, dy : float, m
         Offset of the neighbor from the generator.
     robot : int
@@ -121,7 +121,7 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
     Returns
     -------
     int
-        Number of neighbors after.
+        New number of neighbors.
     """
     neighbors[count, DX] = dx
     neighbors[count, DY] = dy
@@ -137,7 +137,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     Parameters
     ----------
     workspace : Workspace
-        Its first rows are the neighbors; they are reordered.
+        Its first `neighbor_count` neighbors are those of the robot; they are reordered.
     neighbor_count : int
     points : (n, 2) array, m
         The generators.
@@ -171,7 +171,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
                 count = new_count
                 squared_range = _compute_squared_range(rings, ring, count)
         elif is_sorted:
-            # This is the nearest of the remaining neighbors, so that none of them can cut the cell.
+            # This is the nearest of the remaining neighbors, so none of them can cut the cell.
             break
     return CellPolygon(ring=ring, vertex_count=count, start=0)
 
@@ -180,7 +180,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
 def _compute_squared_range(rings: Array, ring: int, count: int) -> float:
     """Return the square of the largest distance at which a neighbor can cut the polygon, m².
 
-    The neighbor can be twice as far away as the farthest vertex.
+    That distance is twice the distance of the farthest vertex.
     """
     squared_range = 0.0
     for k in range(count):
@@ -223,12 +223,14 @@ def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row:
             break
         last_cut = after
     else:
+        # All vertices are beyond the bisector.
         return 0
     first_cut = farthest
     before = _get_previous_vertex(first_cut, count)
     while rings[ring, before, _EXCESS] > 0.0:
         first_cut = before
         before = _get_previous_vertex(first_cut, count)
+    # Copy the vertices that remain, from `after` to `before`, and close the ring along the bisector.
     other_ring = 1 - ring
     new_count = 0
     k = after
@@ -239,7 +241,7 @@ def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row:
         k = _get_next_vertex(k, count)
     robot = neighbor_rows[row, ROBOT]
     if rings[ring, before, _EXCESS] == 0.0:
-        # The bisector passes through this vertex, where the new edge begins.
+        # The bisector passes through `before`, where the new edge begins.
         rings[other_ring, new_count - 1, BEYOND] = robot
     else:
         _add_crossing(rings, ring, new_count, before, first_cut, robot)
@@ -309,7 +311,7 @@ def write_cell(
     i : int
         Number of the robot.
     cells : CellArrays
-        Changed in place. Edges beyond the last row of its array are not written.
+        Changed in place. Edges that do not fit into its array are counted, but not written.
     edge_count : int
         Number of edges of the previous cells.
 

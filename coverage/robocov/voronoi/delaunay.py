@@ -30,10 +30,10 @@ ENTRIES_PER_TRIANGLE = 4
 """Number of entries of a mesh per triangle: three half-edges, and an unused one."""
 
 _TOLERANCE = 1e-14
-"""Magnitude of a negative sum of two cotangents, relative to the sum of their magnitudes, up to which it may
-be a rounding error, so that the edge is not flipped."""
+"""An edge is not flipped if the sum of its two cotangents is negative by at most this fraction of the sum of
+their magnitudes, because the sign may then be a rounding error."""
 _MAX_FLIPS_PER_POINT = 16
-"""Number of flips, on average, after which triangulating has failed: rounding may cause endless flips."""
+"""Average number of flips per point after which the attempt has failed: rounding may cause endless flips."""
 _MIN_CROSS = 1e-300
 """Cross product that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
 
@@ -95,7 +95,7 @@ def get_next(h: int) -> int:
 
 @inlined_kernel
 def get_first(h: int) -> int:
-    """Return the first half-edge of the triangle of a half-edge.
+    """Return the first half-edge of the triangle that contains a half-edge.
 
     Parameters
     ----------
@@ -105,6 +105,7 @@ def get_first(h: int) -> int:
     -------
     int
     """
+    # Clear the two bits that hold the position within the triangle.
     return h & -4
 
 
@@ -276,7 +277,7 @@ def _flip_from(
 ) -> tuple[int, bool]:
     """Flip the edge of h if it is not Delaunay, then the edges around it, until all of them are.
 
-    Return the number of all flips so far, -1 on failure, and whether all new triangles are counter-clockwise.
+    Return the number of flips so far, or -1 on failure, and whether all new triangles are counter-clockwise.
     """
     stack[0] = h
     stack_size = 1

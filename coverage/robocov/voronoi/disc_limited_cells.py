@@ -59,12 +59,13 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     for the part of the edge inside the disc, and circular sectors for the rest.
     """
     cell_count = len(radii)
-    # A disc that contains the whole cell cuts nothing. Very large and infinite radii are replaced.
+    # A disc that contains the whole cell cuts nothing, however large it is. Infinite radii are therefore
+    # replaced by finite ones.
     reach = np.zeros(cell_count)
     np.maximum.at(reach, edges.cell, compute_lengths(edges.start))
     radius = np.minimum(radii, 2.0 * reach + 1.0)[edges.cell]
     cut = _cut_by_discs(edges, radius)
-    # The triangles that the parts of the edges in the discs span with the generators, and then the sectors.
+    # First the triangles between the generators and the parts of the edges in the discs, then the sectors.
     cross = cut.first[:, 0] * cut.last[:, 1] - cut.first[:, 1] * cut.last[:, 0]
     doubled_area = cross.copy()
     doubled_moment = cross[:, None] * (cut.first + cut.last) / 3.0
@@ -99,7 +100,8 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     CellEdges
         Some edges have length zero.
     """
-    # A disc that contains all cells cuts nothing. Very large and infinite radii are replaced.
+    # A disc that contains all cells cuts nothing, however large it is. Infinite radii are therefore replaced
+    # by finite ones.
     max_coordinate = float(np.abs(edges.start).max(initial=0.0))
     radius = np.minimum(radii[edges.cell], 4.0 * max_coordinate + 1.0)
     cut = _cut_by_discs(edges, radius)
@@ -144,7 +146,7 @@ def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
 
 
 def _build_arcs(start: Array, end: Array) -> _Arcs:
-    """Return the arcs about the origin between the directions of start and end points, (e, 2) each."""
+    """Return the arcs about the origin from the directions of start points to those of end points, (e, 2)."""
     x, y = start.T
     u, v = end.T
     return _Arcs(angle=np.arctan2(y, x), turn=np.arctan2(x * v - y * u, x * u + y * v))

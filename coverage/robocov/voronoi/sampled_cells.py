@@ -10,7 +10,7 @@ from robocov.compiled import kernel
 def find_own_samples(
     samples: Array, positions: Array, robot: IntArray, neighbor_positions: Array
 ) -> BoolArray:
-    """Find the samples in the cell of each robot: those to which none of its neighbors is nearer.
+    """Find the samples in the cell of each robot: no neighbor is nearer to them than the robot is.
 
     Parameters
     ----------

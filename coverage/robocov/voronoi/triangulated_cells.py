@@ -33,8 +33,8 @@ from robocov.voronoi.delaunay import (
 )
 
 _AREA_TOLERANCE = 1e-12
-"""Difference between the total area of the cells and the area of the region, relative to the latter, up to
-which it may be a rounding error."""
+"""Difference between the total area of the cells and the area of the region that rounding may cause, as a
+fraction of the latter."""
 
 
 class Triangulation(NamedTuple):
@@ -56,7 +56,7 @@ class _Fan(NamedTuple):
     half_edge_to_lowest: int
     """Half-edge to the neighbor with the lowest number."""
     lowest: int
-    """Position of that neighbor among the neighbors."""
+    """Index of that neighbor among the neighbors."""
     squared_reach: float
     """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
 
@@ -109,13 +109,13 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     for i in range(n):
         vertices[i, 0] = points[i, 0]
         vertices[i, 1] = points[i, 1]
-        # Within this distance, robots lie in the triangle of the sentinels, and no sentinel cuts a cell.
+        # Robots within this distance lie in the triangle of the sentinels, and no sentinel cuts a cell.
         if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
             return False
     _place_sentinels(vertices[n:], x, y, size)
     mesh = triangulation.mesh
     half_edges = triangulation.half_edges
-    # The triangulation needs a stack. The array of half-edges is still free, and is filled afterwards.
+    # The array of half-edges is filled only afterwards, and serves as the stack until then.
     stack = half_edges
     if not update_triangulation(mesh, vertices, triangulation.cotangents, stack):
         return False
@@ -215,7 +215,8 @@ def _walk_around(
                 lowest = count
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
-            # The vertex lies on the bisector, to its left by half the distance times the cotangent.
+            # The Voronoi vertex lies on the bisector. Its offset to the left of the line from i to j is half
+            # their distance times the cotangent.
             x = 0.5 * (dx - cotangents[h] * dy)
             y = 0.5 * (dy + cotangents[h] * dx)
             squared_reach = max(squared_reach, x * x + y * y)
@@ -228,7 +229,13 @@ def _walk_around(
             rings[0, count, BEYOND] = mesh[CORNER, back]
             count += 1
         else:
+            # Robot i is connected to a sentinel: its cell is not bounded by robots alone.
             squared_reach = np.inf
         h = mesh[TWIN, back]
         if h == first_half_edge:
-            return _Fan(count, half_edge_to_lowest, lowest, squared_reach)
+            return _Fan(
+                neighbor_count=count,
+                half_edge_to_lowest=half_edge_to_lowest,
+                lowest=lowest,
+                squared_reach=squared_reach,
+            )

@@ -60,7 +60,7 @@ class WeightedCells(Cells):
     def edges(self) -> CellEdges:
         """The boundaries as polygons that deviate from the arcs by at most 2e-5 of the region's diameter.
 
-        The edges of a cell are not in order. They include holes, clockwise.
+        The edges of a cell are in no particular order. Those of holes run clockwise.
         """
         lines = split_into_chords(self.pieces, _EDGE_DEVIATION * self.region.diameter)
         chord_counts = [len(line) - 1 for line in lines]
@@ -114,8 +114,8 @@ def partition_by_travel_time(
     Parameters
     ----------
     generators : (n, 2) array, m
-        Generators at the same position do not cut each other's cells if they are equally fast. Otherwise the
-        fastest gets the cell, and the others get none.
+        Generators at the same position do not cut each other's cells if they are equally fast. Otherwise only
+        the fastest of them have a cell, and the cells of the others are empty.
     speeds : (n,) array, m/s
         Positive. If all are equal, the cells are those of `partition`, bit for bit.
     region, neighbors, triangulation, reported_positions
@@ -127,7 +127,7 @@ def partition_by_travel_time(
     Returns
     -------
     VoronoiPartition or WeightedCells
-        The former if all robots are equally fast.
+        A `VoronoiPartition` if all robots are equally fast.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _compute_weighted_cells(
     """Compute cells of robots whose speeds are not all equal, for a density of 1."""
     robot, other = neighbors.list_pairs()
     other_positions = points[other] if reported_positions is None else np.asarray(reported_positions)
-    # The cells among equally fast robots are bounded by straight edges, from which circles cut parts off.
+    # If only equally fast neighbors are considered, cells have straight edges. Circles then cut parts off.
     is_equal = speeds[robot] == speeds[other]
     equal_cells = partition(
         points,
@@ -192,7 +192,7 @@ def _compute_weighted_cells(
     first_moments = moments[:, [MOMENT_X, MOMENT_Y]]
     mass = np.where(areas < _MIN_AREA * region.area, 0.0, areas)
     centroid = points + first_moments / np.where(mass > 0.0, mass, np.inf)[:, None]
-    # A cell without arcs is that among equally fast robots, with the same mass and centroid to the last bit.
+    # A cell without arcs is the same as among equally fast robots, and so are the bits of mass and centroid.
     mass = np.where(is_straight, equal_cells.mass, mass)
     centroid = np.where(is_straight[:, None], equal_cells.centroid, centroid)
     speeds.setflags(write=False)
