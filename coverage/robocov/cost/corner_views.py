@@ -103,10 +103,14 @@ def find_corner_views(
     int
         Number of rows of the result, or -1 if there is not enough space in it or in the index.
     """
-    corners = walls.corners
+    squared_reach = np.inf
+    used = 0  # There is only one source, so none of the entries are used by others.
     row_count = 0
     for corner in range(first, end):
-        if add_walls(walls, wall_index, _SOURCE, corners[corner, 0], corners[corner, 1], np.inf, 0) < 0:
+        x = walls.corners[corner, 0]
+        y = walls.corners[corner, 1]
+        entry_count = add_walls(walls, wall_index, _SOURCE, x, y, squared_reach, used)
+        if entry_count < 0:
             return -1
         row_count = _add_views(walls, tiles, wall_index, corner, indices, lengths, row_count)
         if row_count < 0:
@@ -130,7 +134,8 @@ def _add_views(
     """
     tree = tiles.tree
     first_leaf = len(tree) // 2
-    node = 1  # The root of the tree. After the last node, `skip_subtree` returns 0.
+    # Node 1 is the root of the tree. After the last node, `skip_subtree` returns 0.
+    node = 1
     while node != 0:
         is_empty = tree[node, LOW_X] == np.inf
         if is_empty or is_box_hidden(tree, node, wall_index, _SOURCE):

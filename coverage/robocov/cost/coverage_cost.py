@@ -43,7 +43,7 @@ class CoverageCost:
     lattice : int
         Number of cells along a side.
     progress : callable, optional
-        Called with the fraction of the preparation that is done. It may raise an exception to stop.
+        Called with the completed fraction of the preparation. It may raise an exception to stop.
     geodesics : Geodesics, optional
         The shortest paths of the same environment, if they have been computed already.
 
@@ -212,7 +212,7 @@ class CoverageCost:
         """
         team_count, robot_count, _ = grid_positions.shape
         paths = SitePaths.allocate(team_count, len(self.points))
-        # How many entries the index of the walls needs is known only once it is full.
+        # The number of entries that the wall index needs is not known in advance.
         while True:
             entry_count = self._index_entries_per_robot * robot_count + 2 * SOURCE_BINS
             search = Search.allocate(
@@ -232,7 +232,7 @@ class CoverageCost:
 
         Among robots of the same speed, the nearest one arrives first. There is one search for each speed.
         """
-        # There is one team, and so far it reaches no site.
+        # There is one team, which does not reach any site yet.
         shape = (1, len(self.points))
         arrivals = SitePaths(
             distance=np.full(shape, np.inf),
@@ -261,29 +261,30 @@ class CoverageCost:
         team: int,
         speeds: Array | None = None,
     ) -> CoverageResult:
-        """Build the result of a team, at positions (n, 2) m, from its row of the paths.
+        """Build the result of the team with the given index, at positions (n, 2) m, from the paths.
 
         `is_covered`, (c,), says which components of the free space contain robots of the team.
         """
         distances = paths.distance[team]
         owner = paths.owner[team]
-        covered_distances = distances
-        covered_owner = owner
+        reached_distances = distances
+        reached_owner = owner
         weights = self.weights
         mass = self._mass
         uncovered_area = 0.0
+        # Sites that no robot can reach are left out of the means.
         if not is_covered.all():
-            is_owned = owner >= 0
-            covered_distances = distances[is_owned]
-            covered_owner = owner[is_owned]
-            weights = None if self.weights is None else self.weights[is_owned]
+            is_reached = owner >= 0
+            reached_distances = distances[is_reached]
+            reached_owner = owner[is_reached]
+            weights = None if self.weights is None else self.weights[is_reached]
             mass = float(self._component_masses[is_covered].sum())
             uncovered_area = float(self._component_areas[~is_covered].sum())
-        mean_distance = compute_weighted_mean(covered_distances, weights)
+        mean_distance = compute_weighted_mean(reached_distances, weights)
         mean_time = None
         value = mean_distance * mass
         if speeds is not None:
-            mean_time = compute_weighted_mean(covered_distances / speeds[covered_owner], weights)
+            mean_time = compute_weighted_mean(reached_distances / speeds[reached_owner], weights)
             value = mean_time * mass
         return CoverageResult(
             mean_distance=mean_distance,

@@ -26,7 +26,7 @@ TILES_PER_GROUP = 16
 """Number of consecutive tiles that share a bounding box."""
 
 _CELLS_PER_BLOCK = 1 << 18
-"""Number of cells that are located at the same time, which limits the memory."""
+"""Number of cells that are located at the same time, to limit memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class Tiles(NamedTuple):
 def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     """Build the sites of a lattice and their tiles.
 
-    The square over the region's bounding box, anchored at its lower left corner, is cut into ``side²`` cells.
+    The region's bounding box, widened to a square from its lower left corner, is cut into ``side²`` cells.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Ti
     """Arrange sites at (m, 2) grid steps in tiles."""
     column = sites.cells % sites.lattice
     row = sites.cells // sites.lattice
-    # Sort the sites by tile. The sites of a tile then are a run of consecutive entries of `by_tile`.
+    # Sort the sites by tile, so that those of one tile are consecutive entries of `by_tile`.
     tile = compute_z_order(column // TILE_SIDE, row // TILE_SIDE)
     by_tile = np.argsort(tile, kind="stable")
     first = find_run_starts(tile[by_tile])

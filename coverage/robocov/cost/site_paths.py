@@ -36,15 +36,15 @@ from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue,
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 _MAX_SMALL_TEAM = 12
-"""Size of the largest team for which walls are indexed at any distance: each of so few robots is tested with
-most sites anyway."""
+"""Size of the largest team for which walls are indexed at any distance. In such a small team, each robot is
+tested with most sites anyway."""
 
 _REACH_PADDING = 1e-9
 """Relative margin added to the reach of a robot's view, far larger than rounding."""
 
 
 class CostMap(NamedTuple):
-    """The data of a map, which do not depend on the robots."""
+    """The data of a map that do not depend on the robots."""
 
     walls: Walls
     graph: CornerGraph
@@ -322,7 +322,7 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
 @kernel
 def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
     """Find the shortest paths from the robots to the corners."""
-    # Find short paths quickly: at first, try only the robot that is nearest to each corner.
+    # Trying only the robot nearest to each corner first finds short paths quickly.
     waiting_count = _try_nearest_robots(cost_map.walls, search, robots)
     relax_paths(cost_map.graph, search.corner_paths, search.queue, waiting_count)
     waiting_count = _try_closer_robots(cost_map.walls, search, robots)
@@ -338,13 +338,15 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
     boxes = walls.corner_boxes
     first_leaf = len(boxes) // 2
     paths = search.corner_paths
+    # While corners are searched, there is no group of tiles, and its scratch space is free.
+    leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
     for corner in range(len(walls.corners)):
         if corner % LEAF_SIZE == 0:
             leaf = first_leaf + corner // LEAF_SIZE
             candidate_count = _list_nearest_candidates(
-                boxes, leaf, robots, search.all_robots, len(robots), search.group_robots
+                boxes, leaf, robots, search.all_robots, len(robots), leaf_robots
             )
         # No path to the corner is known yet.
         paths.length[corner] = np.inf
@@ -352,7 +354,7 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
         search.queue.is_waiting[corner] = False
         nearest = _find_nearest_candidate(
             robots,
-            search.group_robots,
+            leaf_robots,
             candidate_count,
             walls.corners[corner, 0],
             walls.corners[corner, 1],
@@ -363,12 +365,13 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
 
 @kernel
 def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
-    """Try the straight paths to each corner from all robots that are closer than its path is long.
+    """Try the straight path to each corner from every robot that may be closer than its path so far is long.
 
     No other robot can shorten the path. Return the number of corners in the queue.
     """
     boxes = walls.corner_boxes
     first_leaf = len(boxes) // 2
+    leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
     for corner in range(len(walls.corners)):
@@ -378,10 +381,10 @@ def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
             for leaf_corner in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
                 longest = max(longest, search.corner_paths.length[leaf_corner])
             candidate_count = _list_robots_within(
-                boxes, leaf, robots, longest * longest, search.all_robots, len(robots), search.group_robots
+                boxes, leaf, robots, longest * longest, search.all_robots, len(robots), leaf_robots
             )
         for k in range(candidate_count):
-            waiting_count = _try_straight_path(walls, search, corner, search.group_robots[k], waiting_count)
+            waiting_count = _try_straight_path(walls, search, corner, leaf_robots[k], waiting_count)
     return waiting_count
 
 

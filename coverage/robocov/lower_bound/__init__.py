@@ -10,11 +10,11 @@ sites, this sum is at least
 
     sum_c w_c u_c - n max_p profit(p),    profit(p) = sum_c w_c max(0, u_c - d(c, p)),
 
-where the profit is what a robot at p would earn if each site paid its price for being reached,
-because min_i d_i is at least u - sum_i max(0, u - d_i). This is the Lagrangian dual of the p-median problem
-(Cornuéjols, Fisher and Nemhauser 1977; the original was not consulted). Prices that make the bound large are
-first searched for on a table of distances from some positions, which proves nothing yet. Branch and bound
-over triangles that cover all positions then proves an upper bound on their profit.
+because min_i d_i is at least u - sum_i max(0, u - d_i). The profit is what a robot at p would earn if each
+site paid its price for being reached. This is the Lagrangian dual of the p-median problem (Cornuéjols, Fisher
+and Nemhauser 1977; the original was not consulted). A first search for prices that make the bound large uses
+a table of distances from some positions, and proves nothing yet. Branch and bound over triangles that cover
+all positions then proves an upper bound on their profit.
 
 On a triangle T of free space, d(c, .) is the minimum of the lengths of the shortest paths to c that pass the
 obstacles on given sides. Such a length is convex on T (the universal cover of the free space has no positive

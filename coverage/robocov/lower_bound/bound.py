@@ -45,8 +45,8 @@ _SLACK = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
 
 _MIN_SCALE = 1e-9
-"""Smallest cost by which the dual is divided in a search, as a fraction of the cost if all sites were as far
-away as the map is large: the cost of a placement may be zero."""
+"""Lower limit of the cost by which a search divides the dual, because the cost of a placement may be zero. It
+is a fraction of what the cost would be if the distance of every site were the size of the map."""
 
 _MAX_ITERATIONS = 100
 """Maximum number of iterations of each search for prices."""
@@ -61,7 +61,7 @@ _MAX_PRICE_RANK = 4
 """The price of a site is at most its distance to the robot of this rank, here the fourth-nearest one."""
 
 _CANDIDATES_PER_BLOCK = 256
-"""Number of positions whose distances are computed at the same time, which limits the memory."""
+"""Number of positions whose distances are computed at the same time, to limit memory."""
 
 _MAX_TRIANGLES = 1_000_000
 """A proof ends after this number of triangles, with the bound that it has reached."""
@@ -105,7 +105,7 @@ class LowerBound:
 
     @property
     def gap(self) -> float:
-        """Largest possible excess of the placement over the best one, as a fraction of its cost."""
+        """Largest possible excess cost of the placement over the best one, as a fraction of its own cost."""
         if self.placement_mean_distance == 0.0:
             return 0.0
         return 1.0 - self.mean_distance / self.placement_mean_distance
@@ -132,14 +132,15 @@ def compute_lower_bound(
     positions : (n, 2) array, m
         A placement of low cost, such as that of `find_optimum`. The lower its cost, the smaller the gap.
     radius : float, m
-        Radius of the robots, at least 1 µm: a point where walls touch would be in two rooms at once.
+        Radius of the robots, at least 1 µm. A robot without extent could be in two rooms at once, at a point
+        where their walls touch.
     lattice : int
         Number of cells along a side of the lattice; see `CoverageCost`.
     precision : float
         The search ends if the gap is at most this fraction of the cost, or if the bound is within about this
         fraction of the best one that the dual problem can give.
     progress : callable, optional
-        Called regularly with the fraction that is done. It may raise an exception to stop.
+        Called regularly with the completed fraction of the work. It may raise an exception to stop.
 
     Returns
     -------
@@ -155,7 +156,7 @@ def compute_lower_bound(
 
     Notes
     -----
-    An allowance of 1e-10 of the map's size per robot and site covers all rounding errors.
+    The bound is lowered by 1e-10 of the map's size per robot and site, far more than all rounding errors.
 
     Examples
     --------
@@ -282,7 +283,7 @@ class _Dual:
         )
 
     def _choose_candidate_spacing(self, site_spacing: float) -> float:
-        """Return the side, grid steps, of square blocks of sites that leaves enough blocks for candidates."""
+        """Return a multiple of the spacing of the sites that leaves enough candidates, grid steps."""
         min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self._robot_count)
         sites_per_side = max(1, int(math.sqrt(len(self.site_numbers) / min_candidates)))
         return sites_per_side * site_spacing / self._unit
@@ -320,7 +321,7 @@ class _Dual:
         return distances[_MAX_PRICE_RANK - 1], first_prices
 
     def _thin_out(self, candidates: Array) -> Array:
-        """Return the first of (p, 2) positions in each square of a grid of half the spacing of candidates."""
+        """Return the first position in each square of a grid that is half as wide as `_candidate_spacing`."""
         squares = np.floor(candidates * 2.0 / self._candidate_spacing)
         _, first = np.unique(squares, axis=0, return_index=True)
         return candidates[np.sort(first)]
@@ -390,14 +391,18 @@ class _Dual:
         scratch = TriangleScratch.allocate(len(self._geodesics.corners))
         grid_prices = prices / self._unit
 
-        def compute(wall_index: AngularWallIndex) -> Array | None:
+        def compute_profits(wall_index: AngularWallIndex) -> Array | None:
+            """Return the rows of the kernel's result; None if the index is too small."""
             profits = np.empty((2, len(triangles)))
             has_space = bound_profits(
                 self._site_data, wall_index, grid_prices, triangles, centers, scratch, profits
             )
             return profits if has_space else None
 
-        profits = self._geodesics.run_with_index(1, SOURCE_BINS, compute) * self._unit
+        grid_profits = self._geodesics.run_with_index(
+            source_count=1, bin_count=SOURCE_BINS, compute=compute_profits
+        )
+        profits = grid_profits * self._unit
         return centers, profits[CENTER_PROFIT], profits[PROFIT_BOUND]
 
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:

@@ -20,7 +20,7 @@ PROFIT_BOUND = 1
 _SOURCE = 0
 """The only source of the index, which is the center of the current triangle."""
 _MIN_SEGMENT_LENGTH = 1.0
-"""Length of the shortest segment, grid steps: all points have whole coordinates."""
+"""Length of the shortest segment that is not empty, grid steps: all points have whole coordinates."""
 
 
 class SiteData(NamedTuple):
@@ -113,8 +113,13 @@ def bound_profits(
     bool
         Whether the index had enough entries.
     """
+    squared_reach = np.inf
+    used = 0  # There is only one source, so none of the entries are used by others.
     for t in range(len(triangles)):
-        if add_walls(site_data.walls, wall_index, _SOURCE, centers[t, 0], centers[t, 1], np.inf, 0) < 0:
+        center_x = centers[t, 0]
+        center_y = centers[t, 1]
+        entry_count = add_walls(site_data.walls, wall_index, _SOURCE, center_x, center_y, squared_reach, used)
+        if entry_count < 0:
             return False
         center = _set_triangle(site_data, wall_index, scratch, triangles[t], centers[t])
         profit = 0.0
@@ -167,7 +172,7 @@ def _add_site(
     straight = np.sqrt(dx * dx + dy * dy)
     if straight - center.radius >= price:
         return 0.0
-    # A distance above the price is as good as the price.
+    # A site pays nothing to a robot that is farther away than its price, so the bounds start at the price.
     for vertex in range(3):
         scratch.min_distances[vertex] = price
     distance = np.inf
@@ -210,7 +215,7 @@ def _lower_to_tangent(
     The path starts at the center. `length` is the length of the whole path, and `first_length` that of its
     first segment, whose end is at -(dx, dy) from the center.
     """
-    # If the segment is empty, its direction (dx, dy) is zero, and it does not matter by what it is divided.
+    # If the segment is empty, its direction (dx, dy) is zero, and the divisor does not matter.
     divisor = max(first_length, _MIN_SEGMENT_LENGTH)
     for vertex in range(3):
         rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]
