@@ -27,9 +27,9 @@ _CHAMFER_PROBABILITY = 0.25
 _CHAMFER_FRACTIONS = (0.2, 0.45)
 _NOTCH_PROBABILITY = 0.2
 _NOTCH_FRACTIONS = (0.35, 0.6)
-"""Smallest and largest fraction of an edge that is cut off, see `Trim`."""
+"""Smallest and largest fraction of an edge that is cut off; see `Trim`."""
 _MAX_CORNERS = 12
-"""The index of the corner to trim is drawn below this, and taken modulo the number of corners."""
+"""Upper limit of the random number that, modulo the number of corners, selects the corner to trim."""
 _MAX_UNEVENNESS = 0.25
 """Largest offset of a cut from an even division, relative to the width of one block."""
 _MIN_THICKNESS = 0.3
@@ -167,7 +167,7 @@ def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] 
         width, height = np.ptp([(edge.x, edge.y) for edge in cell], axis=0).tolist()
         if max(width, height) < 2.0 * street_width:
             return None
-        # The normal of a street is along the longer side of the cell, apart from its tilt.
+        # Apart from its tilt, the street runs across the longer side of the cell, and its normal along it.
         deviations = float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
         tilt = tilt_deviation * deviations
         angle = tilt + math.pi / 2.0 if height > width else tilt
@@ -213,7 +213,7 @@ def _divide_cell(cell: Cell, fraction: float, street: _Street) -> tuple[Cell, Ce
     """Return the parts of a cell on both sides of a street, the first with a fraction of the extent."""
     normal_x, normal_y = street.normal
     distances = [edge.x * normal_x + edge.y * normal_y for edge in cell]
-    # Only the part of the cell that streets leave free is divided.
+    # The extent that is divided excludes the new street, and half of the streets at both ends.
     free_extent = max(distances) - min(distances) - 2.0 * street.width
     distance = min(distances) + street.width + fraction * free_extent
     origin = (normal_x * distance, normal_y * distance)
@@ -272,7 +272,7 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
     ----------
     cell : Cell
     widening : float, m
-        Widening of the first street, see `Edge`.
+        Widening of the first street; see `Edge`.
 
     Returns
     -------

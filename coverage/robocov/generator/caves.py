@@ -31,7 +31,7 @@ _RIM_SIDES = 0.012
 """Smallest thickness of the rock along the boundary."""
 _SHORE_UNITS = 0.35
 _SHORE_RISE = 3.0
-"""Width of the belt along the boundary where the field is raised, and the rise."""
+"""Width of the belt along the boundary in which the field is raised, and the height of the rise."""
 _HALL_UNITS = 0.35
 _HALL_DEPTH = 1.5
 """Radius around the start within which the field is lowered, and the depth."""
@@ -41,11 +41,11 @@ _MAX_TOLERANCE_SIDES = 0.0027
 _MIN_CHAMBER_AREA_UNITS2 = 0.03
 _MIN_PILLAR_AREA_UNITS2 = 0.02
 _SPIKE_UNITS = 0.05
-"""Spikes of rock up to twice as thick are removed."""
+"""Half of the thickness up to which spikes of rock are removed."""
 _MAX_BEND = 0.25
 """Largest offset of a tunnel's middle, relative to its length."""
 _WINDOW_REACH = 1.5
-"""Distance from a window within which the parts that it connects are sought, relative to the dilation."""
+"""Distance from a window up to which the parts on its sides are searched for, relative to the dilation."""
 _LEVEL_RADIUS = 1.2
 _MAX_RADIUS = 2.0
 """Dilation with which the level is chosen, and the largest dilation, relative to the smallest one."""
@@ -55,7 +55,7 @@ _RADIUS_STEPS = 12
 _MAX_ROUNDS = 12
 """Maximum number of rounds in which windows are widened before a layout is abandoned."""
 _WINDOWS_PER_CHAMBER = 0.005
-"""Number of windows that are widened in one round, the narrowest first, per chamber."""
+"""Number of windows per chamber that are widened in one round, the narrowest first."""
 _USED_AREA_TOLERANCE = 0.5 * AREA_TOLERANCE
 """The rest of the tolerance is left for rounding errors."""
 
@@ -81,14 +81,14 @@ def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generato
     points, values = draw_random_field(request, rng)
     values += _compute_shore_rise(request, points)
     values -= _compute_hall_depth(request, corner_disc, points)
-    # Whatever the level of the field is, tunnels are drawn from the same random numbers.
+    # The tunnels are drawn from the same random numbers at every level of the field.
     tunnel_seed = int(rng.integers(2**32))
     core = _choose_core(builder, points, values, tunnel_seed)
     for _ in range(_MAX_ROUNDS):
         radius = _choose_radius(builder, core)
         outline, pillars = _round_rings(request, builder.dilate(core, radius))
         space = Polygon(outline, pillars)
-        if abs(builder.compute_blocked_fraction(space) - request.area) > _USED_AREA_TOLERANCE:
+        if abs(builder.compute_excess(space)) > _USED_AREA_TOLERANCE:
             return None
         gaps = find_narrow_gaps(MultiPolygon([space]), request.gap)
         narrow_gaps = [gap for gap in gaps if gap.width < request.gap]
@@ -101,13 +101,13 @@ def build_cave(request: Request, corner_disc: DiscStart, rng: np.random.Generato
 
 
 def _compute_shore_rise(request: Request, points: Array) -> Array:
-    """Return by how much the field is raised along the boundary."""
+    """Return the height by which the field is raised at each point because of the boundary."""
     distances = np.minimum(points, points[-1, -1] - points).min(axis=-1)
     return np.asarray(_SHORE_RISE * np.exp(-((distances / (_SHORE_UNITS * request.unit)) ** 2)))
 
 
 def _compute_hall_depth(request: Request, corner_disc: DiscStart, points: Array) -> Array:
-    """Return by how much the field is lowered around the start."""
+    """Return the depth by which the field is lowered at each point because of the start."""
     distances = compute_lengths(points - np.array(corner_disc.center))
     return np.asarray(_HALL_DEPTH * np.exp(-((distances / (_HALL_UNITS * request.unit)) ** 2)))
 
@@ -140,12 +140,13 @@ class _CaveBuilder:
         chambers = [
             part for part in shapely.get_parts(low_area) if part.area >= _MIN_CHAMBER_AREA_UNITS2 * unit**2
         ]
+        # The core is dilated later, by at least the radius by which the start is eroded here.
         hall = self.start.buffer(-self.min_radius)
         if hall.is_empty:
             hall = self.start.centroid
-        whole = shapely.union_all([*chambers, hall])
-        tunnels = build_tunnels(shapely.get_parts(whole), np.random.default_rng(seed))
-        return shapely.union_all([whole, *tunnels])
+        separate_parts = shapely.union_all([*chambers, hall])
+        tunnels = build_tunnels(shapely.get_parts(separate_parts), np.random.default_rng(seed))
+        return shapely.union_all([separate_parts, *tunnels])
 
     def dilate(self, core: BaseGeometry, radius: float) -> Polygon:
         """Return the area within a radius of a core, with smooth walls and without small pillars."""
@@ -160,9 +161,11 @@ class _CaveBuilder:
         ]
         return shapely.simplify(Polygon(largest.exterior, pillars), self.tolerance)
 
-    def compute_blocked_fraction(self, space: Polygon) -> float:
-        """Return the fraction of the map outside a free space."""
-        return 1.0 - float(space.area) / (float(self.request.width) * float(self.request.height))
+    def compute_excess(self, space: Polygon) -> float:
+        """Return the blocked fraction of the map, outside a free space, minus the requested fraction."""
+        map_area = float(self.request.width) * float(self.request.height)
+        blocked_fraction = 1.0 - float(space.area) / map_area
+        return blocked_fraction - self.request.area
 
 
 def _create_builder(request: Request, corner_disc: DiscStart) -> _CaveBuilder:
@@ -195,7 +198,7 @@ def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int)
         level = (low + high) / 2.0
         core = builder.build_core(points, values - level, seed)
         space = builder.dilate(core, _LEVEL_RADIUS * builder.min_radius)
-        if builder.compute_blocked_fraction(space) > builder.request.area:
+        if builder.compute_excess(space) > 0.0:
             low = level
         else:
             high = level
@@ -209,7 +212,7 @@ def _choose_radius(builder: _CaveBuilder, core: BaseGeometry) -> float:
     for _ in range(_RADIUS_STEPS):
         radius = (low + high) / 2.0
         space = builder.dilate(core, radius)
-        if builder.compute_blocked_fraction(space) > builder.request.area:
+        if builder.compute_excess(space) > 0.0:
             low = radius
         else:
             high = radius
@@ -338,8 +341,8 @@ def build_tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
         lines = shapely.shortest_line(parts[i], parts[j])
         by_length = np.lexsort((j, i, shapely.length(lines)))
         for k in by_length.tolist():
-            are_joined_by_line = joined.merge(i[k], j[k])
-            if are_joined_by_line:
+            were_separate = joined.merge(i[k], j[k])
+            if were_separate:
                 tunnels.append(_bend_line(lines[k], rng))
         distance *= 2.0
     return tunnels

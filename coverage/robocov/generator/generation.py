@@ -34,7 +34,7 @@ from robocov.generator.rooms import build_building
 from robocov.mapfile.rules import check_rules
 
 Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
-"""Returns obstacles that keep the disc of the start in the corner free; None if an attempt fails."""
+"""Returns obstacles that leave the disc of the start in the corner free; None if the attempt failed."""
 
 _MAX_ATTEMPTS = 40
 """Number of layouts that are tried before the parameters are considered impossible."""
@@ -52,13 +52,13 @@ _DISC_MARGIN_SIDES = 0.02
 _MAX_CENTER_OFFSET_SIDES = 0.3
 """Largest offset of the other disc from the middle along x and y, in shorter sides of the map."""
 _CENTER_CANDIDATES = 41
-"""Points along x and along y that are compared as centers of that disc."""
+"""Number of points along x, and along y, that are compared as centers of that disc."""
 _CENTER_DISC_FRACTION = 0.8
 """Largest radius of that disc, as a fraction of the one in the corner."""
 _CENTER_OFFSET_WEIGHT = 0.2
 """Clearance, m, that outweighs one meter of distance from the middle."""
 _SCORE_DIGITS = 9
-"""Scores are rounded to this, so that rounding errors do not decide between equal scores."""
+"""Decimal places to which scores are rounded, so that rounding errors do not decide between equal scores."""
 _GAP_TOLERANCE_M = 1e-6
 
 
@@ -78,7 +78,7 @@ class MapKind:
     area : float
         Default blocked fraction of the area.
     is_approximate : bool
-        Whether maps have about the requested number, rather than exactly.
+        Whether maps have only approximately the requested number.
     """
 
     layout: Layout
@@ -172,7 +172,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     Raises
     ------
     ParameterError
-        If a parameter is out of range, or no layout is found that fulfills all of them.
+        If a parameter is out of range, or no layout is found that meets all requirements.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     raise ParameterError(
         f"area: no layout of {request.obstacles} {map_kind.counted} was found that blocks {request.area:g} "
         f"of {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m. "
-        "Try another area, a narrower gap or another number"
+        f"Try another area, a narrower gap or another number of {map_kind.counted}"
     )
 
 
@@ -274,7 +274,7 @@ def _choose_starts(
 def _shrink_corner_disc(
     environment: Environment, request: Request, corner_disc: DiscStart
 ) -> DiscStart | None:
-    """Return the disc, smaller and nearer to its corner if walls are near; None if it gets too small."""
+    """Return the disc, smaller and nearer to its corner if walls are near; None if it would be too small."""
     center = np.array(corner_disc.center)
     outwards = np.sign(center - request.size / 2.0)
     radius = corner_disc.radius

@@ -44,7 +44,7 @@ _MAX_OPENED_FRACTION = 0.12
 _MAX_REMOVED_FRACTION = 0.4
 """Largest fraction of the walls that are removed until the blocked area fits."""
 _DEAD_END_PROBABILITY = 0.7
-"""Probability that the wall to be removed is one at a dead end."""
+"""Probability of removing a wall at a dead end, if there is one."""
 _USED_AREA_TOLERANCE = 0.8 * AREA_TOLERANCE
 """The rest of the tolerance is left for rounding errors."""
 _GAP_TOLERANCE_M = 1e-9
@@ -83,7 +83,7 @@ def build_maze(request: Request, corner_disc: DiscStart, rng: np.random.Generato
         obstacles = _build_walls(request, shape, trails, thickness)
         area_error = abs(_compute_union_area(obstacles) - request.blocked_area)
         if _clear_disc(request, shape, walls, thickness, corner_disc):
-            # With fewer walls, their thickness is chosen again.
+            # There are fewer walls now, so their thickness must be chosen again.
             continue
         if area_error <= max_area_error:
             return [*obstacles]
@@ -107,7 +107,7 @@ def _choose_grid_shape(request: Request) -> GridShape:
 
 
 def _choose_thickness(request: Request, shape: GridShape, trails: list[list[Post]]) -> float:
-    """Return the rounded thickness of the walls whose blocked area is nearest to the requested one, m."""
+    """Return the rounded thickness, m, with which walls block an area nearest to the requested one."""
 
     def compute_area(steps: int) -> float:
         thickness = round(steps * request.step, request.digits)

@@ -10,7 +10,7 @@ from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
 SHAPE_PROBABILITIES = {"convex": 0.6, "L": 0.2, "U": 0.2}
-"""A U that would be too narrow for the gap becomes an L."""
+"""A U whose opening would be too narrow for the gap becomes an L."""
 
 _MIN_AREA_RATIO = 0.5
 _MAX_AREA_RATIO = 1.5
@@ -33,7 +33,7 @@ _MAX_STRETCH = 1.7
 _L_WIDTHS = (1.0, 1.5)
 _L_THICKNESSES = (0.3, 0.5)
 """Smallest and largest width of an L, relative to its height, and thickness of its arms, relative to its
-sides."""
+width and height."""
 _U_WIDTHS = (1.0, 1.6)
 _U_ARM_WIDTHS = (0.2, 0.3)
 _U_BASE_HEIGHTS = (0.22, 0.35)
@@ -94,7 +94,7 @@ def scatter_polygons(
 
 
 def _are_too_large(areas: Array, request: Request) -> bool:
-    """Return whether obstacles fill too much of the map, even as discs, which need the least room."""
+    """Return whether obstacles fill too much of the map even as discs, which need the least room."""
     radii = np.sqrt(areas / np.pi) + request.gap / 2.0
     filled_area = float((np.pi * radii**2).sum())
     max_filled_area = _MAX_FILLED_FRACTION * (request.width - request.gap) * (request.height - request.gap)
@@ -134,7 +134,10 @@ def _place_shape(
 
 
 def _draw_shape(request: Request, shape: str, area: float, rng: np.random.Generator) -> Array:
-    """Return a random outline of a shape, (k, 2) m."""
+    """Return a random outline of a shape, (k, 2) m.
+
+    The outline is an L if the arms of a U would be too close to each other.
+    """
     if shape == "convex":
         return draw_convex_polygon(rng, area)
     if shape == "U":
@@ -170,7 +173,7 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
 
 
 def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
-    """Draw an L of two arms whose thickness is 0.3 to 0.5 of its sides.
+    """Draw an L whose arms take up 0.3 to 0.5 of its width and of its height.
 
     Parameters
     ----------
@@ -182,10 +185,19 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     (6, 2) array, m
     """
     width = rng.uniform(*_L_WIDTHS)
-    relative_thickness, top = rng.uniform(*_L_THICKNESSES, 2)
-    right = width * relative_thickness
-    outline = [(0.0, 0.0), (width, 0.0), (width, top), (right, top), (right, 1.0), (0.0, 1.0)]
-    return _scale_and_rotate(np.array(outline), area, rng)
+    relative_width, arm_height = rng.uniform(*_L_THICKNESSES, 2)
+    arm_width = width * relative_width
+    outline = np.array(
+        [
+            (0.0, 0.0),
+            (width, 0.0),
+            (width, arm_height),
+            (arm_width, arm_height),
+            (arm_width, 1.0),
+            (0.0, 1.0),
+        ]
+    )
+    return _scale_and_rotate(outline, area, rng)
 
 
 def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:

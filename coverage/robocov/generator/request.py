@@ -11,7 +11,7 @@ from robocov.environment import MIN_START_GAP_RADII, Ring
 from robocov.errors import require_number
 
 MIN_GAP_M = 0.21
-"""Robots of the default size fit through."""
+"""Smallest gap that may be requested: robots of the default size fit through it."""
 assert MIN_GAP_M > 2.0 * DEFAULT_RADIUS_M * (1.0 + MIN_START_GAP_RADII)
 AREA_TOLERANCE = 0.005
 """Largest difference between the blocked fraction of a map's area and the requested one."""
@@ -24,14 +24,14 @@ _MIN_GAPS_PER_SIDE = 3.0
 _MIN_CENTIMETER_GAP_M = 0.5
 """Coordinates are rounded to centimeters from this gap on, to millimeters below."""
 _ROUNDING_ALLOWANCE_STEPS = 3.0
-"""Steps by which gaps are drawn wider, because rounding may bring corners nearer to each other."""
+"""Rounding steps by which gaps are made wider, because rounding may bring corners nearer to each other."""
 _STEP_TOLERANCE = 1e-9
 """Fraction of a step by which a length may miss a multiple of it because of rounding."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """Parameters of a map, see `robocov.generator.generate_map`.
+    """Parameters of a map; see `robocov.generator.generate_map`.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Request:
         return self.gap + _ROUNDING_ALLOWANCE_STEPS * self.step
 
     def round_points(self, points: Array) -> Array:
-        """Round coordinates.
+        """Round coordinates to the decimal places of the map.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class Request:
         return np.round(points, self.digits) + 0.0
 
     def build_ring(self, points: Array) -> Ring:
-        """Build an outline from rounded points.
+        """Build an outline from points, which are rounded first.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class Request:
         return tuple((x, y) for x, y in self.round_points(points).tolist())
 
     def round_down(self, length: float) -> float:
-        """Round a length down.
+        """Round a length down to the decimal places of the map.
 
         Parameters
         ----------
@@ -127,5 +127,5 @@ class Request:
         -------
         float, m
         """
-        # Because of the tolerance, a rounding error does not make a multiple of the step one step shorter.
+        # With the tolerance, a multiple of the step does not lose a step to a rounding error.
         return round(math.floor(length / self.step + _STEP_TOLERANCE) * self.step, self.digits)

@@ -17,22 +17,22 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.generator.request import Request
 
-# A unit is the side of a room of mean area, `Request.unit`.
+# A unit is the side of a room of mean area, `Request.unit`. Lengths in gaps are multiples of `Request.gap`.
 _CORRIDOR_PROBABILITY = 0.5
 _MIN_CORRIDOR_ROOMS = 5
 """Smallest number of rooms of a building with a corridor."""
-_MIN_CORRIDOR_GAPS = 1.6
-_MAX_CORRIDOR_GAPS = 2.2
+_MIN_CORRIDOR_WIDTH_GAPS = 1.6
+_MAX_CORRIDOR_WIDTH_GAPS = 2.2
 """Smallest and largest width of a corridor."""
 _MIN_CORRIDOR_OFFSET = 0.38
 _MAX_CORRIDOR_OFFSET = 0.62
 """Smallest and largest part of the space beside a corridor that is on its left or below it."""
-_MIN_ROOM_GAPS = 1.5
+_MIN_ROOM_SIDE_GAPS = 1.5
 """Smallest side of a room."""
 _MAX_UNEVENNESS = 0.3
 """Largest offset of a wall from an even division, relative to the width of one room."""
-_MIN_DOOR_GAPS = 1.06
-_MAX_DOOR_GAPS = 1.6
+_MIN_DOOR_WIDTH_GAPS = 1.06
+_MAX_DOOR_WIDTH_GAPS = 1.6
 """Smallest and largest width of a door."""
 _LOOP_PROBABILITY = 0.3
 """Probability of a door between rooms that are already connected."""
@@ -42,9 +42,9 @@ _MIN_WALL_FRACTION = 0.3
 _MAX_WALL_FRACTION = 0.5
 _MAX_WALL_FRACTION_OF_SMALL_ROOMS = 0.9
 """Smallest and largest fraction of the blocked area that walls take; small rooms have less furniture."""
-_SMALL_ROOM_GAPS = 6.0
-_SMALLEST_ROOM_GAPS = 3.0
-"""As the side of the mean room falls from one to the other, that fraction rises to that of small rooms."""
+_SMALL_ROOM_SIDE_GAPS = 6.0
+_SMALLEST_ROOM_SIDE_GAPS = 3.0
+"""Sides of the mean room between which the largest fraction rises to that of small rooms."""
 _WALL_LENGTH_UNITS = 1.5
 """Length of the walls of a room without doors; half of each wall counts for each of its rooms."""
 _MAX_THICKNESS_UNITS = 0.06
@@ -62,7 +62,7 @@ _MIN_SHRINKAGE = 0.2
 _MAX_FURNITURE_FRACTION = 0.35
 """Largest fraction of the rooms that furniture may fill; more does not fit."""
 _AREA_TOLERANCE = 0.001
-"""Fraction of the map that is too small for a piece of furniture."""
+"""Largest difference between the blocked area and the requested one, as a fraction of the map's area."""
 _PIECE_PROBABILITIES = {"cabinet": 0.5, "table": 0.3, "round table": 0.2}
 _CABINET_STRETCH = (1.6, 3.5)
 _TABLE_STRETCH = (1.0, 2.0)
@@ -258,11 +258,11 @@ def build_building(
 def _draw_thickness(request: Request, rng: np.random.Generator) -> float:
     """Return a random thickness of walls, m."""
     room_gaps = request.unit / request.gap
-    smallness = (_SMALL_ROOM_GAPS - room_gaps) / (_SMALL_ROOM_GAPS - _SMALLEST_ROOM_GAPS)
+    smallness = (_SMALL_ROOM_SIDE_GAPS - room_gaps) / (_SMALL_ROOM_SIDE_GAPS - _SMALLEST_ROOM_SIDE_GAPS)
     smallness = min(max(smallness, 0.0), 1.0)
     max_fraction = _MAX_WALL_FRACTION + (_MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION) * smallness
     fraction = rng.uniform(_MIN_WALL_FRACTION, max_fraction)
-    # The walls of a mean room block their length times their thickness, in square units.
+    # In units, the walls of a mean room block their length times their thickness; the room's area is 1.
     thickness_units = min(fraction * request.area / _WALL_LENGTH_UNITS, _MAX_THICKNESS_UNITS)
     # Half of the thickness is rounded, so that the faces of walls have rounded coordinates.
     half_thickness = thickness_units * request.unit / 2.0
@@ -313,7 +313,7 @@ def _divide_by_wall(
     first_count = count // 2 if rng.random() < 0.5 else count - count // 2
     fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
     low, high = box.get_range(axis)
-    min_side = _MIN_ROOM_GAPS * request.gap + plan.thickness
+    min_side = _MIN_ROOM_SIDE_GAPS * request.gap + plan.thickness
     min_position = low + min_side
     max_position = high - min_side
     if min_position > max_position:
@@ -337,11 +337,13 @@ def _divide_by_corridor(
     width, height = box.sides
     axis = 1 if width >= height else 0
     extent = box.sides[axis]
-    corridor_width = rng.uniform(_MIN_CORRIDOR_GAPS, _MAX_CORRIDOR_GAPS) * request.gap + plan.thickness
+    corridor_width = (
+        rng.uniform(_MIN_CORRIDOR_WIDTH_GAPS, _MAX_CORRIDOR_WIDTH_GAPS) * request.gap + plan.thickness
+    )
     offset = (extent - corridor_width) * rng.uniform(_MIN_CORRIDOR_OFFSET, _MAX_CORRIDOR_OFFSET)
     start = round(offset, request.digits)
     end = round(offset + corridor_width, request.digits)
-    if min(start, extent - end) < 2.0 * _MIN_ROOM_GAPS * request.gap:
+    if min(start, extent - end) < 2.0 * _MIN_ROOM_SIDE_GAPS * request.gap:
         return [(box, count)]
     wall_range = box.get_range(1 - axis)
     plan.walls.append(Wall(axis, start, *wall_range))
@@ -380,7 +382,7 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
     min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
     places = _find_door_places(plan)
     order_keys, loop_draws, relative_positions = rng.random((3, len(places)))
-    widths = request.gap * rng.uniform(_MIN_DOOR_GAPS, _MAX_DOOR_GAPS, len(places))
+    widths = request.gap * rng.uniform(_MIN_DOOR_WIDTH_GAPS, _MAX_DOOR_WIDTH_GAPS, len(places))
 
     def compute_sort_key(k: int) -> tuple[bool, float]:
         """Return a key that puts doors to the corridor first, and is random otherwise."""
@@ -414,8 +416,8 @@ def _find_door_places(plan: FloorPlan) -> list[_DoorPlace]:
     places = []
     for wall in plan.walls:
         before = rooms_by_high[wall.axis, wall.position]
-        behind = rooms_by_low[wall.axis, wall.position]
-        for first, second in itertools.product(before, behind):
+        after = rooms_by_low[wall.axis, wall.position]
+        for first, second in itertools.product(before, after):
             first_low, first_high = plan.rooms[first].get_range(1 - wall.axis)
             second_low, second_high = plan.rooms[second].get_range(1 - wall.axis)
             low = max(wall.start, first_low, second_low)
@@ -436,7 +438,7 @@ def _place_furniture(
     if area > _MAX_FURNITURE_FRACTION * room_areas.sum():
         return None
     start_disc = shapely.Point(corner_disc.center).buffer(corner_disc.radius)
-    # The doors and the furniture of each room, from which further furniture keeps its distance.
+    # The doors and the furniture of each room. More furniture must keep a gap from them.
     occupied: list[list[Polygon]] = [[] for _ in inner_rooms]
     for door in plan.doors:
         opening = door.wall.build_piece(door.start, door.end, plan.thickness)
@@ -504,7 +506,7 @@ def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Pie
 def _sample_piece_corners(
     request: Request, piece: _Piece, room: Box, rng: np.random.Generator
 ) -> Array | None:
-    """Sample positions of a piece in a room; its gap to a wall is zero or at least the requested one.
+    """Sample positions of a piece in a room where its gap to each wall is zero or at least the requested one.
 
     Returns
     -------
@@ -522,11 +524,12 @@ def _sample_piece_corners(
         axis = 1 if piece.size[0] > piece.size[1] else 0
         offsets[:, axis] = free_size[axis] * rng.integers(0, 2, _CANDIDATES_PER_PIECE)
     corners = request.round_points(offsets + room_low)
-    clearances = np.column_stack([corners - room_low, room_high - corners - piece.size])
-    # A round table would touch a wall in a single point.
-    is_valid = clearances >= request.gap
+    gaps_to_walls = np.column_stack([corners - room_low, room_high - corners - piece.size])
+    is_valid = gaps_to_walls >= request.gap
     if not piece.is_round:
-        is_valid |= clearances < request.step / 2.0
+        # Pieces may also touch a wall, except for round tables, which would touch it in a single point.
+        is_touching = gaps_to_walls < request.step / 2.0
+        is_valid |= is_touching
     return corners[is_valid.all(axis=1)]
 
 

@@ -156,7 +156,7 @@ def test_what_cannot_be_made_is_told_with_its_option(
 def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--count", "2", "--seed", "4", "--area", "0.8", "--out", str(tmp_path / "maps")]
     assert main(["generate", *words]) == 2
-    assert capsys.readouterr().err.splitlines()[-1].endswith("or another number (seed 4)")
+    assert capsys.readouterr().err.splitlines()[-1].endswith("or another number of obstacles (seed 4)")
 
 
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
