@@ -18,7 +18,7 @@ _MIN_MEAN_DENSITY = 1e-9
 
 
 class Density(ABC):
-    """Importance of each point: φ of equation (4), dimensionless and never negative. Immutable."""
+    """Importance of each point: φ of equation (4), dimensionless, never negative, and immutable."""
 
     kind: ClassVar[str]
     """Name in map files."""

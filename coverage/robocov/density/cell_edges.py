@@ -9,7 +9,7 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 
 REGION = -1
-"""Neighbor of an edge of a cell that is part of the region's boundary."""
+"""Stands for the cell beyond an edge that is part of the region's boundary."""
 
 MASS = 0
 """Column of the moments of cells: the integral of φ, m²."""
@@ -21,8 +21,8 @@ POLAR_MOMENT = 3
 """Column of the moments of cells: the integral of φ (x² + y²), m⁴."""
 
 _MIN_RELATIVE_LENGTH = 1e-12
-"""Length of an edge, relative to the distances of its ends from the generator, up to which it may be a
-rounding error."""
+"""Lengths of edges up to this fraction of the distances of their ends from the generator may be rounding
+errors."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +91,7 @@ class CellEdges:
         first_cell = self.cell[is_shared]
         second_cell = self.beyond[is_shared]
         cell_count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
-        # Each pair becomes one number: sorting pairs takes several times as long.
+        # Each pair is encoded as one number, because sorting pairs takes several times as long.
         low = np.minimum(first_cell, second_cell)
         high = np.maximum(first_cell, second_cell)
         numbers = np.unique(low * cell_count + high)
@@ -106,7 +106,7 @@ class CellEdges:
 
 @kernel
 def _sum_moments(start: Array, end: Array, cell: IntArray, cell_count: int) -> Array:
-    """Return the sums of the moments of the triangles that the edges span with the generators."""
+    """Return the sums of the moments of the triangles between the edges and the generators."""
     sums = np.zeros((cell_count, 4))
     for k in range(len(cell)):
         x = start[k, 0]

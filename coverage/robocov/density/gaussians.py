@@ -25,7 +25,7 @@ Matrix: TypeAlias = tuple[Point, Point]
 """A 2 x 2 matrix, row by row."""
 
 _MIN_RELATIVE_DETERMINANT = 1e-9
-"""Determinant, relative to the product of the diagonal, up to which a covariance is nearly singular."""
+"""A covariance counts as singular if its determinant is at most this fraction of the diagonal's product."""
 
 
 class _Factor(NamedTuple):
@@ -39,15 +39,16 @@ class _Factor(NamedTuple):
 class _StandardMoments(NamedTuple):
     """Moments of the standard Gaussian over cells, or contributions of edges to them, one array each.
 
-    The second moments are stored as what they lack: the mass minus the moments xx and yy, and minus xy.
+    The second moments are stored as deficits, which are what the integrals along edges give: the mass minus
+    the moment xx or yy, and minus the moment xy.
     """
 
     mass: Array
     x: Array
     y: Array
-    missing_xx: Array
-    missing_xy: Array
-    missing_yy: Array
+    deficit_xx: Array
+    deficit_xy: Array
+    deficit_yy: Array
 
 
 @dataclass(frozen=True)
@@ -135,16 +136,16 @@ class Gaussian:
             for contribution in _integrate_along_edges(start, end)
         ]
         standard = _StandardMoments(*sums)
-        # From the standard coordinates to moments about the center of the Gaussian.
+        # Convert the moments in standard coordinates to moments about the center of the Gaussian.
         mass = standard.mass
         x = factor.xx * standard.x
         y = factor.yx * standard.x + factor.yy * standard.y
         polar = (
-            (factor.xx * factor.xx + factor.yx * factor.yx) * (mass - standard.missing_xx)
-            - 2.0 * factor.yy * factor.yx * standard.missing_xy
-            + factor.yy * factor.yy * (mass - standard.missing_yy)
+            (factor.xx * factor.xx + factor.yx * factor.yx) * (mass - standard.deficit_xx)
+            - 2.0 * factor.yy * factor.yx * standard.deficit_xy
+            + factor.yy * factor.yy * (mass - standard.deficit_yy)
         )
-        # From the center to moments about the origins of the cells.
+        # Convert them to moments about the origins of the cells.
         offset_x = offset[:, 0]
         offset_y = offset[:, 1]
         squared_offset = (offset * offset).sum(axis=1)
@@ -264,7 +265,7 @@ def _integrate_along_edges(start: Array, end: Array) -> _StandardMoments:
     mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
     # An edge whose line passes through the center adds nothing.
     mass[~has_distance] = 0.0
-    # Far from the center, squares may overflow; the exponential is then still zero, as it should be.
+    # Far from the center, squares may overflow. The exponential is then zero, as it should be.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))
@@ -272,9 +273,9 @@ def _integrate_along_edges(start: Array, end: Array) -> _StandardMoments:
         mass=mass,
         x=-normal_x * e0,
         y=-normal_y * e0,
-        missing_xx=normal_x * (normal_x * (d * e0) + tangent_x * e1),
-        missing_xy=normal_y * (normal_x * (d * e0) + tangent_x * e1),
-        missing_yy=normal_y * (normal_y * (d * e0) + tangent_y * e1),
+        deficit_xx=normal_x * (normal_x * (d * e0) + tangent_x * e1),
+        deficit_xy=normal_y * (normal_x * (d * e0) + tangent_x * e1),
+        deficit_yy=normal_y * (normal_y * (d * e0) + tangent_y * e1),
     )
     for contribution in contributions:
         contribution[~has_length] = 0.0

@@ -10,7 +10,7 @@ from robocov.density.base import Density
 from robocov.density.cell_edges import MASS, REGION, CellEdges
 
 _SQUARES_PER_BATCH = 1 << 16
-"""Number of squares that are integrated at the same time, which limits the memory."""
+"""Number of squares that are integrated at the same time, to limit memory."""
 
 
 def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:

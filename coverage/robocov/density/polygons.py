@@ -5,7 +5,7 @@ as positive, that to the left of a falling edge as negative. The integral over t
 polygons is therefore a signed sum over the pairs of their edges e and f. Each term is the integral of a
 polynomial over the area between f and e,
 
-    ∫ max(0, x_e(y) - x_f(y)) dy          (the area; over the heights y that both edges have)
+    ∫ max(0, x_e(y) - x_f(y)) dy          (the area; over the heights y common to both edges)
 
 and the same with other powers of x and y in it. Both edges are straight, so that this is an integral of
 a polynomial in y over one interval. Rounding decides nothing: each pair adds a term that depends
@@ -35,7 +35,7 @@ _STEP = 4
 _JUMP_COLUMNS = 5
 
 _GAUSS_NODE = 0.5 - 0.5 / 3.0**0.5
-"""First node of Gauss's rule with two points on [0, 1], which is exact for cubic polynomials."""
+"""First node of the Gauss rule with two points on [0, 1], which is exact for cubic polynomials."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class WeightedPolygons(Density):
 
     @cached_property
     def _jumps(self) -> Array:
-        """The lines across which φ jumps, (j, 5): edges of the areas that are not level.
+        """The lines across which φ jumps, (j, 5): all edges of the areas except horizontal ones.
 
         For the columns, see the constants at the top of the module.
         """
@@ -130,14 +130,14 @@ class WeightedPolygons(Density):
         for area in reversed(self.areas):
             visible = area.polygon if covered.is_empty else shapely.difference(area.polygon, covered)
             covered = shapely.union(covered, area.polygon)
-            # Points and lines, where areas touch, have no rings.
+            # Where areas touch, the difference may contain points and lines, which have no rings.
             for ring in shapely.get_rings(shapely.orient_polygons(shapely.get_parts(visible))):
                 points = shapely.get_coordinates(ring)
                 jumps.append(_build_jumps(points, area.weight - self.background))
         all_jumps = np.concatenate(jumps)
-        is_level = all_jumps[:, _LOW_Y] >= all_jumps[:, _HIGH_Y]
+        is_horizontal = all_jumps[:, _LOW_Y] >= all_jumps[:, _HIGH_Y]
         has_step = all_jumps[:, _STEP] != 0.0
-        return np.asarray(all_jumps[~is_level & has_step])
+        return np.asarray(all_jumps[~is_horizontal & has_step])
 
     def evaluate(self, points: Array) -> Array:
         """Evaluate the weight of the last area that contains each point, or the background.
@@ -180,13 +180,13 @@ def _build_jumps(points: Array, step: float) -> Array:
     is_falling = start[:, 1:] > end[:, 1:]
     low = np.where(is_falling, end, start)
     high = np.where(is_falling, start, end)
-    # The inside of the polygon lies to the left of an edge that rises.
+    # The inside of the polygon lies to the left of a rising edge.
     signed_step = np.where(is_falling, 1.0, -1.0) * step
     return np.hstack([low, high, signed_step])
 
 
 class _Segment(NamedTuple):
-    """An edge or a jump that is not level, from its lower to its upper end, relative to a generator."""
+    """An edge or a jump that is not horizontal, from its lower to its upper end, relative to a generator."""
 
     low_x: float
     low_y: float
@@ -195,7 +195,7 @@ class _Segment(NamedTuple):
 
 
 class _Strip(NamedTuple):
-    """The area between a jump, on the left, and an edge, on the right, at the heights that both have."""
+    """The area between a jump, on the left, and an edge, on the right, over the heights common to both."""
 
     bottom: float
     top: float
@@ -216,7 +216,7 @@ def _add_jumps(
     """Add to the moments of cells the integrals between each edge and each jump to its left."""
     for e in range(len(cell)):
         c = cell[e]
-        # An edge that falls is turned around, and its integrals are subtracted.
+        # A falling edge is reversed, and its integrals are subtracted.
         if start[e, 1] < end[e, 1]:
             sign = 1.0
             edge = _Segment(start[e, 0], start[e, 1], end[e, 0], end[e, 1])

@@ -32,7 +32,7 @@ _ONE, _U, _V, _UU, _VV = range(5)
 """Columns of the integrals of φ times 1, u, v, u² and v² over cells."""
 
 _GAUSS_NODE = 0.5 * 0.6**0.5
-"""Distance of the outer nodes of Gauss's rule with three points on [0, 1] from the middle one."""
+"""Distance of the outer nodes of the Gauss rule with three points on [0, 1] from the middle one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class Raster(Density):
         return float(self.values.max())
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the image; points outside have the value of the nearest border pixel.
+        """Evaluate the image. Points outside have the value of the nearest border pixel.
 
         Parameters
         ----------
@@ -160,7 +160,7 @@ class Raster(Density):
             edges.cell,
             len(origins),
         )
-        # From steps of the grid to meters.
+        # Convert grid steps to meters.
         step_x, step_y = grid.step
         integrals = integrals * (step_x * step_y)
         mass = integrals[:, _ONE]
@@ -168,7 +168,7 @@ class Raster(Density):
         y = integrals[:, _V] * step_y
         xx = integrals[:, _UU] * (step_x * step_x)
         yy = integrals[:, _VV] * (step_y * step_y)
-        # From moments about the origin of the grid to moments about the given ones.
+        # Convert moments about the origin of the grid to moments about the origins of the cells.
         offset_x, offset_y = offsets.T
         polar = xx - offset_x * (2.0 * x - offset_x * mass) + yy - offset_y * (2.0 * y - offset_y * mass)
         return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
@@ -201,7 +201,7 @@ class _Grid(NamedTuple):
 
     u and v are coordinates in steps of the grid, from its lower left corner. In the square of column i and
     row j, the density is ``a + b ξ + c η + d ξ η``, with ξ = u - i and η = v - j from 0 to 1. The outermost
-    squares extend to infinity; b, c and d are such that the density is constant outwards.
+    squares extend to infinity; their b, c and d are chosen so that the density is constant outwards.
 
     Attributes
     ----------
@@ -276,7 +276,8 @@ def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell
 
     With P(u, v) the integral of φ at height v from the left side of the image to u, the integral of φ over a
     polygon is that of P dv along its edges. P is a prefix sum over squares and a polynomial within a square.
-    Each edge is therefore split where it crosses into another square, and Gauss's rule is exact on each part.
+    Each edge is therefore split where it crosses into another square, and the Gauss rule is exact on each
+    part.
     """
     _, rows, columns = grid.coefficients.shape
     sums = np.zeros((cell_count, 5))
@@ -348,7 +349,7 @@ def _find_first_line(start: float, step: float, line_count: int) -> int:
 
 @kernel
 def _find_crossing(line: int, start: float, step: float, line_count: int) -> float:
-    """Return the fraction of an edge at which it crosses a grid line; infinite for other than inner lines."""
+    """Return the fraction of an edge at which it crosses a grid line; inf unless that is an inner line."""
     if 0 < line < line_count and step != 0.0:
         return (line - start) / step
     return np.inf

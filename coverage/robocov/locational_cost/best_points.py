@@ -37,9 +37,9 @@ _LAST_WEIGHTED_STEP = 1e-6
 _NO_STEP = 1e-15
 """Length of a step, relative to half the perimeter of the cell, that changes nothing."""
 _MIN_CURVATURE = 1e-14
-"""Curvature, relative to the largest one, up to which it may be a rounding error."""
+"""Curvatures up to this fraction of the largest one may be rounding errors."""
 _MIN_AREA = 1e-9
-"""Area of a cell, relative to the square of half its perimeter, up to which it may be a rounding error."""
+"""Areas of cells up to this fraction of the square of half the perimeter may be rounding errors."""
 _MIN_WEIGHTED_CLEARANCE = 1e-9
 """Clearance of a centroid, relative to half the perimeter, up to which a cell is not treated as convex."""
 _MIN_MEAN_DENSITY = 1e-12
@@ -108,10 +108,12 @@ def find_targets(cells: Cells, density: Density | None, target: str, height: flo
 
     Notes
     -----
-    Centroid and median take all points of the cell into account. 1/(r²+h²) rewards points within a few h, so
-    that the far ends of a much larger cell hardly count; if h is much larger than the cell, the target is the
-    centroid. Without obstacles, the choice hardly affects the coverage cost (22). With walls it matters more:
-    a few centimeters in the goal can decide whether a robot gets around a wall, which is usually a
+    "centroid" and "median" take all points of the cell into account. With "sensing", points within a few h of
+    the target matter most, and the far ends of a much larger cell hardly count; if h is much larger than the
+    cell, the target is the centroid.
+
+    Without obstacles, the choice hardly affects the coverage cost (22). With walls it matters more: moving
+    the target by a few centimeters can decide whether a robot gets around a wall. This is usually a
     disadvantage of "sensing" with a low h.
     """
     if target == "centroid":
@@ -199,7 +201,7 @@ def _search_weighted(
 
 
 def _start_search(points: Array, is_active: BoolArray) -> _Search:
-    """Return the state before the first step from given points."""
+    """Return the state before the first step from the given points."""
     count = len(points)
     return _Search(
         points=points,
@@ -276,6 +278,7 @@ def _choose_next_trial(search: _Search, i: int, half_perimeter: float, last_step
         search.points[i, 1] = search.trials[i, 1]
         search.is_active[i] = False
     elif not length > _NO_STEP * half_perimeter:
+        # The step changes nothing, or its length is nan.
         search.is_active[i] = False
 
 
@@ -283,7 +286,7 @@ def _choose_next_trial(search: _Search, i: int, half_perimeter: float, last_step
 def _compute_newton_step(
     gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float, max_length: float
 ) -> tuple[float, float]:
-    """Return Newton's step, or a descent step if the Hessian is not positive definite, of limited length."""
+    """Return the Newton step, or a descent step if the Hessian is not positive definite; limit its length."""
     trace = xx + yy
     determinant = xx * yy - xy * xy
     if trace > 0.0 and determinant > _MIN_CURVATURE * trace * trace:
@@ -299,7 +302,7 @@ def _compute_newton_step(
 def _compute_descent_step(
     gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float
 ) -> tuple[float, float]:
-    """Return Newton's step for the absolute values of the Hessian's eigenvalues, which always descends."""
+    """Return the Newton step with the absolute values of the Hessian's eigenvalues, which always descends."""
     mean = 0.5 * (xx + yy)
     half_difference = 0.5 * (xx - yy)
     radius = np.sqrt(half_difference * half_difference + xy * xy)
@@ -321,11 +324,11 @@ def _compute_descent_step(
 
 @kernel
 def _compute_eigenvector(half_difference: float, xy: float, radius: float) -> tuple[float, float]:
-    """Return a unit eigenvector, of the larger eigenvalue, of a symmetric matrix.
+    """Return a unit eigenvector of a symmetric matrix, for its larger eigenvalue.
 
     The matrix is a multiple of the identity plus ((half_difference, xy), (xy, -half_difference)), whose
     eigenvalues are plus and minus `radius`. Both (radius + half_difference, xy) and
-    (xy, radius - half_difference) are eigenvectors, of which the longer one is more accurate.
+    (xy, radius - half_difference) are eigenvectors; the longer one is more accurate, and is used.
     """
     if half_difference >= 0.0:
         x = radius + half_difference

@@ -32,7 +32,7 @@ _PANEL_LENGTH = 2.0
 """Length of a panel of the quadrature in τ, where s = w sinh τ. The integrand is analytic for |Im τ| < π/2,
 and 16 nodes per panel leave less than a rounding error."""
 _MIN_RELATIVE_LENGTH = 1e-12
-"""Length of an edge, relative to half the perimeter of its cell, up to which it may be a rounding error."""
+"""Lengths of edges up to this fraction of half the perimeter of the cell may be rounding errors."""
 _MIN_LENGTH_M = 1e-300
 """Length that replaces shorter ones in divisions, so that nothing is divided by zero."""
 _MAX_SERIES_SQUARE = 0.0625
@@ -70,8 +70,8 @@ class CellDerivatives(NamedTuple):
 class _RelativeEdge(NamedTuple):
     """An edge relative to a point.
 
-    `distance` is that of its line, negative if the point lies outside it. The edge starts at `start`,
-    measured along the line from the foot of the perpendicular.
+    `distance` is that of the edge's line, negative if the point lies on its outer side. `start` is where the
+    edge starts on that line, measured from the foot of the perpendicular.
     """
 
     normal_x: float
@@ -239,6 +239,7 @@ def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
     d = edge.distance
     first = edge.start
     last = edge.start + edge.length
+    # The distance of the rounded ends, from which `edge.length` may differ.
     length = last - first
     mean = (first * first + first * last + last * last) / 3.0 + d * d
     return _EdgeIntegral(total=length * mean, along=length * (last + first), across=2.0 * d * length)
@@ -266,6 +267,7 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
     d = edge.distance
     first = edge.start
     last = edge.start + edge.length
+    # The distance of the rounded ends, from which `edge.length` may differ.
     length = last - first
     squared_height = height * height
     w = np.sqrt(d * d + squared_height)
@@ -275,7 +277,7 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
         # From far above, f is nearly constant. Integrating f - 1/h² keeps the digits of its variation.
         remainder = _subtract_arctan(last / w) - _subtract_arctan(first / w)
         total = -length * (d / w) ** 2 / squared_height - remainder / w
-    # 1/f at both ends
+    # The values of 1/f at both ends.
     first_r = np.sqrt(d * d + first * first)
     last_r = np.sqrt(d * d + last * last)
     first_inverse = first_r * first_r + squared_height
@@ -298,7 +300,7 @@ def _subtract_arctan(x: float) -> float:
     square = x * x
     if square >= _MAX_SERIES_SQUARE:
         return float(x - np.arctan(x))
-    # x³/3 - x⁵/5 + x⁷/7 ..., by Horner's rule
+    # The series is x³/3 - x⁵/5 + x⁷/7 ..., evaluated by Horner's method.
     series = 0.0
     for k in range(_SERIES_TERMS - 1, -1, -1):
         sign = 1.0 if k % 2 == 0 else -1.0
@@ -310,7 +312,7 @@ def _subtract_arctan(x: float) -> float:
 def _sum_edge_costs(
     start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float, rule: Array
 ) -> Array:
-    """Return the cost of each cell: the sum of ∫ f over the triangles of its point and its edges.
+    """Return the cost of each cell: the sum of ∫ f over the triangles between its point and its edges.
 
     The integral over a triangle is negative if the point is on the outer side of the edge.
     """

@@ -1,9 +1,9 @@
 """Gradient and Hessian of the locational cost for any density, by quadrature.
 
-A cell is divided into the triangles that the point spans with the edges. In the coordinates
-q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that Gauss's
-rule converges quickly where φ is smooth. If φ jumps within a cell, the error is of the order of the
-distance between the nodes.
+A cell is divided into the triangles between the point p and the edges. In the coordinates
+q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that
+Gaussian quadrature converges quickly where φ is smooth. If φ jumps within a cell, the error is of the order
+of the distance between the nodes.
 """
 
 from typing import NamedTuple
@@ -75,42 +75,46 @@ def compute_weighted_derivatives(
     weight = weight * density.evaluate(positions.reshape(-1, 2)).reshape(weight.shape)
     dx = offset[..., 0]
     dy = offset[..., 1]
-    # The gradient of the integrand is -first (dx, dy), its Hessian first I + second (dx, dy)ᵀ (dx, dy).
+    # Let c1 be the weight times f'(r)/r, where r² = dx² + dy², and c2 the weight times (f'(r)/r)'/r. Then the
+    # gradient of the integrand is -c1 (dx, dy), and its Hessian is c1 I + c2 (dx, dy)ᵀ (dx, dy).
     square = dx * dx + dy * dy
     if isinstance(f, Sensing):
         inverse = 1.0 / (square + f.height**2)
-        first = 2.0 * weight * inverse * inverse
-        second = -8.0 * weight * inverse * inverse * inverse
+        c1 = 2.0 * weight * inverse * inverse
+        c2 = -8.0 * weight * inverse * inverse * inverse
     else:
         inverse = 1.0 / np.sqrt(np.maximum(square, _MIN_SQUARED_DISTANCE))
-        first = weight * inverse
-        second = -weight * inverse * inverse * inverse
+        c1 = weight * inverse
+        c2 = -weight * inverse * inverse * inverse
     cell_count = len(points)
     return WeightedDerivatives(
-        x=_sum_by_cell(-first * dx, cell, cell_count),
-        y=_sum_by_cell(-first * dy, cell, cell_count),
-        xx=_sum_by_cell(first + second * dx * dx, cell, cell_count),
-        xy=_sum_by_cell(second * dx * dy, cell, cell_count),
-        yy=_sum_by_cell(first + second * dy * dy, cell, cell_count),
+        x=_sum_by_cell(-c1 * dx, cell, cell_count),
+        y=_sum_by_cell(-c1 * dy, cell, cell_count),
+        xx=_sum_by_cell(c1 + c2 * dx * dx, cell, cell_count),
+        xy=_sum_by_cell(c2 * dx * dy, cell, cell_count),
+        yy=_sum_by_cell(c1 + c2 * dy * dy, cell, cell_count),
     )
 
 
 def _build_gauss_rule(count: int) -> tuple[Array, Array]:
-    """Return nodes and weights of Gauss's rule on [0, 1]."""
+    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
 def _build_outward_rule(f: Performance, max_diameter: Array, cell: IntArray) -> tuple[Array, Array]:
-    """Return nodes u from the point to each edge, and their weights times u, (e, 12) each."""
+    """Return nodes u from the point to each edge, and their weights times u, (e, 12) each.
+
+    For `Sensing` the rule is one in x, where u = sinh(a x) / sinh(a): the steeper f is near the point, the
+    more nodes lie there.
+    """
     plain_nodes, plain_weights = _build_gauss_rule(_NODES_OUTWARD)
     nodes = np.tile(plain_nodes, (len(max_diameter), 1))
     weights = np.tile(plain_weights, (len(max_diameter), 1))
     if isinstance(f, Sensing):
-        # The steeper f is near the point, the more nodes lie there.
-        bend = np.arcsinh(np.maximum(max_diameter / f.height, _MIN_RELATIVE_SIZE))[:, None]
-        weights = weights * bend * np.cosh(bend * nodes) / np.sinh(bend)
-        nodes = np.sinh(bend * nodes) / np.sinh(bend)
+        a = np.arcsinh(np.maximum(max_diameter / f.height, _MIN_RELATIVE_SIZE))[:, None]
+        weights = weights * a * np.cosh(a * nodes) / np.sinh(a)
+        nodes = np.sinh(a * nodes) / np.sinh(a)
     return nodes[cell], (nodes * weights)[cell]
 
 
