@@ -41,11 +41,11 @@ _MAX_TOLERANCE_SIDES = 0.0027
 _MIN_CHAMBER_AREA_UNITS2 = 0.03
 _MIN_PILLAR_AREA_UNITS2 = 0.02
 _SPIKE_UNITS = 0.05
-"""Half of the thickness up to which spikes of rock are removed."""
+"""Half of the maximum thickness of the spikes of rock that are removed."""
 _MAX_BEND = 0.25
 """Largest offset of a tunnel's middle, relative to its length."""
 _WINDOW_REACH = 1.5
-"""Distance from a window up to which the parts on its sides are searched for, relative to the dilation."""
+"""Maximum distance between a window and the parts that it connects, relative to the dilation."""
 _LEVEL_RADIUS = 1.2
 _MAX_RADIUS = 2.0
 """Dilation with which the level is chosen, and the largest dilation, relative to the smallest one."""

@@ -41,11 +41,11 @@ _MIN_CURVATURE = 1e-14
 _MIN_AREA = 1e-9
 """Areas of cells up to this fraction of the square of half the perimeter may be rounding errors."""
 _MIN_WEIGHTED_CLEARANCE = 1e-9
-"""Clearance of a centroid, relative to half the perimeter, up to which a cell is not treated as convex."""
+"""A cell counts as convex if the clearance of its centroid exceeds this fraction of half the perimeter."""
 _MIN_MEAN_DENSITY = 1e-12
 """Mean density of a cell, relative to the largest density, below which the cell keeps its centroid."""
 _MAX_RISE = 0.5
-"""Slope at the end of a step, relative to the descent at its start, up to which the step is accepted."""
+"""A step is accepted if the slope at its end is at most this fraction of the descent at its start."""
 _MIN_SHORTENING = 0.1
 _MAX_SHORTENING = 0.5
 """Range of the factor by which a step that is not accepted is shortened."""

@@ -76,10 +76,10 @@ _ROUNDING = 1e-10
 """Allowance per robot and site, as a fraction of the map's size, far larger than all rounding errors."""
 
 _PROGRESS_BEFORE_TABLE = 0.1
-"""Fraction of the work that is done when the table of distances is built."""
+"""Fraction of the work before the table of distances is built."""
 
 _PROGRESS_BEFORE_SEARCH = 0.2
-"""Fraction of the work that is done when the search for prices starts."""
+"""Fraction of the work before the search for prices starts."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,8 +33,8 @@ from robocov.voronoi.delaunay import (
 )
 
 _AREA_TOLERANCE = 1e-12
-"""Difference between the total area of the cells and the area of the region that rounding may cause, as a
-fraction of the latter."""
+"""Largest difference that rounding may cause between the total area of the cells and the area of the region,
+as a fraction of the region's area."""
 
 
 class Triangulation(NamedTuple):
