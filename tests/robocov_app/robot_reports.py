@@ -11,7 +11,7 @@ from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov_app.viewer.explanation.explain import RobotReport, explain
-from robocov_app.viewer.explanation.lines import ReportLine
+from robocov_app.viewer.explanation.sentences import ReportLine
 
 
 def build_report(

@@ -11,8 +11,8 @@ format reads.
 """
 
 from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.conversion.conversion_options import Shaping
 from robocov_app.formats.geometry.conversion.environment import build_environment
-from robocov_app.formats.geometry.conversion.shaping import Shaping
 from robocov_app.formats.interface import Exporter, Importer
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.registry import (

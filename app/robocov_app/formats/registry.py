@@ -8,8 +8,8 @@ from robocov.errors import MapError, ParameterError, describe_unknown_name, form
 from robocov_app.formats.files import read_head
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geodata import geojson, imdf, osm
+from robocov_app.formats.geometry.conversion.conversion_options import Shaping
 from robocov_app.formats.geometry.conversion.environment import build_environment
-from robocov_app.formats.geometry.conversion.shaping import Shaping
 from robocov_app.formats.interface import Exporter, Importer
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.raster import movingai, picture, ros, tmx

@@ -17,8 +17,8 @@ from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
 from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
 from robocov_app.viewer.explanation.explain import RobotReport
-from robocov_app.viewer.explanation.lines import ReportLine
-from robocov_app.viewer.explanation.text import MIN_FORCE_N
+from robocov_app.viewer.explanation.quantities import MIN_FORCE_N
+from robocov_app.viewer.explanation.sentences import ReportLine
 from robocov_app.viewer.parameters import NumberParameter, OptionParameter, Parameter
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed

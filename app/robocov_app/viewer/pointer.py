@@ -11,24 +11,13 @@ from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanG
 from robocov_app.toolkit.tool import CursorShape
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
+from robocov_app.viewer.chart.scrubbing import TimeGesture
 from robocov_app.viewer.panel import ViewerPanel
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.tools.snapping import MapSnapper
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
 
 _NO_ROBOT = (-1, -1)
-
-
-class TimeGesture(Gesture):
-    """Shows the time under the mouse."""
-
-    def __init__(self, viewer: Presenter, chart: Chart) -> None:
-        self._viewer = viewer
-        self._chart = chart
-
-    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Show the time under the mouse."""
-        self._viewer.attempt(lambda: self._viewer.playback.look_at(self._chart.to_time(event.pos[0])))
 
 
 class ViewerPointer(Pointer):

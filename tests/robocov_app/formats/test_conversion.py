@@ -13,9 +13,9 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.conversion.conversion_options import Shaping
 from robocov_app.formats.geometry.conversion.environment import build_environment
 from robocov_app.formats.geometry.conversion.map_layout import build_boundary
-from robocov_app.formats.geometry.conversion.shaping import Shaping
 from robocov_app.formats.geometry.conversion.starts import find_roomiest_point
 from robocov_app.formats.geometry.polygons import round_polygons
 

@@ -14,8 +14,8 @@ from shapely import MultiPolygon, Polygon, box
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov_app.formats import ReadOptions, import_map
 from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.conversion.conversion_options import Shaping
 from robocov_app.formats.geometry.conversion.environment import build_environment
-from robocov_app.formats.geometry.conversion.shaping import Shaping
 
 ROOM = box(0, 0, 20, 16)
 ARC = tuple((10 + 4 * math.cos(k / 100), 5 + 4 * math.sin(k / 100)) for k in range(314))

@@ -13,8 +13,8 @@ from robocov import Rapf, Simulation, Team
 from robocov.observation import Decision
 from robocov.voronoi import partition
 from robocov_app.viewer.explanation.explain import explain
+from robocov_app.viewer.explanation.quantities import format_direction, format_force, format_length
 from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
-from robocov_app.viewer.explanation.text import format_direction, format_force, format_length
 
 # lengths, forces and directions
 

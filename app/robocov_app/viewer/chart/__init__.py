@@ -1,4 +1,4 @@
-"""The chart of the coverage cost against time, and the time line below it.
+"""The chart of the coverage cost against time, and the time slider below it.
 
 Modules
 -------
@@ -10,6 +10,8 @@ frame
     Place, look and content that all parts share.
 axes, events, curves
     Parts of the page, which changes seldom.
-captions, time_line, pointer_tag
+captions, time_slider, pointer_tag
     Parts that change in each frame.
+scrubbing
+    Dragging the time slider.
 """

@@ -19,7 +19,7 @@ from robocov_app.viewer.chart.events import draw_events
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.pointer_tag import draw_pointer_tag
 from robocov_app.viewer.chart.scale import ChartScale, TimeScale, build_chart_scale
-from robocov_app.viewer.chart.time_line import draw_empty_time_line, draw_present
+from robocov_app.viewer.chart.time_slider import draw_empty_time_line, draw_present
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME, PlottedQuantity
 

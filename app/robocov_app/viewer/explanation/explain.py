@@ -7,16 +7,16 @@ from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
-from robocov_app.viewer.explanation.lines import (
+from robocov_app.viewer.explanation.first_sentence import describe_motion
+from robocov_app.viewer.explanation.motion import classify_motion
+from robocov_app.viewer.explanation.sentences import (
     ReportLine,
     build_position_line,
     list_force_lines,
     list_reasons,
     list_surroundings,
 )
-from robocov_app.viewer.explanation.motion import classify_motion
 from robocov_app.viewer.explanation.situation import RobotSituation
-from robocov_app.viewer.explanation.verdict import describe_motion
 from robocov_app.viewer.presenter import Presenter
 
 

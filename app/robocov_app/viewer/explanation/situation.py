@@ -15,7 +15,7 @@ from robocov.environment import Environment, WallObstacle
 from robocov.metrics import MAX_CONTACT_GAP_M
 from robocov.observation import Decision, Snapshot
 from robocov.team import Team
-from robocov_app.viewer.explanation.text import MIN_FORCE_N, format_direction, format_length
+from robocov_app.viewer.explanation.quantities import MIN_FORCE_N, format_direction, format_length
 
 UNEXPLAINED_FORCE = "law"
 """Kind of the force that a controller's terms do not explain."""

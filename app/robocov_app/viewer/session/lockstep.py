@@ -11,6 +11,7 @@ from robocov.conditions import TIME_TOLERANCE_S
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
+from robocov_app.viewer.session.drag_spring import compute_spring_forces
 from robocov_app.viewer.session.edits import (
     AddRobot,
     DragRobot,
@@ -29,13 +30,8 @@ from robocov_app.viewer.session.pane import Continuation, Pane, resume_simulatio
 from robocov_app.viewer.session.past.states import PaneSetup, RunState
 from robocov_app.viewer.session.scenario import SessionScenario
 
-DRAG_STIFFNESS_PER_KG = 60.0
-"""Stiffness of the spring that pulls a dragged robot, divided by its mass, 1/s²."""
-MAX_DRAG_ACCELERATION_M_S2 = 80.0
-"""Maximum pull of the spring, divided by the mass of the robot."""
 MIN_REPORTED_OFFSET_M = 5e-4
 """A robot that joins farther than this from the requested position is reported with the distance."""
-_TINY = 1e-12
 
 
 class AutomaticEvent(NamedTuple):
@@ -212,21 +208,14 @@ class Lockstep:
             pane.adopt(setup, simulation)
 
     def _compute_pull(self, pane: Pane) -> Array | None:
-        """Return the forces of a critically damped spring on the dragged robot, (n, 2) N."""
+        """Return the forces of the spring that pulls the dragged robot, (n, 2) N; None if there is none."""
         if self.drag is None:
             return None
         number, target = self.drag
         row = pane.get_row(number)
         if row is None:
             return None
-        simulation = pane.simulation
-        acceleration = DRAG_STIFFNESS_PER_KG * (np.array(target) - simulation.positions[row])
-        acceleration -= 2.0 * np.sqrt(DRAG_STIFFNESS_PER_KG) * simulation.velocities[row]
-        magnitude = float(np.hypot(*acceleration))
-        fraction = min(1.0, MAX_DRAG_ACCELERATION_M_S2 / max(magnitude, _TINY))
-        forces = np.zeros_like(simulation.positions)
-        forces[row] = acceleration * (simulation.team.mass[row] * fraction)
-        return forces
+        return compute_spring_forces(pane.simulation, row, target)
 
     def _find_changing_robots(self, change_times: Array) -> list[int]:
         """Return the numbers of the robots whose change times, (n,) s, lie in the last step."""

@@ -16,6 +16,7 @@ from robocov_app.formats.geometry.conversion.cleaning import (
     measure_deviation,
     remove_hairs,
 )
+from robocov_app.formats.geometry.conversion.conversion_options import Conversion, Shaping
 from robocov_app.formats.geometry.conversion.free_parts import PartSelection, drop_specks, select_parts
 from robocov_app.formats.geometry.conversion.map_layout import (
     MapLayout,
@@ -24,7 +25,6 @@ from robocov_app.formats.geometry.conversion.map_layout import (
     normalize_ring,
 )
 from robocov_app.formats.geometry.conversion.primitives import restore_primitives
-from robocov_app.formats.geometry.conversion.shaping import Conversion, Shaping
 from robocov_app.formats.geometry.conversion.starts import build_starts, find_rooms, require_room
 from robocov_app.formats.geometry.conversion.validity import build_valid_boundary, build_valid_free_space
 from robocov_app.formats.geometry.polygons import round_polygons

@@ -9,7 +9,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
-from robocov_app.formats.geometry.conversion.shaping import Conversion
+from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2
 from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.reports import format_area

@@ -12,7 +12,7 @@ from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.conversion.cleaning import Deviation, measure_deviation
-from robocov_app.formats.geometry.conversion.shaping import Conversion
+from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.polygons import (
     buffer_with_mitres,
     fill_holes,

@@ -9,8 +9,8 @@ from shapely import MultiPolygon, Polygon, STRtree
 from robocov.arrays import Array
 from robocov.environment import MIN_START_GAP_RADII, DiscStart, PointsStart, StartSpec, UniformStart
 from robocov.errors import MapError, format_count
+from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.free_parts import MAX_FILE_ROBOTS
-from robocov_app.formats.geometry.conversion.shaping import Conversion
 from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.simplification.narrow_gaps import count_ray_crossings
 

@@ -6,7 +6,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import MapError
-from robocov_app.formats.geometry.conversion.shaping import Conversion
+from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.polygons import list_polygons, make_valid, to_multipolygon
 from robocov_app.formats.reports import format_area
 

@@ -19,7 +19,6 @@ from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.shapes.boundary_search import find_surrounding
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
-from robocov_app.formats.geometry.shapes.import_tally import ImportTally
 from robocov_app.formats.geometry.shapes.interpretation import interpret
 from robocov_app.formats.geometry.shapes.label_filter import LabelFilter
 from robocov_app.formats.geometry.shapes.shape_types import (
@@ -29,6 +28,7 @@ from robocov_app.formats.geometry.shapes.shape_types import (
     WallLine,
     get_obstacle_name,
 )
+from robocov_app.formats.import_tally import ImportTally
 from robocov_app.formats.options import ReadOptions, get_or_default
 
 __all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]

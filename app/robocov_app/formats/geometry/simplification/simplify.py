@@ -28,6 +28,8 @@ from robocov_app.formats.geometry.simplification.checks import (
 )
 from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline
 
+DEFAULT_TOLERANCE_M = 0.02
+"""Distance by which walls of vector formats may move."""
 _MIN_CELLS = 16
 """Rings of fewer cells stay as they are: the cells are the best description of them."""
 _MAX_HALVINGS = 3

@@ -12,10 +12,9 @@ from robocov.environment import MIN_START_GAP_RADII
 from robocov.errors import MapError, ParameterError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.simplification.simplify import DEFAULT_TOLERANCE_M
 from robocov_app.formats.options import Options, get_or_default
 
-DEFAULT_TOLERANCE_M = 0.02
-"""Distance by which walls of vector formats may move."""
 _MAX_GRID_M = 1e-4
 """Coordinates are rounded to this, or to a hundredth of a cell if that is finer."""
 

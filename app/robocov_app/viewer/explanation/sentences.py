@@ -4,18 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robocov_app.viewer.explanation.motion import Motion
-from robocov_app.viewer.explanation.situation import (
-    UNEXPLAINED_FORCE,
-    RobotSituation,
-    compute_alignment,
-)
-from robocov_app.viewer.explanation.text import (
+from robocov_app.viewer.explanation.quantities import (
     MIN_FORCE_N,
     format_direction,
     format_force,
     format_length,
     format_number,
     format_robot_count,
+)
+from robocov_app.viewer.explanation.situation import (
+    UNEXPLAINED_FORCE,
+    RobotSituation,
+    compute_alignment,
 )
 
 MAX_NAMED_FORCES = 3

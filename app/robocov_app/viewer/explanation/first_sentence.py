@@ -2,18 +2,18 @@
 
 from robocov.metrics import SETTLED_DISTANCE_M
 from robocov_app.viewer.explanation.motion import Motion
-from robocov_app.viewer.explanation.situation import (
-    MIN_SHORTFALL_M,
-    NearbyObject,
-    RobotSituation,
-    compute_alignment,
-)
-from robocov_app.viewer.explanation.text import (
+from robocov_app.viewer.explanation.quantities import (
     MIN_FORCE_N,
     format_direction,
     format_force,
     format_length,
     format_number,
+)
+from robocov_app.viewer.explanation.situation import (
+    MIN_SHORTFALL_M,
+    NearbyObject,
+    RobotSituation,
+    compute_alignment,
 )
 
 MIN_AHEAD_ALIGNMENT = 0.7
