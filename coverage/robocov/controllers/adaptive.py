@@ -67,7 +67,7 @@ class Adaptive(BaseController):
     Notes
     -----
     *Basis functions.* The estimate of robot i is K(q)·a_i. K are Gaussians on a grid of `basis` by `basis`,
-    divided by their sum, so that a constant density is represented exactly. At its position p_i, in its cell
+    divided by their sum, so a constant density is represented exactly. At its position p_i, in its cell
     V_i with the centroid C_i, robot i learns by
 
         dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ
@@ -79,7 +79,7 @@ class Adaptive(BaseController):
     *Gaussian process.* One measurement is stored for each of 20 by 20 squares, as if taken at its center. The
     kernel is the squared exponential with the length `correlation`, as in Luo and Sycara (ICRA 2018) and
     Santos, Diaz-Mercado and Egerstedt (2018), without their mixtures and bounds. With `explore` above 0, that
-    many standard deviations are added to the mean, so that robots are drawn to where no robot has been. This
+    many standard deviations are added to the mean, so robots are drawn to unvisited places. This
     takes several times as long to compute.
 
     The implementation is based on summaries of the papers, not on their full texts. It differs from the
@@ -135,7 +135,7 @@ class Adaptive(BaseController):
         )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
-        """Compute the forces toward the centroids, after a new estimate if it is time for one."""
+        """Update the estimates if they are due, and compute the forces toward the centroids."""
         next_plan_time = memory.plan_time + self.period - TIME_TOLERANCE_S
         if memory.goals is None or not memory.plan_time <= seen.time < next_plan_time:
             memory = self._plan(seen, memory)
@@ -174,7 +174,7 @@ class Adaptive(BaseController):
         lattice = memory.lattice
         dt = self.period
         functions = lattice.evaluate_basis(seen.positions)
-        # Λ and λ.
+        # Λ is `information`, λ is `projections`.
         information = memory.information + dt * functions[:, :, None] * functions[:, None]
         projections = memory.projections + dt * functions * _measure(seen)[:, None]
         goals = compute_sample_centroids(is_own, lattice.samples, memory.estimates, seen.positions)
@@ -354,7 +354,7 @@ def _build_grid(region: Region, count: int) -> Array:
 def _evaluate_basis(points: Array, centers: Array, width: float) -> Array:
     """Return Gaussians at points, (k, m), divided by their sum at each point."""
     exponents = _compute_exponents(points, centers, width)
-    # The nearest Gaussian counts 1, however far away it is.
+    # Scaled so that the nearest Gaussian is 1: far from all centers, the sum would underflow.
     values = np.exp(exponents.min(axis=1, keepdims=True) - exponents)
     return np.asarray(values / values.sum(axis=1, keepdims=True))
 

@@ -47,7 +47,7 @@ from robocov.planning.window import Window
 from robocov.team import Team
 
 MAX_PLANNING_GROUP = 8
-"""Number of robots that a robot with a map of its own plans for: itself and the nearest others."""
+"""Number of robots that a robot with its own map plans for: itself and the nearest others."""
 MIN_REST_S = 3.0
 """Time after which a robot that has not moved is at rest."""
 
@@ -73,7 +73,7 @@ _CHANGED_WALL_RADII = 4.0
 _ARRIVAL_RADIUS_M = 0.35
 """Distance from a goal at which a robot has arrived."""
 _LISTENING_S = 2.0
-"""Time for which robots with delayed messages stay at their starts."""
+"""Time that robots with delayed messages wait at their starts."""
 _SHARED_PATIENCE_FACTOR = 2.5
 """Factor of the patience if all robots learn from what one of them sees."""
 _MIN_PROGRESS_M = 0.05
@@ -83,11 +83,11 @@ _MAX_STUCK_PLANS = 3
 _JAM_RADIUS_M = 0.7
 """Distance from a robot within which others are in the same jam."""
 _MAX_EVASION_S = 8.0
-"""Maximum time for which a robot moves out of a jam."""
+"""Maximum time that a robot spends moving out of a jam."""
 _SWAP_SAVING = 0.1
 """Fraction of the squared path lengths that an exchange of goals must save."""
 _JOINT_PLANNING_CROSSINGS = 3.0
-"""Time for which a robot plans for others, in multiples of the time it needs to cross the region."""
+"""Time that a robot spends planning for others, in multiples of the time it needs to cross the region."""
 _STAGGERING = 0.5
 """Fraction of the period in which all robots make their first plans."""
 _MAX_DOUBLINGS = 60.0
@@ -234,18 +234,20 @@ class Atlas(BaseController):
         return AtlasMemory(team, tuple(states), routes, np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
-        """Compute the forces that lead robots along their routes, after new plans if these are due."""
+        """Plan the routes that are due, and compute the forces that lead all robots along their routes."""
         estimates = memory.estimates
-        cautious = seen
+        # Plans use the most likely positions of neighbors; collision avoidance assumes that they are closer.
+        conservative = seen
         if seen.reported_positions is not None:
             previous = estimates or Estimates.build_initial(len(seen.positions))
             seen, estimates = estimate_positions(seen, previous, memory.team)
-            cautious = assume_closer_neighbors(seen, estimates)
+            conservative = assume_closer_neighbors(seen, estimates)
         memory = self._add_scans(seen, memory)
-        memory = self._plan_routes(seen, memory, first_plan_time=0.0 if estimates is None else _LISTENING_S)
+        first_plan_time = 0.0 if estimates is None else _LISTENING_S
+        memory = self._plan_routes(seen, memory, first_plan_time=first_plan_time)
         returns = update_returns(seen, memory.returns)
         command = follow_routes(
-            cautious,
+            conservative,
             memory.team,
             routes=memory.routes,
             legs=memory.legs,
@@ -408,7 +410,7 @@ class Atlas(BaseController):
             compute_node_weights(planner, seen.density),
             other_positions,
             first_node,
-            former_goal=np.full(2, np.nan) if state.motion is None else state.motion.goal,
+            previous_goal=np.full(2, np.nan) if state.motion is None else state.motion.goal,
             min_saving=min(1.0, self.rest * cooperation.savings_factor),
         )
 
@@ -421,7 +423,7 @@ class Atlas(BaseController):
         return period
 
     def _plan_for_team(
-        self, former: TeamGoals | None, basis: PlanBasis, seen: Observations, cooperation: _Cooperation
+        self, previous: TeamGoals | None, basis: PlanBasis, seen: Observations, cooperation: _Cooperation
     ) -> TeamGoals:
         """Return goals for the team, or for a robot and its nearest neighbors."""
         size = len(basis.robots)
@@ -430,9 +432,9 @@ class Atlas(BaseController):
         group = basis.robots[:size]
         is_whole_team = size == len(basis.robots)
         window = _build_team_window(basis.known_map, basis.positions[:size], is_whole_team=is_whole_team)
-        former_planner = basis.planner if former is None else former.planner
-        planner = former_planner.update(basis.known_map, window)
-        situation = _build_situation(basis, size, former, cooperation.is_fixed)
+        previous_planner = basis.planner if previous is None else previous.planner
+        planner = previous_planner.update(basis.known_map, window)
+        situation = _build_situation(basis, size, previous, cooperation.is_fixed)
         min_savings = self._compute_min_savings(cooperation, size, is_quiet=basis.is_quiet)
         if cooperation.is_agreed:
             goals = _place_agreed_team(planner, seen.density, group, situation, min_savings)
@@ -466,13 +468,13 @@ class Atlas(BaseController):
         assert state.basis is not None
         planner = state.basis.planner
         path = state.path
-        former_viewpoint = None if state.motion is None else state.motion.viewpoint
-        if former_viewpoint is None and math.dist(own.goal, position) > _ARRIVAL_RADIUS_M:
+        previous_viewpoint = None if state.motion is None else state.motion.viewpoint
+        if previous_viewpoint is None and math.dist(own.goal, position) > _ARRIVAL_RADIUS_M:
             return path, OwnMotion(own.goal)
-        if former_viewpoint is not None:
+        if previous_viewpoint is not None:
             path = replace(path, viewpoint_length=path.viewpoint_length + path_increase)
-            if math.dist(former_viewpoint, position) < _ARRIVAL_RADIUS_M:
-                path = replace(path, viewpoints=(*path.viewpoints, former_viewpoint))
+            if math.dist(previous_viewpoint, position) < _ARRIVAL_RADIUS_M:
+                path = replace(path, viewpoints=(*path.viewpoints, previous_viewpoint))
         viewpoint = None
         node = planner.find_own_node(position)
         # The goal of a robot without others hardly depends on unknown space.
@@ -485,7 +487,7 @@ class Atlas(BaseController):
                 own.cell_distances,
                 path_lengths=planner.get_distances(node),
                 min_stake=self.stake * own.cost * 2.0**doublings,
-                former_viewpoints=path.viewpoints,
+                previous_viewpoints=path.viewpoints,
             )
         return path, OwnMotion(own.goal, viewpoint, is_idle=viewpoint is None)
 
@@ -571,24 +573,24 @@ def _extend_path(
 
 
 def _build_situation(
-    basis: PlanBasis, size: int, former: TeamGoals | None, is_fixed: BoolArray
+    basis: PlanBasis, size: int, previous: TeamGoals | None, is_fixed: BoolArray
 ) -> TeamSituation:
-    """Return the situation of the first `size` robots of a team; they start from their former goals.
+    """Return the situation of the first `size` robots of a team; they start from their previous goals.
 
-    Fixed robots, and those without a former goal, start from their positions. `is_fixed`, (k - 1,), is about
-    the robots after the first one.
+    Fixed robots, and those without a previous goal, start from their positions. The first robot
+    has no entry in `is_fixed`, (k - 1,).
     """
     group = basis.robots[:size]
     positions = basis.positions[:size]
     is_fixed_in_group = np.concatenate([[False], is_fixed])[:size]
-    former_goals = positions.copy()
-    if former is not None:
-        _, rows, former_rows = np.intersect1d(group, former.robots, return_indices=True)
+    previous_goals = positions.copy()
+    if previous is not None:
+        _, rows, previous_rows = np.intersect1d(group, previous.robots, return_indices=True)
         is_free = ~is_fixed_in_group[rows]
-        former_goals[rows[is_free]] = former.goals[former_rows[is_free]]
+        previous_goals[rows[is_free]] = previous.goals[previous_rows[is_free]]
     return TeamSituation(
         positions=positions,
-        former_goals=former_goals,
+        previous_goals=previous_goals,
         is_fixed=is_fixed_in_group,
         other_positions=basis.positions[size:],
     )
@@ -609,14 +611,14 @@ def _place_agreed_team(
     order = np.argsort(group)
     situation = TeamSituation(
         positions=situation.positions[order],
-        former_goals=situation.former_goals[order],
+        previous_goals=situation.previous_goals[order],
         is_fixed=situation.is_fixed[order],
         other_positions=situation.other_positions,
     )
     key = (
         group[order].tobytes(),
         situation.positions.tobytes(),
-        situation.former_goals.tobytes(),
+        situation.previous_goals.tobytes(),
         min_savings.relocation,
     )
     plan = _LATEST_PLANS.get(planner)

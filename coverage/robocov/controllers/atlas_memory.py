@@ -75,7 +75,7 @@ class OwnMotion:
     goal: Array
     """(2,) m, its own goal."""
     viewpoint: Array | None = None
-    """(2,) m, point to which it moves first, to look around."""
+    """(2,) m, the point where it first looks around."""
     is_idle: bool = False
     """True if the next plan may be skipped as long as nothing changes."""
 
@@ -85,7 +85,7 @@ class JamState:
     """How long one robot has been stuck among others, and until when it moves away from them."""
 
     stuck_plans: int = 0
-    """Number of consecutive plans for which it has been stuck."""
+    """Number of consecutive plans during which it has been stuck."""
     evasion_end: float = 0.0
     """Time until which it moves out of the jam, s."""
 

@@ -67,7 +67,7 @@ class Barrier(BaseController):
         h_ij = sqrt(2 (alpha_i + alpha_j) (|dp| - D_s)) + dp · dv / |dp| >= 0
 
     This is ensured by dh_ij/dt >= -gamma h_ij³, which is linear in the accelerations. Each of the two robots
-    takes the fraction alpha_i / (alpha_i + alpha_j) of it, so that all decide independently. The desired
+    takes the fraction alpha_i / (alpha_i + alpha_j) of it, so all decide independently. The desired
     acceleration, here Lloyd's, is changed as little as these half planes require: one quadratic program for
     each robot, solved exactly. If no acceleration is allowed, the robot brakes. An obstacle point does not
     move and does not contribute: alpha_j = 0. The closest point of a wall moves on as the robot passes;
@@ -76,7 +76,7 @@ class Barrier(BaseController):
     Robots do not know the velocities of others: each derives them from two reported positions. Obstacle
     points are the closest one and those of the last scan. The bodies and limits of the others are assumed to
     be known. The square root is rounded over the last millimeter, and continued as an odd function within the
-    safe distance, so that robots that start too close to each other separate.
+    safe distance, so robots that start too close to each other separate.
 
     The implementation is based on summaries of the paper (IEEE T-RO 33, 661-674), not on the full text; h_ij
     is taken from the documentation of MathWorks' barrier certificate block.
@@ -155,7 +155,7 @@ class Barrier(BaseController):
     def _find_near_neighbors(self, seen: Observations, team: Team) -> NearNeighbors:
         """Find the neighbors that constrain a robot now."""
         min_distance = 2.0 * float(team.radius.max()) + self.safe_gap
-        # Upper bound of the distance that two robots need to stop if they meet at full speed.
+        # Upper bound on the distance that two robots need to stop if they meet at full speed.
         stopping_distance = (
             2.0 * float(team.max_speed.max()) ** 2 / float(self._compute_braking_limits(team).min())
         )
@@ -250,9 +250,9 @@ def _derive_velocities(reports: NeighborReports, previous: NeighborReports | Non
     """
     velocities = np.zeros_like(reports.positions)
     if previous is not None and reports.time > previous.time:
-        _, rows, former_rows = np.intersect1d(
+        _, rows, previous_rows = np.intersect1d(
             reports.pair, previous.pair, assume_unique=True, return_indices=True
         )
-        moves = reports.positions[rows] - previous.positions[former_rows]
+        moves = reports.positions[rows] - previous.positions[previous_rows]
         velocities[rows] = moves / (reports.time - previous.time)
     return clip_lengths(velocities, max_speed)

@@ -36,7 +36,7 @@ from robocov.observation.scanned_view import (
 )
 
 _SAMPLES_PER_RAY = 10
-"""Number of samples with which integrals along a ray are approximated."""
+"""Number of samples for integrals along a ray."""
 _SAMPLE_FRACTIONS = (np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY
 """Positions of the samples of each ray, as fractions of its length."""
 _SETTLE_TIME_S = 2.0
@@ -147,7 +147,7 @@ class BoostingMemory(Memory):
     gradient: Array | None = None
     """(n, 2) m, gradient that each robot follows."""
     speed_fraction: Array | None = None
-    """(n,) Fraction of full speed with which each robot follows the gradient."""
+    """(n,) Fraction of full speed at which each robot follows the gradient."""
     ascents: tuple[Ascent, ...] = ()
 
 
@@ -207,11 +207,11 @@ class Boosting(BaseController):
     The gain `boost` selects the boosted gradient:
 
     - ``phi``: the weight κ Φ_i^γ w, larger for points that no other robot detects
-    - ``p``: the weight κ (1 - Π (1 - p))^-γ w, larger for points that the whole team hardly detects
+    - ``p``: the weight κ (1 - Π (1 - p))^-γ w, larger for points that the whole team barely detects
     - ``neighbours``: the weight w; in addition, each neighbor in range repels with κ / d^γ
 
     A robot follows it until it comes to rest, or for at most `patience`. A robot that has returned on its
-    trail is not boosted again, so that the result is no worse than without boosts, apart from what the other
+    trail is not boosted again, so the result is no worse than without boosts, apart from what the other
     robots have changed in the meantime.
 
     The implementation is based on the abstracts of the paper (arXiv 1409.0776) and of its sequel by Welikala
@@ -388,11 +388,11 @@ def compute_undetected(
         Unit vectors along the rays.
     pairs : NearNeighbors
         The neighbors that may see points of the view: within their own reach, unless a wall that the robot
-        sees is in front of the line between neighbor and point.
+        sees blocks the line of sight from the neighbor to the point.
     reach : (n,) array, m
         Maximum distance of each robot's view.
     decay : float, 1/m
-        λ.
+        λ in the probability exp(-λ d) of detecting a point at distance d.
 
     Returns
     -------

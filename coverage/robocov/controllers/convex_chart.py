@@ -18,7 +18,7 @@ from robocov.observation.region import Region
 _MAX_REFINEMENTS = 12
 """Maximum number of times that wall segments are halved until they are edges of the mesh."""
 _ROUNDING_M = 1e-6
-"""Length to which vertices of the mesh are rounded."""
+"""Vertices of the mesh are rounded to multiples of this length."""
 
 
 class ConvexChart:
@@ -133,6 +133,7 @@ class _PiecewiseAffineMap(NamedTuple):
         inverses = np.stack([second[:, ::-1] * [1.0, -1.0], first[:, ::-1] * [-1.0, 1.0]], axis=1)
         inverses /= determinant[:, None, None]
         image_sides = images[:, :2] - images[:, 2:]
+        # The matrix with the sides of the image as columns, times the inverse: a sum of outer products.
         jacobians = (image_sides[..., None] * inverses[:, :, None]).sum(axis=1)
         return cls(origins=corners[:, 2], inverses=inverses, images=images, jacobians=jacobians)
 

@@ -25,7 +25,7 @@ from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_sam
 _MIN_DETERMINANT = 1e-300
 """Lower limit of determinants in divisions."""
 
-# Charts take long to build, and must not be copied with the memories of robots.
+# Charts are slow to build, and must not be copied with the memories of robots.
 _get_chart = lru_cache(maxsize=8)(ConvexChart)
 
 
@@ -55,7 +55,7 @@ class Diffeomorphism(WholeMapController):
     Notes
     -----
     The motion minimizes the cost of the images: its distances are those in the chart, not path lengths in the
-    map. A room at the end of a long corridor is small in the chart, and hardly attracts robots.
+    map. A room at the end of a long corridor is small in the chart, and barely attracts robots.
 
     Any diffeomorphism will do; this one is a `ConvexChart`. For a `shrink` of 1 and without obstacles it is
     the identity, and the controller is `Lloyd`.
@@ -112,11 +112,12 @@ class Diffeomorphism(WholeMapController):
 
 
 def _compute_centroids(seen: Observations, chart: ConvexChart, images: Array) -> Array:
-    """Return the centroids, (n, 2) m, of the cells of robots with the given images in the chart."""
+    """Return the centroids, (n, 2) m, of the robots' cells in the chart; `images`, (n, 2) m, are F(p_i)."""
     pairs = seen.find_near_neighbors(np.inf)
     if seen.reported_positions is None:
         neighbor_images = images[pairs.neighbor]
     else:
+        # Robots know their neighbors' positions as reported, which may differ from one receiver to the next.
         neighbor_images, _ = chart.map_to_chart(seen.positions[pairs.robot] - pairs.offset)
     is_own = find_own_samples(chart.samples, images, pairs.robot, neighbor_images)
     return compute_sample_centroids(is_own, chart.samples, chart.mass, images)

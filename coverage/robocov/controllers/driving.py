@@ -25,9 +25,9 @@ _MIN_LENGTH = 1e-300
 _MIN_RATE = 1e-9
 """Lower limit in 1/s of the rate of approach in divisions."""
 _RELATIVE_SLACK = 1e-12
-"""Amount by which a constraint may be violated because of rounding, relative to the radius of the disc."""
+"""Tolerance of constraints for rounding errors, relative to the radius of the disc."""
 _MIN_SLOPE = 1e-12
-"""Sine of the angle up to which the lines of two constraints count as parallel."""
+"""Sine of the largest angle between two constraint lines that count as parallel."""
 
 
 class Margins(NamedTuple):
@@ -113,7 +113,7 @@ def compute_drive_forces(velocities: Array, seen: Observations, team: Team, resp
     seen : Observations
     team : Team
     response_time : float, s
-        Time constant with which the velocities are reached.
+        Time constant of the approach to the desired velocities.
 
     Returns
     -------
@@ -204,11 +204,11 @@ def limit_approach_speed(
     offsets : (n, k, 2) array, m
         From each object to the robot; nan for none.
     clearance : (n, k) array, m
-        Distance to which the robot may come.
+        Minimum distance of the robot from the object.
     rate : float, 1/s
         Maximum rate of the exponential decrease of the remaining distance to the clearance.
     braking : (n, k) array, m/s²
-        Acceleration with which the robot must be able to stop at the clearance.
+        Deceleration that must suffice for the robot to stop at the clearance.
     max_speed : (n,) array, m/s
 
     Returns

@@ -14,7 +14,7 @@ from robocov.k_median import choose_greedily, improve_sources
 from robocov.planning.discovered_map import FREE, UNKNOWN
 
 _INSPECTED_RADIUS_M = 0.5
-"""Distance around an inspected target within which no other target is worth a visit."""
+"""Targets closer than this to an inspected target are not worth a visit."""
 _ARRIVAL_RADIUS_M = 0.3
 """Distance from a target at which a robot inspects it."""
 _MIN_PROGRESS_M = 0.05
@@ -70,16 +70,16 @@ class FrontierMedian(SharedMapController):
 
     def _list_inspected_targets(self, situation: Situation) -> Array:
         """Return the targets that need no further visit, (m, 2) m."""
-        former_plan = situation.former_plan
-        if former_plan is None:
+        previous_plan = situation.previous_plan
+        if previous_plan is None:
             return np.empty((0, 2))
-        inspected = former_plan.placement.inspected_targets
-        if former_plan.placement.is_final:
+        inspected = previous_plan.placement.inspected_targets
+        if previous_plan.placement.is_final:
             return inspected
-        goals = situation.former_goals
+        goals = situation.previous_goals
         has_arrived = np.sqrt(((situation.positions - goals) ** 2).sum(axis=1)) < _ARRIVAL_RADIUS_M
-        # The former group may have consisted of other robots: the nearest former position counts.
-        moves = situation.positions[:, None] - former_plan.group.positions
+        # The previous group may have consisted of other robots: the nearest previous position counts.
+        moves = situation.positions[:, None] - previous_plan.group.positions
         progress = np.sqrt((moves**2).sum(axis=2)).min(axis=1)
         is_stuck = np.isfinite(goals[:, 0]) & (progress < _MIN_PROGRESS_M)
         return np.unique(np.vstack([inspected, goals[has_arrived | is_stuck]]), axis=0)
@@ -144,9 +144,9 @@ class FrontierMedian(SharedMapController):
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return situation.positions
-        former_plan = situation.former_plan
-        goals = situation.former_goals
-        if former_plan is not None and former_plan.placement.is_final and np.isfinite(goals).all():
+        previous_plan = situation.previous_plan
+        goals = situation.previous_goals
+        if previous_plan is not None and previous_plan.placement.is_final and np.isfinite(goals).all():
             first = candidates.find_nearest(goals)
             min_saving = self.threshold
         else:

@@ -64,7 +64,7 @@ class Gain:
         ----------
         value : object
         where : str
-            Name of the controller, with which the message begins.
+            Name of the controller, for the start of the message.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class Option:
         ----------
         value : object
         where : str
-            Name of the controller, with which the message begins.
+            Name of the controller, for the start of the message.
 
         Raises
         ------

@@ -53,7 +53,7 @@ class GeodesicLloyd(WholeMapController):
 
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) replace the straight distance
     in the locational cost by the length d of the shortest path. Each robot moves along the shortest path to
-    the goal that minimizes an upper bound of the cost of its cell. This controller knows the whole map, and
+    the goal that minimizes an upper bound on the cost of its cell. This controller knows the whole map, and
     therefore serves as a bound for those that do not.
 
     Notes
@@ -209,5 +209,5 @@ def _build_obstacle(polygon: Polygon) -> PolygonObstacle:
     return PolygonObstacle(outer, tuple(holes))
 
 
-# Planners take long to build, and must not be copied with the memories of robots.
+# Planners are slow to build, and must not be copied with the memories of robots.
 _get_planner = lru_cache(maxsize=8)(GeodesicPlanner)

@@ -18,8 +18,8 @@ class GreedySubmodular(SharedMapController):
     Robots are placed one after another, each where it reduces the cost most, given the earlier ones; then all
     positions descend. The map is the one that the robots discover and share; unknown space counts as free
     where a path may lead to. When the map has changed, the team plans again. It keeps descending from the
-    former goals unless the new greedy solution saves the fraction `threshold` of the cost. Goals are assigned
-    to robots such that the sum of the squared path lengths is minimal.
+    previous goals unless the new greedy solution saves the fraction `threshold` of the cost. Goals are
+    assigned to robots such that the sum of the squared path lengths is minimal.
 
     Notes
     -----
@@ -44,17 +44,17 @@ class GreedySubmodular(SharedMapController):
     threshold: float = gain(0.01, "1", "fraction of the cost that a new greedy plan must save", high=1.0)
 
     def compute_placement(self, situation: Situation) -> Placement:
-        """Compute the greedy placement, or the former one if that is about as good, after descent."""
+        """Compute the greedy placement, or the previous one if that is about as good, after descent."""
         weights = situation.compute_weights(~situation.known_map.is_blocked)
         candidates = Candidates.build_at_nodes(situation, weights, situation.planner.sources)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return Placement(goals=situation.positions, is_final=False)
         chosen = run_lloyd(candidates.table, choose_greedily(candidates.table, count))
-        if np.isfinite(situation.former_goals).all():
-            former = run_lloyd(candidates.table, candidates.find_nearest(situation.former_goals))
-            max_cost = (1.0 - self.threshold) * candidates.compute_cost(former)
+        if np.isfinite(situation.previous_goals).all():
+            previous = run_lloyd(candidates.table, candidates.find_nearest(situation.previous_goals))
+            max_cost = (1.0 - self.threshold) * candidates.compute_cost(previous)
             if not candidates.compute_cost(chosen) < max_cost:
-                chosen = former
+                chosen = previous
         goals = assign_goals(situation, candidates.refine(situation, weights, chosen))
         return Placement(goals=goals, is_final=True)

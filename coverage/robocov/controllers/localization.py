@@ -26,15 +26,15 @@ _MIN_SIGMA_M = 1e-9
 _SENT_TOLERANCE_S = 1e-6
 """A message is new if it was sent later than the last one by more than this, because sums of steps round."""
 _MANEUVER_FRACTION = 0.5
-"""Fraction of the maximum acceleration with which others are assumed to change their velocity."""
+"""Assumed acceleration of others, as a fraction of their maximum acceleration."""
 _MAX_EXTRAPOLATION_S = 1.5
-"""Time for which others are assumed to keep their velocities."""
+"""Maximum time that others are assumed to keep their velocities."""
 _DOUBT_SIGMAS = 1.0
-"""Number of standard deviations of a fix by which others may be closer than estimated."""
+"""Others may be closer than estimated by this number of standard deviations of a fix."""
 _DOUBT_SPEED = 1.0
 """Speed in m/s at which others may have come closer since their last message."""
 _MAX_DOUBT_FRACTION = 0.75
-"""Maximum fraction of the estimated distance by which others may be closer."""
+"""Others may be closer than estimated by at most this fraction of the estimated distance."""
 
 
 class Tracks(NamedTuple):
@@ -164,12 +164,12 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
     max_squared_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
     was_displaced = (squared_residual > max_squared_residual) & (previous.fix_counts >= _MIN_FIXES)
     fix_counts = np.where(was_displaced, 1.0, previous.fix_counts + 1.0)
-    # The mean of all fixes at first, then of those in the last seconds.
+    # At first the mean of all fixes, later that of the last few seconds.
     gain = np.maximum(1.0 / fix_counts, min(dt / _AVERAGING_S, 1.0))
     positions = predicted + gain[:, None] * (seen.positions - predicted)
     # A fix differs more from the mean of k - 1 others than from the truth. There are two coordinates.
     squared_error = 0.5 * squared_residual * (1.0 - 1.0 / np.maximum(fix_counts, 1.0))
-    # The first fix has no residual, so that there is one value less to average than there are fixes.
+    # The first fix has no residual, so there is one residual fewer to average than there are fixes.
     variance_gain = np.maximum(1.0 / np.maximum(fix_counts - 1.0, 1.0), gain)
     variance = previous.variance + variance_gain * (squared_error - previous.variance)
     variance = np.where(was_displaced, previous.variance, variance)
@@ -201,7 +201,7 @@ def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observa
 def _update_tracks(
     previous: Tracks, messages: _Messages, sigma: Array, maneuver: Array, max_speed: Array
 ) -> Tracks:
-    """Return the tracks after the newest messages, of which some may be known already.
+    """Return the tracks after the newest messages, some of which may already be known.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def _update_track(
     root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
     steady_alpha = 1.0 - root * root
     steady_beta = 2.0 * (1.0 - root) ** 2
-    # The gains with which k messages are fitted by least squares are larger for small k.
+    # For small k, the gains of a least-squares fit to k messages are larger.
     initial_alpha = 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0))
     initial_beta = 6.0 / (k * (k + 1.0))
     alpha = max(steady_alpha, initial_alpha)

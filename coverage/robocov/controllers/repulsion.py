@@ -37,11 +37,11 @@ _MIN_DISTANCE_M = 1e-9
 _MIN_LENGTH = 1e-300
 """Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _MIN_CHARGE_DISTANCE_M = 0.05
-"""Distance below which Howard's forces no longer grow; robots in contact are farther apart."""
+"""Howard's forces stop growing below this distance; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)
 """Force of all rays that hit a straight wall, relative to that of a point charge at the same distance."""
 _MAX_LINK_STRETCH = 0.999
-"""Fraction of the range of a link beyond which the force that maintains it no longer grows."""
+"""The force that maintains a link stops growing beyond this fraction of the range."""
 _MIN_EXPLORING_SPEED = 0.01
 """Speed in m/s below which a robot has no well-defined direction of motion."""
 _BRAKING_FRACTION = 0.5
@@ -175,7 +175,7 @@ class Howard(BaseController):
     of the robots.
 
     Obstacles are the points that the rays of the range sensor hit. Each ray carries an equal fraction of the
-    charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan,
+    charge `k_obs`, so its effect does not depend on the number of rays. Before the first scan,
     a straight wall through the closest obstacle point is assumed.
 
     The sum over all obstacles and robots, the inverse-square forces and the friction are based on general

@@ -34,7 +34,7 @@ _APPROACH_RATE = 10.0
 _MIN_SPEED_LIMIT = 0.15
 """Speed in m/s that a robot may reach even close to a wall."""
 _MAX_EVASION_SPEED = 0.3
-"""Maximum speed in m/s with which a robot passes another one on the left."""
+"""Maximum speed in m/s at which a robot passes another one on the left."""
 _EVASION_RANGE_M = 1.5
 """Distance from which robots pass each other on the left."""
 _MIN_DISTANCE_M = 1e-9
@@ -77,7 +77,7 @@ def follow_routes(
     k_prop : float, 1/s
         Speed per meter of distance to the goal.
     response_time : float, s
-        Time constant with which velocities are reached.
+        Time constant of the approach to the desired velocities.
 
     Returns
     -------

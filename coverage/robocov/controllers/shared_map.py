@@ -40,7 +40,7 @@ CERTAIN_RANGE_FRACTION = 0.8
 """Fraction of the communication range within which a robot would certainly be heard."""
 
 _REFINEMENT_RADIUS = 1.5
-"""Distance from chosen candidates within which nodes are close, in spacings of candidates."""
+"""Maximum distance of nearby nodes from a chosen candidate, in spacings of candidates."""
 
 
 class Group(NamedTuple):
@@ -86,9 +86,9 @@ class Situation(NamedTuple):
 
     positions: Array
     """(k, 2) m, their known or assumed positions."""
-    former_goals: Array
+    previous_goals: Array
     """(k, 2) m, their goals in the last plan; nan for robots without one."""
-    former_plan: Plan | None
+    previous_plan: Plan | None
     known_map: DiscoveredMap
     planner: GridPlanner
     density: Density | None
@@ -114,7 +114,7 @@ class Candidates(NamedTuple):
     positions: Array
     """(c, 2) m"""
     table: Array
-    """(m, c) Weighted distances from the m nodes that are to be covered."""
+    """(m, c) Weighted distances from the m nodes to cover."""
 
     @classmethod
     def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
@@ -192,7 +192,7 @@ class SharedMapMemory:
 
 @dataclass(frozen=True)
 class SharedMapController(BaseController):
-    """Base class of controllers with which each robot plans for itself and all robots that it hears.
+    """Base class of controllers in which each robot plans for itself and all robots that it hears.
 
     Robots scan, and merge their maps with those of the robots that they hear (`DiscoveredMap`). Every
     `period` seconds, each robot makes a plan, and follows the shortest route to its own goal in that plan.
@@ -270,16 +270,16 @@ class SharedMapController(BaseController):
         """Return the plan of each robot; robots with the same knowledge share one."""
         plans: list[Plan] = []
         plans_by_knowledge: dict[tuple[object, ...], Plan] = {}
-        for robot, former_plan in enumerate(memory.plans):
+        for robot, previous_plan in enumerate(memory.plans):
             known_map = memory.maps[robot]
-            group = _build_group(seen, memory.team, former_plan, robot)
+            group = _build_group(seen, memory.team, previous_plan, robot)
             radius = float(memory.team.radius[robot])
             sensing_range = float(memory.team.sensing_range[robot])
             arrays = tuple(column.tobytes() for column in group)
-            key = (id(known_map), id(former_plan), radius, sensing_range, *arrays)
+            key = (id(known_map), id(previous_plan), radius, sensing_range, *arrays)
             if key not in plans_by_knowledge:
                 plans_by_knowledge[key] = self._make_plan(
-                    seen, known_map, former_plan, group, radius, sensing_range
+                    seen, known_map, previous_plan, group, radius, sensing_range
                 )
             plans.append(plans_by_knowledge[key])
         return tuple(plans)
@@ -288,27 +288,29 @@ class SharedMapController(BaseController):
         self,
         seen: Observations,
         known_map: DiscoveredMap,
-        former_plan: Plan | None,
+        previous_plan: Plan | None,
         group: Group,
         radius: float,
         sensing_range: float,
     ) -> Plan:
         """Return the plan of a robot; its radius and sensing range are in m."""
-        if former_plan is not None and _is_still_valid(former_plan, known_map, seen.density, group):
-            return replace(former_plan, group=group)
+        if previous_plan is not None and _is_still_valid(previous_plan, known_map, seen.density, group):
+            return replace(previous_plan, group=group)
         window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
-        former_goals = np.full(group.positions.shape, np.nan)
-        if former_plan is None:
+        previous_goals = np.full(group.positions.shape, np.nan)
+        if previous_plan is None:
             planner = GridPlanner(known_map, window, radius + self.clearance)
         else:
-            planner = former_plan.planner
-            _, rows, former_rows = np.intersect1d(group.robots, former_plan.group.robots, return_indices=True)
-            former_goals[rows] = former_plan.placement.goals[former_rows]
+            planner = previous_plan.planner
+            _, rows, previous_rows = np.intersect1d(
+                group.robots, previous_plan.group.robots, return_indices=True
+            )
+            previous_goals[rows] = previous_plan.placement.goals[previous_rows]
         planner = planner.update(known_map, window)
         situation = Situation(
             positions=group.positions,
-            former_goals=former_goals,
-            former_plan=former_plan,
+            previous_goals=previous_goals,
+            previous_plan=previous_plan,
             known_map=known_map,
             planner=planner,
             density=seen.density,
@@ -358,7 +360,7 @@ def update_maps(
 ) -> list[DiscoveredMap]:
     """Add the scan of each robot to the maps of all robots in its hearing group.
 
-    Robots that all hear each other share one map. All scans are added to it in turn, so that later scans can
+    Robots that all hear each other share one map. All scans are added to it in turn, so later scans can
     correct earlier ones: if maps were only merged, an error in one of them would never be corrected.
 
     Parameters
@@ -401,21 +403,21 @@ def update_maps(
     return updated_maps
 
 
-def _build_group(seen: Observations, team: Team, former_plan: Plan | None, robot: int) -> Group:
+def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, robot: int) -> Group:
     """Return the group of a robot: itself, those that it hears, and those assumed to be at their goals."""
     position = seen.positions[robot : robot + 1]
     robots = np.append(seen.neighbors.list_neighbors(robot), robot)
     positions = np.vstack([seen.get_neighbor_positions(robot), position])
     heard_times = np.full(len(robots), seen.time)
-    if former_plan is not None:
-        former = former_plan.group
-        goals = former_plan.placement.goals
+    if previous_plan is not None:
+        previous = previous_plan.group
+        goals = previous_plan.placement.goals
         distance = np.sqrt(((goals - position) ** 2).sum(axis=1))
-        is_silent = seen.time - former.heard_times > MAX_SILENCE_S
+        is_silent = seen.time - previous.heard_times > MAX_SILENCE_S
         is_close = distance < CERTAIN_RANGE_FRACTION * team.communication_range[robot]
-        is_expected = ~(np.isin(former.robots, robots) | (is_silent & is_close))
-        robots = np.concatenate([robots, former.robots[is_expected]])
+        is_expected = ~(np.isin(previous.robots, robots) | (is_silent & is_close))
+        robots = np.concatenate([robots, previous.robots[is_expected]])
         positions = np.vstack([positions, goals[is_expected]])
-        heard_times = np.concatenate([heard_times, former.heard_times[is_expected]])
+        heard_times = np.concatenate([heard_times, previous.heard_times[is_expected]])
     order = np.argsort(robots)
     return Group(robots=robots[order], positions=positions[order], heard_times=heard_times[order])

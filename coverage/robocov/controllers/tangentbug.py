@@ -26,23 +26,23 @@ from robocov.observation import Decision, Observations, Scanning, compute_ray_di
 from robocov.team import Team
 
 _SQUARE_SIDE_M = 0.1
-"""Side of the squares in which a robot stores the obstacle points that it has detected."""
+"""Side of the squares that store the obstacle points a robot has detected."""
 _MIN_IMPROVEMENT_M = 0.2
 """Minimum difference for a point to count as nearer to the goal; smaller values let modes alternate."""
 _RETURN_RADIUS_M = 0.3
-"""Distance from a point within which a robot has returned to it."""
+"""A robot closer to a point than this has returned to it."""
 _ARRIVAL_RADIUS_M = 0.05
 """Distance from a point at which a robot has arrived."""
 _MIN_BOUNDARY_LENGTH_M = 1.0
 """Minimum length of a boundary that is worth following."""
 _PATIENCE_DECAY = 0.9
-"""Factor of the length for which boundaries are followed, with each attempt to reach a goal."""
+"""Factor by which the maximum length of followed boundaries shrinks with each attempt to reach a goal."""
 _CONTACT_FRACTION = 0.95
-"""Fraction of its present distance to which a robot may approach a point that is within the clearance."""
+"""A robot within the clearance of a point may approach it to this fraction of the current distance."""
 _MIN_LENGTH = 1e-300
 """Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _ROUNDING_M = 1e-9
-"""Length by which a free distance may be too small because of rounding."""
+"""Tolerance of free distances for rounding errors."""
 _MAX_RETURN_FACTOR = 3.0
 """A robot gives up its return after the maximum length of its boundary, times this factor."""
 

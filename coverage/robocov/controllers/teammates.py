@@ -70,15 +70,15 @@ class Teammates(NamedTuple):
             *(np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True))
         )
         updated = joined._select(np.argsort(joined.robots))
-        _, rows, former_rows = np.intersect1d(
+        _, rows, previous_rows = np.intersect1d(
             updated.robots, self.robots, assume_unique=True, return_indices=True
         )
-        moves = updated.positions[rows] - self.rest_positions[former_rows]
+        moves = updated.positions[rows] - self.rest_positions[previous_rows]
         is_at_rest = np.sqrt((moves**2).sum(axis=1)) < REST_RADIUS_M
         rows = rows[is_at_rest]
-        former_rows = former_rows[is_at_rest]
-        updated.rest_positions[rows] = self.rest_positions[former_rows]
-        updated.rest_times[rows] = self.rest_times[former_rows]
+        previous_rows = previous_rows[is_at_rest]
+        updated.rest_positions[rows] = self.rest_positions[previous_rows]
+        updated.rest_times[rows] = self.rest_times[previous_rows]
         return updated
 
     def add_reports(

@@ -182,7 +182,7 @@ def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
         loader = _TextLoader(source.path, source.text)
         path = source.path
         modules = source.modules
-    # Each file has a name of its own, so that two files called mine.py do not replace each other.
+    # Each file gets its own name, so two files called mine.py do not replace each other.
     module_name = f"{_MODULE_PREFIX}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
     assert spec is not None and spec.loader is not None
@@ -345,7 +345,7 @@ def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
         # An outer context already provides them; they are not loaded twice.
         yield
         return
-    former_modules = {name: sys.modules.pop(name) for name in modules if name in sys.modules}
+    previous_modules = {name: sys.modules.pop(name) for name in modules if name in sys.modules}
     finder = _TextFinder(modules)
     sys.meta_path.insert(0, finder)
     try:
@@ -354,4 +354,4 @@ def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
         sys.meta_path.remove(finder)
         for name in modules:
             sys.modules.pop(name, None)
-        sys.modules.update(former_modules)
+        sys.modules.update(previous_modules)

@@ -31,7 +31,7 @@ from robocov.observation.scanned_view import (
 )
 
 _SAMPLES_PER_RAY = 12
-"""Number of samples with which integrals along a ray are approximated."""
+"""Number of samples for integrals along a ray."""
 _SAMPLE_FRACTIONS = np.append((np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY, 1.0)
 """Positions of the samples of each ray, and of its end, as fractions of its length."""
 
@@ -44,7 +44,7 @@ class VisibilityMemory(Memory):
     gradient: Array | None = None
     """(n, 2) m, gradient of the area in view."""
     speed_fraction: Array | None = None
-    """(n,) Fraction of full speed with which each robot follows the gradient."""
+    """(n,) Fraction of full speed at which each robot follows the gradient."""
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,8 @@ class VoronoiGraphCoverage(SharedMapController):
 
     In the paper the graph is known, and robots know the neighbors of their neighbors. Here it is the graph
     of the map that robots discover and share, and each robot plans for all robots that it hears. Unknown
-    space counts as free where a path may lead to, so that the graph extends into it. When the map has
-    changed, the plan starts from the former vertices; the first exchange must then save the fraction
+    space counts as free where a path may lead to, so the graph extends into it. When the map has
+    changed, the plan starts from the previous vertices; the first exchange must then save the fraction
     `threshold` of the cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to
     robots such that the sum of the squared path lengths is minimal.
 
@@ -59,12 +59,12 @@ class VoronoiGraphCoverage(SharedMapController):
     threshold: float = gain(0.01, "1", "fraction of the cost that the first exchange must save", high=1.0)
 
     def compute_placement(self, situation: Situation) -> Placement:
-        """Compute the placement by vertex substitution, starting from the former one."""
+        """Compute the placement by vertex substitution, starting from the previous one."""
         candidates = self._build_vertices(situation)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return Placement(goals=situation.positions, is_final=False)
-        goals = situation.former_goals
+        goals = situation.previous_goals
         chosen = candidates.find_nearest(np.where(np.isfinite(goals), goals, situation.positions))
         is_fixed = np.zeros(count, dtype=bool)
         min_saving = self.threshold
@@ -77,23 +77,28 @@ class VoronoiGraphCoverage(SharedMapController):
         return Placement(goals=assign_goals(situation, candidates.positions[chosen]), is_final=True)
 
     def _build_vertices(self, situation: Situation) -> Candidates:
-        """Build the vertices that the robots can reach, with their distances along the graph."""
+        """Build the candidates: the vertices that robots can reach, with distances weighted by mass."""
         known_map = situation.known_map
         raster = known_map.raster
         window = Window.build_around(raster, situation.positions[0], math.inf, MAX_BLOCKS)
+        block_size = raster.cell_size * window.stride
         is_reachable = _find_reachable_blocks(situation, window)
         cells_by_block = window.crop(~known_map.is_blocked, fill=False).reshape(window.block_shape)
         free_counts = cells_by_block.sum(axis=(1, 3))
-        block_size = raster.cell_size * window.stride
+
         roadmap = VoronoiRoadmap.build(
             is_reachable, free_counts > 0, _MIN_SPACING_M / block_size, MAX_VERTICES
         )
+        # The roadmap has rows and columns of blocks; positions are x and y of their centers.
         vertices = np.asarray(raster.origin) + (roadmap.vertices[:, ::-1] + 0.5) * block_size
+
         mass = free_counts.astype(np.float64)
         if situation.density is not None and not situation.density.is_uniform:
             mass *= situation.density.evaluate(window.compute_nodes(raster)).reshape(mass.shape)
         has_vertex = roadmap.vertex_of_cell >= 0
         weights = np.bincount(roadmap.vertex_of_cell[has_vertex], mass[has_vertex], minlength=len(vertices))
+
+        # Row q, column p of the table: distance to vertex q from a robot at vertex p, times the weight of q.
         distances = np.minimum(roadmap.distances * block_size, UNREACHABLE_M)
         return Candidates(positions=vertices, table=np.ascontiguousarray((distances * weights).T))
 

@@ -58,7 +58,7 @@ class GridPlanner(MapWindow):
 
     @classmethod
     def get_shared(cls, known_map: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
-        """Return the planner in use for exactly this map and window, or build one.
+        """Return the planner that is already in use for a map and window, or build it.
 
         Parameters
         ----------
@@ -76,7 +76,8 @@ class GridPlanner(MapWindow):
         planner = _PLANNERS_IN_USE.get(key)
         if planner is None:
             planner = cls(known_map, window, clearance)
-        return _PLANNERS_IN_USE.setdefault(key, planner)
+            _PLANNERS_IN_USE[key] = planner
+        return planner
 
     def update(self, known_map: DiscoveredMap, window: Window) -> GridPlanner:
         """Return the planner for a later map and window.

@@ -21,7 +21,7 @@ _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 _MAX_MOVE = 2
 """Maximum number of rows or columns in one move."""
 _UNKNOWN_DETOUR = 0.4
-"""Fraction by which routes through unknown cells are assumed to be longer, since walls may turn up there."""
+"""Assumed excess length of routes through unknown cells, as a fraction: walls may turn up there."""
 _SIGHT_STEP_CELLS = 0.5
 """Maximum distance between the sampled points of a line of sight."""
 
@@ -205,7 +205,7 @@ def compute_distances(
         Lower bound on the lengths of the edges.
     sources : (k,) int array
     offsets : (k,) array, m
-        Distances with which the sources start.
+        Initial distances of the sources.
     limit : float, m
         Nodes farther away are not reached.
 

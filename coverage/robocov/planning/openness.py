@@ -16,7 +16,7 @@ PRIOR_OPENNESS = 0.8
 WALK_LENGTH_BLOCKS = 30.0
 """Typical distance of a random walk from its start when it is cut off."""
 MAX_BLOCKS = 1000
-"""Default maximum number of blocks into which a map is divided."""
+"""Default maximum number of blocks in a map."""
 
 _RELAXATION_FACTOR = 1.9  # converges fastest for walks of `WALK_LENGTH_BLOCKS`
 _MAX_ITERATIONS = 1000
@@ -153,7 +153,7 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
                 if blocks.unknown_counts[i, j] == 0.0:
                     continue
                 # The centers of two blocks are one side apart, but the border of a block is only half a side
-                # from its center, so that the flow across it is twice as large.
+                # from its center, so the flow across it is twice as large.
                 leak = blocks.unknown_counts[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
                 inflow = 2.0 * blocks.free_side_counts[i, j] + leak * PRIOR_OPENNESS
                 conductance = 2.0 * (blocks.free_side_counts[i, j] + blocks.wall_side_counts[i, j]) + leak

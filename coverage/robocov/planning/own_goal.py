@@ -39,7 +39,7 @@ def find_own_goal(
     weights: Array,
     other_positions: Array,
     first_node: int,
-    former_goal: Array,
+    previous_goal: Array,
     min_saving: float,
 ) -> OwnGoal:
     """Find a local minimum of the coverage cost as a function of the position of one robot.
@@ -53,8 +53,8 @@ def find_own_goal(
         Positions of all other robots.
     first_node : int
         Node at which the search starts.
-    former_goal : (2,) array, m
-        Kept if the new goal is hardly better; nan if there is none.
+    previous_goal : (2,) array, m
+        Kept if the new goal is barely better; nan if there is none.
     min_saving : float
         Fraction of the cost of the robot's own cell that a new goal must save.
 
@@ -78,11 +78,11 @@ def find_own_goal(
         node = best
         neighbors = search.evaluate_neighbors(node)
     cell_distances = search.compute_cell_distances(node)
-    goal, excess = _refine_goal(planner, node, neighbors, search.costs, former_goal)
-    if np.isfinite(former_goal).all():
+    goal, excess = _refine_goal(planner, node, neighbors, search.costs, previous_goal)
+    if np.isfinite(previous_goal).all():
         cell_cost = float((search.target_weights * cell_distances[search.targets]).sum())
         if excess < min_saving * cell_cost:
-            goal = former_goal.copy()
+            goal = previous_goal.copy()
     return OwnGoal(goal=goal, node=node, cell_distances=cell_distances, cost=search.costs[node])
 
 
@@ -139,17 +139,17 @@ def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
 
 
 def _refine_goal(
-    planner: GridPlanner, node: int, neighbors: list[int], costs: Mapping[int, float], former_goal: Array
+    planner: GridPlanner, node: int, neighbors: list[int], costs: Mapping[int, float], previous_goal: Array
 ) -> tuple[Array, float]:
-    """Return the minimum of the parabolas around a node, and the excess cost of the former goal over it.
+    """Return the minimum of the parabolas around a node, and the excess cost of the previous goal over it.
 
-    The excess is infinite if the former goal is more than one spacing away, where the parabolas do not hold.
+    The excess is infinite beyond one spacing from the node, where the parabolas do not hold.
     """
     right, up, left, down = neighbors
     goal = planner.nodes[node].copy()
     excess = 0.0
     for axis, (ahead, behind) in enumerate(((right, left), (up, down))):
-        offset = (former_goal[axis] - planner.nodes[node][axis]) / planner.spacing
+        offset = (previous_goal[axis] - planner.nodes[node][axis]) / planner.spacing
         if abs(offset) > 1.0:
             excess = math.inf
         if ahead < 0 or behind < 0:
@@ -159,7 +159,7 @@ def _refine_goal(
         if curvature > 0.0:
             shift = min(max(-slope / curvature, -0.5), 0.5)
             goal[axis] += shift * planner.spacing
-            former_cost = slope * offset + 0.5 * curvature * offset * offset
+            previous_cost = slope * offset + 0.5 * curvature * offset * offset
             min_cost = slope * shift + 0.5 * curvature * shift * shift
-            excess += former_cost - min_cost
+            excess += previous_cost - min_cost
     return goal, excess

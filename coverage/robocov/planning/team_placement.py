@@ -27,14 +27,14 @@ _MAX_ROBOTS_FOR_THOROUGH_SEARCH = 8
 
 
 class TeamSituation(NamedTuple):
-    """Positions and former goals of the robots of a team, as known to the first robot, which plans."""
+    """Positions and previous goals of the robots of a team, as known to the first robot, which plans."""
 
     positions: Array
     """(k, 2) m"""
-    former_goals: Array
-    """(k, 2) m, goals in the former plan."""
+    previous_goals: Array
+    """(k, 2) m, goals in the previous plan."""
     is_fixed: BoolArray
-    """(k,) Whether each robot keeps its former goal. The first robot never does."""
+    """(k,) Whether each robot keeps its previous goal. The first robot never does."""
     other_positions: Array
     """(o, 2) m, positions of robots that do not move and are not part of the plan."""
 
@@ -89,32 +89,32 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     Returns
     -------
     (k, 2) array, m
-        The former goals if the robot that makes the plan cannot go anywhere.
+        The previous goals if the robot that makes the plan cannot go anywhere.
 
     Notes
     -----
-    Starting from the former plan, Lloyd's iteration alternates with interchange (`robocov.k_median`). If all
-    robots but the first are fixed, the first one goes to the best position in its own cell. Goals are
+    Starting from the previous plan, Lloyd's iteration alternates with interchange (`robocov.k_median`). If
+    all robots but the first are fixed, the first one goes to the best position in its own cell. Goals are
     assigned so that the sum of the squared path lengths is minimal: then the assignment stays the same while
     the robots move, and their paths do not cross. Since robots also leave these paths to look around, they
     exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
     """
     own_node = planner.find_own_node(team.positions[0])
     if own_node < 0:
-        return team.former_goals
+        return team.previous_goals
     is_reachable = np.isfinite(planner.get_distances(own_node))
     is_usable = is_reachable[planner.sources]
     sources = planner.sources[is_usable]
     is_target = is_reachable & (weights > 0.0)
     if len(sources) < len(team.positions) or not is_target.any():
-        return team.former_goals
+        return team.previous_goals
     distances = planner.source_distances[is_usable]
     other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
     # All other robots together are one more source, the last one, which is fixed.
     target_distances = np.vstack([distances[:, is_target], other_distances[is_target]])
     table = np.ascontiguousarray((target_distances * weights[is_target]).T)
 
-    chosen = _choose_former_sources(planner.nodes[sources], team)
+    chosen = _choose_previous_sources(planner.nodes[sources], team)
     chosen = _improve_sources(table, chosen, team, min_savings.relocation)
     if team.is_fixed[1:].all():
         from_team = np.column_stack([distances[:, sources[chosen]], other_distances[sources]])
@@ -126,11 +126,11 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     )
 
 
-def _choose_former_sources(source_positions: Array, team: TeamSituation) -> IntArray:
-    """Return the source nearest to each former goal, all different; fixed robots choose first."""
+def _choose_previous_sources(source_positions: Array, team: TeamSituation) -> IntArray:
+    """Return the source nearest to each previous goal, all different; fixed robots choose first."""
     chosen = np.full(len(team.positions), -1, dtype=np.intp)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
-        squared_distances = ((source_positions - team.former_goals[robot]) ** 2).sum(axis=1)
+        squared_distances = ((source_positions - team.previous_goals[robot]) ** 2).sum(axis=1)
         squared_distances[chosen[chosen >= 0]] = np.inf
         chosen[robot] = squared_distances.argmin()
     return chosen
@@ -139,7 +139,7 @@ def _choose_former_sources(source_positions: Array, team: TeamSituation) -> IntA
 def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
     """Return sources, (k,), with a lower cost. The last column of the table represents all other robots."""
     # The order does not depend on who plans, so that all robots choose the same of two equally good plans.
-    order = np.lexsort(team.former_goals.T)
+    order = np.lexsort(team.previous_goals.T)
     others_source = table.shape[1] - 1
     improved_sources = improve_sources(
         table,
@@ -184,7 +184,7 @@ def _assign_goals(
         unchanged_sum = squared_lengths[unchanged, unchanged].sum()
         if assigned_sum > (1.0 - min_saving) * unchanged_sum:
             assignment = unchanged
-    goals = team.former_goals.copy()
+    goals = team.previous_goals.copy()
     goals[mobile] = source_positions[chosen[mobile[assignment]]]
     return goals
 

@@ -19,7 +19,7 @@ def find_viewpoint(
     cell_distances: Array,
     path_lengths: Array,
     min_stake: float,
-    former_viewpoints: Sequence[Array],
+    previous_viewpoints: Sequence[Array],
 ) -> Array | None:
     """Find the most worthwhile viewpoint on an unknown patch of a robot's own cell.
 
@@ -32,7 +32,7 @@ def find_viewpoint(
         Distances from the robot to all nodes.
     min_stake : float
         Stake below which a patch is not worth a visit, in cells times meters.
-    former_viewpoints : sequence of (2,) arrays, m
+    previous_viewpoints : sequence of (2,) arrays, m
         Viewpoints that the robot has already visited.
 
     Returns
@@ -67,11 +67,11 @@ def find_viewpoint(
     stake_per_length = frontier_stakes[is_worth_visiting, None] / (_ADDED_LENGTH_M + path_lengths[node])
     value = frontier.is_side_free[is_worth_visiting] * stake_per_length
     first_center = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
-    # Former viewpoints in units of cells, from the center of the first cell of the window.
-    former_cells = (np.array(former_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size
+    # Previous viewpoints in units of cells, from the center of the first cell of the window.
+    previous_cells = (np.array(previous_viewpoints).reshape(-1, 2) - first_center) / raster.cell_size
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
-    for former_column, former_row in former_cells:
-        squared_distances = (former_column - column) ** 2 + (former_row - row) ** 2
+    for previous_column, previous_row in previous_cells:
+        squared_distances = (previous_column - column) ** 2 + (previous_row - row) ** 2
         value[squared_distances < min_distance**2] = 0.0
     best = value.argmax()
     if not value.flat[best] > 0.0:

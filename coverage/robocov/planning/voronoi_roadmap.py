@@ -51,7 +51,7 @@ class VoronoiRoadmap(NamedTuple):
         has_clearance : (rows, columns) bool array
             Whether each cell may be part of the graph.
         is_free : (rows, columns) bool array
-            Whether each cell is to be assigned to a vertex.
+            Whether to assign each cell to a vertex.
         spacing : float
             Minimum distance from one vertex to the next, in cells.
         max_vertices : int

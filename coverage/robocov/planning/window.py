@@ -43,7 +43,7 @@ class Window(NamedTuple):
         center : (2,) array, m
         reach : float, m
             The window contains all points up to this distance; infinite for the whole raster. It moves in
-            steps of a quarter of the reach, so that it stays the same while the center hardly moves.
+            steps of a quarter of the reach, so it stays the same while the center barely moves.
         max_nodes : int
             Maximum number of nodes.
 

@@ -26,8 +26,8 @@ def test_goals_are_assigned_by_squared_path_lengths() -> None:
     goals = np.array([[4.0, 2.4], [3.0, 1.0]])
     situation = Situation(
         positions=positions,
-        former_goals=np.full((2, 2), np.nan),
-        former_plan=None,
+        previous_goals=np.full((2, 2), np.nan),
+        previous_plan=None,
         known_map=build_map(),
         planner=build_planner(),
         density=None,
@@ -52,18 +52,18 @@ def test_silent_robots_are_expected_at_their_goals_until_they_are_missed_there(
     positions = np.array([[1.0, 1.0], [7.0, 3.0]])
     not_linked = Neighbors.from_ranges(positions, np.full(2, 3.0))
     seen = Observations(positions, np.zeros((2, 2)), not_linked, np.full((2, 2), np.nan), REGION, time=time)
-    former_group = Group(
+    previous_group = Group(
         robots=np.array([0, 1]), positions=positions, heard_times=np.array([time, time - silence])
     )
-    former_plan = Plan(
-        group=former_group,
+    previous_plan = Plan(
+        group=previous_group,
         placement=Placement(goals=np.array([[1.0, 1.0], goal]), is_final=False),
         known_map=build_map(),
         planner=build_planner(),
         density=None,
     )
     team = Team.homogeneous(2, communication_range=3.0)
-    group = _build_group(seen, team, former_plan, 0)
+    group = _build_group(seen, team, previous_plan, 0)
     assert group.robots.tolist() == ([0, 1] if is_expected else [0])
     if is_expected:
         assert group.positions[1].tolist() == goal

@@ -48,13 +48,13 @@ def build_simulation(name: str, conditions: Conditions | None = None, **limits: 
 
 
 def build_situation(state: np.ndarray, positions: list[list[float]]) -> Situation:
-    """Return the situation of robots without a former plan on a map with given cells."""
+    """Return the situation of robots without a previous plan on a map with given cells."""
     known_map = DiscoveredMap(RASTER, state.astype(np.uint8))
     window = Window.build_around(RASTER, np.array([1.0, 1.0]), np.inf, 400)
     return Situation(
         positions=np.array(positions),
-        former_goals=np.full((len(positions), 2), np.nan),
-        former_plan=None,
+        previous_goals=np.full((len(positions), 2), np.nan),
+        previous_plan=None,
         known_map=known_map,
         planner=GridPlanner(known_map, window, 0.13),
         density=None,
@@ -237,8 +237,8 @@ def test_targets_are_not_visited_again(is_stuck: bool) -> None:
     assert not plan.placement.is_final
     situation = Situation(
         positions=plan.group.positions if is_stuck else plan.placement.goals,
-        former_goals=plan.placement.goals,
-        former_plan=plan,
+        previous_goals=plan.placement.goals,
+        previous_plan=plan,
         known_map=plan.known_map,
         planner=plan.planner,
         density=None,

@@ -23,7 +23,7 @@ def compute_cost(planner: GridPlanner, positions: np.ndarray) -> float:
 
 
 def place_at_rest(planner: GridPlanner, positions: np.ndarray, fixed: tuple[int, ...] = ()) -> np.ndarray:
-    """Place a team that is at its former goals, where some robots are fixed."""
+    """Place a team that is at its previous goals, where some robots are fixed."""
     is_fixed = np.isin(np.arange(len(positions)), fixed)
     team = TeamSituation(positions, positions, is_fixed, NO_POSITIONS)
     return place_team(planner, compute_node_weights(planner), team, MinSavings(0.01, 0.01))
@@ -109,7 +109,7 @@ def test_goals_are_exchanged_only_if_that_saves_enough() -> None:
         assert np.array_equal(new_goals, goals[::-1] if is_exchanged else goals)
 
 
-def test_a_viewpoint_is_at_the_border_of_an_open_patch_and_away_from_former_ones() -> None:
+def test_a_viewpoint_is_at_the_border_of_an_open_patch_and_away_from_previous_ones() -> None:
     state = np.full(RASTER.shape, FREE, dtype=np.uint8)
     state[10:20, 10:20] = WALL
     state[11:19, 11:19] = 0
@@ -147,7 +147,7 @@ def test_the_own_goal_minimizes_the_cost() -> None:
     assert (own.cell_distances[planner.nodes[:, 0] > 5.5] == 0.0).all()
 
 
-def test_the_former_goal_is_kept_if_the_new_one_saves_little() -> None:
+def test_the_previous_goal_is_kept_if_the_new_one_saves_little() -> None:
     planner = build_planner()
     weights = compute_node_weights(planner)
     others = np.array([[6.0, 2.0]])
@@ -160,7 +160,7 @@ def test_the_former_goal_is_kept_if_the_new_one_saves_little() -> None:
     np.testing.assert_allclose(moved.goal, own.goal, atol=1e-9)
 
 
-def test_a_former_goal_outside_the_parabolas_is_never_kept() -> None:
+def test_a_previous_goal_outside_the_parabolas_is_never_kept() -> None:
     """The parabolas say nothing about points more than one node away, however low they are there."""
     planner = build_planner()
     weights = compute_node_weights(planner)
