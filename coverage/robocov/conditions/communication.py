@@ -158,6 +158,7 @@ class Radio:
                 is_received=self._find_receivers(step, true_positions, working),
             )
             in_flight = (*in_flight, broadcast)
+        # Messages are in flight in the order in which they arrive, so those that are due come first.
         due = [broadcast for broadcast in in_flight if broadcast.arrival_step <= step]
         if len(due) == 0:
             return replace(inbox, in_flight=in_flight)

@@ -16,7 +16,7 @@ from robocov.conditions.random_streams import FAILURE_STREAM, create_generator
 from robocov.errors import ParameterError, is_number, quote, require_number
 
 TIME_TOLERANCE_S = 1e-9
-"""Difference up to which two times count as equal, because sums of steps have rounding errors."""
+"""Maximum difference between two times that count as equal: sums of steps have rounding errors."""
 
 
 class ConditionParameter(NamedTuple):

@@ -116,7 +116,7 @@ class Perception:
             rng = create_generator(self._conditions.seed, SENSING_STREAM, step)
             noise = rng.normal(scale=sigma, size=self._count)
             measured = np.maximum(distance + noise, MIN_MEASURED_DISTANCE_M)
-            # A point at distance zero has no direction in which it could be moved.
+            # The direction to a point at distance zero is undefined: it stays where it is.
             has_direction = distance > 0.0
             divisor = np.where(has_direction, distance, 1.0)
             offset *= np.where(has_direction, measured / divisor, 1.0)[:, None]

@@ -1,7 +1,7 @@
 """Random numbers that depend only on a seed, a stream and a step.
 
 A generator with a state would have to be copied, rewound and branched together with a run. Here, each step of
-each stream has a generator of its own, so that a step draws the same numbers whenever it is computed.
+each stream has its own generator, so a step draws the same numbers whenever it is computed.
 """
 
 import numpy as np

@@ -198,7 +198,7 @@ class Environment(Drawable):
     def start(self, name: str | None = None) -> Start:
         """Return a start of the map.
 
-        Every map has a start ``uniform``, anywhere in the free space, even if its file does not define one.
+        Every map has the start ``uniform`` (anywhere in the free space), even if its file does not define it.
 
         Parameters
         ----------

@@ -19,7 +19,7 @@ Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 REPEATS: tuple[str, ...] = get_args(Repeat)
 """The values of `Repeat`."""
 _PARALLEL_TOLERANCE_M2 = 1e-12
-"""Cross product up to which an edge counts as parallel to the motion, and sweeps no area."""
+"""Maximum cross product of an edge that counts as parallel to the motion, and so sweeps no area."""
 
 
 @dataclass(frozen=True)

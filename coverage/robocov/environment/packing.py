@@ -20,7 +20,7 @@ _PACKING_TRIALS = 6
 """Number of random packings that are tried if there is room for at most `_MAX_FEW_POINTS`; otherwise one."""
 _MAX_FEW_POINTS = 300
 _LATTICE_TRIALS = 20
-"""Number of random positions and orientations in which a lattice is tried."""
+"""Number of random positions and orientations to try for a lattice."""
 _MAX_LATTICE_STEPS = 2000
 """Larger lattices are not tried, because darts fill large areas well enough."""
 _MIN_DARTS = 64
@@ -28,13 +28,13 @@ _MIN_DARTS = 64
 _DARTS_PER_POINT = 4
 """Expected number of darts inside the area that are thrown for each missing point."""
 _MAX_DARTS_PER_HIT = 100
-"""Throwing ends when more darts inside the area than this are needed for one of them to find room."""
+"""Throwing ends when fewer than one in this number of darts inside the area finds room."""
 _MIN_AREA_FRACTION = 1e-3
 """Lower limit of the fraction of its bounding box that an area is assumed to fill."""
 
 
 def compute_max_points(area: BaseGeometry, spacing: float) -> int:
-    """Compute an upper bound of the number of points in any packing of an area.
+    """Compute an upper bound on the number of points in any packing of an area.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
     for trial in range(trials):
         rng = np.random.default_rng(trial)
         lattice = pack_lattice(rng, area, max_points, spacing)
-        # In passages that are hardly wider than a robot, darts pack more densely than lattices.
+        # In passages that are barely wider than a robot, darts pack more densely than lattices.
         darts = throw_darts(rng, area, max_points, spacing)
         for points in (lattice, darts):
             if len(points) > len(best):
@@ -92,7 +92,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
 
 
 def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n random points one after the other, until hardly any more fit.
+    """Choose up to n random points one after the other, until almost no more fit.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ MAX_BYTES = 2_000_000_000
 _MAX_COMPRESSION_RATIO = 100
 """Maximum size of the arrays relative to that of the file: more is a decompression bomb."""
 _MIN_RATIO_BYTES = 256_000_000
-"""Size of arrays up to which the compression ratio does not matter."""
+"""The compression ratio of arrays up to this size does not matter."""
 _MAX_READ_BYTES = 1 << 20
 """Largest single read: the central directory of a zip file with arrays is short."""
 _DAMAGE_ERRORS = (
@@ -98,7 +98,7 @@ def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, 
 
 
 class _LimitedReader:
-    """A file from which nothing large is read at once, such as a directory of millions of entries."""
+    """A file that refuses large reads, such as that of a directory with millions of entries."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file

@@ -16,7 +16,7 @@ CACHE_VARIABLE = "ROBOCOV_CACHE"
 
 
 def find_cache_root() -> Path | None:
-    """Return the folder for caches; None if there is to be no cache.
+    """Return the folder for caches; None to use no cache.
 
     It is the folder in the environment variable `CACHE_VARIABLE`, or by default the user's cache folder.
     """

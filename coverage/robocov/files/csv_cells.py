@@ -13,8 +13,8 @@ _QUOTED_FORMULA = re.compile(r"'+[=+\-@\t\r\n＝＋－＠]")
 def quote_cell(value: Any) -> Any:
     """Quote the content of a CSV cell, so that no spreadsheet evaluates it.
 
-    A text that starts with ``=``, ``+``, ``-``, ``@``, a tab or a line break gets a leading apostrophe, with
-    which spreadsheets themselves mark text.
+    A text that starts with ``=``, ``+``, ``-``, ``@``, a tab or a line break gets a leading apostrophe, the
+    mark that spreadsheets themselves use for text.
 
     Parameters
     ----------

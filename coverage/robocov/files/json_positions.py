@@ -1,6 +1,6 @@
 """Positions of keys and values in the text of JSON documents.
 
-The parser does not record positions, so that valid files cost nothing. After an error, the text is scanned
+The parser does not record positions, so valid files cost nothing. After an error, the text is scanned
 along the path to the mistake, and everything else is skipped by the parser.
 """
 

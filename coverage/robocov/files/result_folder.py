@@ -1,7 +1,7 @@
 """Result folders: each contains either the old result or the new one, and no other file is changed.
 
 A result is written to a hidden staging folder inside its folder. To commit it, robocov writes a journal,
-which lists the files of the new result, and the files of the old one that are to be removed. Once the
+which lists the files of the new result, and the files of the old one to remove. Once the
 journal has been renamed into place, the new result is valid: if the process is interrupted, the next one that
 opens the folder completes the remaining steps (`complete_commit`). At the end, the journal becomes the
 manifest, which lists the files of the result. Files that are not in the manifest were not written by
@@ -54,7 +54,7 @@ _SIGNATURES = {
 }
 """Patterns in the first bytes of files that robocov has written."""
 _SIGNATURE_BYTES = 4096
-"""Number of bytes at the start of a file in which its signature is searched for."""
+"""Number of bytes at the start of a file that are searched for its signature."""
 
 
 class ResultFolder:

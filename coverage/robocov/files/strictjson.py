@@ -161,7 +161,8 @@ def parse_toml(content: bytes, where: str) -> dict[str, Any]:
         document = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"{where}: byte at offset {error.start}: not UTF-8") from None
-    except ValueError as error:  # Of TOML, or of a whole number with thousands of digits.
+    except ValueError as error:
+        # The content is not TOML, or contains an integer with too many digits for Python.
         text = to_one_line(error)
         raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
     except RecursionError:

@@ -14,7 +14,7 @@ from robocov.errors import OutputError, describe_error, quote
 _SPECIAL_FILES = {"d": "a folder", "p": "a named pipe", "s": "a socket", "c": "a device", "b": "a device"}
 """Kinds of files that are not regular, by the first character of the mode."""
 _MAX_SUFFIX_LENGTH = 16
-"""Characters; longer endings are not suffixes by which a writer chooses a format."""
+"""Characters. Writers choose a format by the suffix; a longer ending is not a suffix."""
 _FLUSH_THREADS = 8
 
 
@@ -112,7 +112,7 @@ def flush_to_disk(paths: Iterable[Path]) -> None:
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    # Flushing is mostly waiting, so that many files take about as long as one.
+    # Flushing is mostly waiting, so many files take about as long as one.
     with ThreadPoolExecutor(_FLUSH_THREADS) as threads:
         list(threads.map(_flush, paths))
 

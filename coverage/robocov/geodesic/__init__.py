@@ -2,7 +2,7 @@
 
 `Geodesics` computes distances and paths. It searches a graph of corners that see each other (`corner_graph`),
 which is built with an index of the walls around a point (`angular_index`). Walls and corners (`walls`) have
-integer coordinates (`grid`), so that visibility does not depend on rounding.
+integer coordinates (`grid`), so visibility does not depend on rounding.
 """
 
 from robocov.geodesic.geodesics import Geodesics

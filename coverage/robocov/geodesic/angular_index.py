@@ -61,7 +61,7 @@ class AngularWallIndex(NamedTuple):
     positions: Array
     """(n, 2) Positions of the sources."""
     squared_reach: Array
-    """(n,) Squared distances up to which walls are in the index."""
+    """(n,) Squares of the distances within which all walls are in the index."""
     squared_clear_distance: Array
     """(n, bins) Squared distances up to which nothing is hidden; `_MUST_CHECK_SECTORS` if the source is at a
     vertex."""

@@ -58,7 +58,7 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
     Parameters
     ----------
     column, row : (n,) int array
-        Coordinates from 0 up to ``2**Z_ORDER_BITS``.
+        Coordinates from 0 to ``2**Z_ORDER_BITS - 1``.
 
     Returns
     -------

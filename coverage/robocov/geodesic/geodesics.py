@@ -39,7 +39,7 @@ _TARGETS_PER_BLOCK = 1024
 _MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
 """Initial number of index entries per source, by number of bins. It is doubled whenever it is too small."""
 _MAX_DEPTH_M = 2.0 * GRID_M
-"""Depth in an obstacle from which points are moved to free space, in addition to `_MAX_RELATIVE_DEPTH`."""
+"""Points up to this depth in an obstacle are moved to free space; see also `_MAX_RELATIVE_DEPTH`."""
 _MAX_RELATIVE_DEPTH = 1e-9
 """The same for large maps, as a fraction of the size of the map."""
 _SNAP_STEPS = 2

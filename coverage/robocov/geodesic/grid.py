@@ -1,4 +1,4 @@
-"""Integer coordinates, in which the side of a line on which a point lies is computed exactly."""
+"""Integer coordinates, which decide exactly on which side of a line a point lies."""
 
 from __future__ import annotations
 

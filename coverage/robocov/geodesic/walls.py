@@ -187,7 +187,7 @@ def _find_sectors(segments: _Segments) -> _Sectors:
     At a pinch, each outgoing wall is paired with the next incoming wall counter-clockwise; see `Walls`.
     """
     vertices = segments.vertices
-    # As many walls end at a vertex as start there: sorted by vertex, both kinds have the same rows.
+    # As many walls start at a vertex as end there. Row i of both orders therefore has the same vertex.
     leaving = np.argsort(segments.start, kind="stable")
     arriving = np.argsort(segments.end, kind="stable")
     vertex = segments.start[leaving]

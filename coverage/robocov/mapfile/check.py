@@ -232,7 +232,7 @@ def _iterate_rings(environment: Environment) -> Iterator[tuple[str, Ring]]:
 
 
 def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> Iterator[str]:
-    """Warn of all likely mistakes."""
+    """Yield a warning for each likely mistake."""
     vertex_count = count_vertices(environment)
     if vertex_count > MANY_VERTICES:
         yield describe_vertex_count(vertex_count)
@@ -248,7 +248,7 @@ def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> 
 
 
 def _find_shape_warnings(environment: Environment) -> Iterator[str]:
-    """Warn of duplicate vertices, and of obstacles outside the boundary."""
+    """Yield warnings about duplicate vertices and obstacles outside the boundary."""
     for path, ring in _iterate_rings(environment):
         points = np.asarray(ring)
         edge_lengths = compute_lengths(np.roll(points, -1, axis=0) - points)
@@ -263,7 +263,7 @@ def _find_shape_warnings(environment: Environment) -> Iterator[str]:
 
 
 def _find_path_warnings(environment: Environment) -> Iterator[str]:
-    """Warn of obstacles that move through fixed ones, or through the boundary."""
+    """Yield warnings about obstacles that move through fixed ones or through the boundary."""
     fixed = {k: shape.polygon for k, shape in enumerate(environment.obstacles) if shape.path is None}
     for k, obstacle in enumerate(environment.obstacles):
         if obstacle.path is None:
@@ -284,7 +284,7 @@ def _format_obstacle(environment: Environment, k: int) -> str:
 
 
 def _find_component_warnings(environment: Environment, radius: float) -> Iterator[str]:
-    """Warn of components of the free space that cannot be reached from the largest one."""
+    """Yield warnings about components of the free space that the largest one does not reach."""
     footprint = math.pi * radius * radius
     pockets = []
     for component in list(environment.free.geoms)[1:]:

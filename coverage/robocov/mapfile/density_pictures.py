@@ -58,7 +58,7 @@ def _resolve_inside(name: str, folder: Path) -> Path:
     if "\0" not in name and "\\" not in name and not PureWindowsPath(name).anchor:
         try:
             path = (folder / name).resolve()
-        except (OSError, RuntimeError):  # Circular links.
+        except (OSError, RuntimeError):  # The path contains circular links.
             path = None
     if path is None or not path.is_relative_to(folder.resolve()):
         raise InputError("expected a file in the folder of the map, got a path outside it")

@@ -330,12 +330,12 @@ class MapModel(Model, title="robocov map"):
 
 
 def to_json_value(value: Any) -> Any:
-    """Convert an object that a model describes, or coordinates, to a JSON value.
+    """Convert an obstacle, start or density, or a part of one, to a JSON value.
 
     Parameters
     ----------
     value : object
-        An obstacle, start or density, or numbers, strings and sequences of them.
+        An obstacle, start or density; or a number, a string, or a sequence of such values.
 
     Returns
     -------
@@ -357,7 +357,11 @@ def to_json_value(value: Any) -> Any:
     document = {}
     model = next(_MODELS_BY_CLASS[base] for base in type(value).__mro__ if base in _MODELS_BY_CLASS)
     for key, field in model.model_fields.items():
-        item = get_args(field.annotation)[0] if key == "kind" else getattr(value, key)
+        if key == "kind":
+            # The kind is a constant of the model, such as Literal["circle"], not an attribute of the object.
+            item = get_args(field.annotation)[0]
+        else:
+            item = getattr(value, key)
         if item not in (None, (), []) or field.is_required():
             document[key] = to_json_value(item)
     return document
@@ -371,7 +375,7 @@ def build_map_schema() -> dict[str, Any]:
     dict
     """
     schema = MapModel.model_json_schema(by_alias=True)
-    # The schema of pydantic describes the starts whose names fit the pattern, but allows other names as well.
+    # pydantic's schema constrains only starts whose names match the pattern, and allows anything elsewhere.
     starts = schema["properties"]["starts"]
     ((pattern, start),) = starts.pop("patternProperties").items()
     starts["additionalProperties"] = start

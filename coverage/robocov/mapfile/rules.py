@@ -107,9 +107,9 @@ def _find_line_mistakes(path: JsonPath, line: Ring, noun: str) -> Iterator[Mista
 
 
 def _build_crossing_mistake(path: JsonPath, points: Array, polygon: Polygon) -> Mistake:
-    """Return the mistake of a ring that crosses or touches itself, with the two edges."""
+    """Return the mistake of a ring that crosses or touches itself; it names the two edges."""
     reason = shapely.is_valid_reason(polygon)
-    # Such as "Self-intersection[5 5]".
+    # The reason ends with the point, as in "Self-intersection[5 5]".
     x, y = (float(number) for number in reason[reason.index("[") + 1 : -1].split())
     ends = np.roll(points, -1, axis=0)
     edges = shapely.linestrings(np.stack([points, ends], axis=1))

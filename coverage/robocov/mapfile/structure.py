@@ -35,7 +35,7 @@ from robocov.mapfile.models import (
 
 NO_WEIGHT = "expected at least one weight above 0, got none"
 _MIN_KIND_SIMILARITY = 0.5
-"""Similarity, as `difflib` measures it, from which a kind is suggested."""
+"""Minimum similarity of a suggested kind, as `difflib` measures it."""
 _MIN_RELATIVE_DETERMINANT = 1e-9
 """Smallest determinant of a covariance matrix, relative to the product of its diagonal."""
 _BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
@@ -179,7 +179,7 @@ def _is_covariance(matrix: list[list[float]]) -> bool:
 
 
 def _describe_choice(model: Model, first: str, second: str) -> str | None:
-    """Return the message for a model that has not exactly one of two keys; None if it has."""
+    """Return the message for a model without exactly one of two keys; None if it has one."""
     has_first = getattr(model, first) is not None
     has_second = getattr(model, second) is not None
     if has_first != has_second:

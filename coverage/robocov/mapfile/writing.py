@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NUMERIC_KEYS = ("boundary", "obstacles", "starts", "density")
 """Keys whose numbers `dump_map` shortens."""
 _EXPANDED_KEYS = ("obstacles", "starts")
-"""Keys whose items are written on lines of their own."""
+"""Keys whose items are each written on a separate line."""
 _DIGITS = 9
 """Decimal places of coordinates in meters: smaller fractions of a map have no meaning."""
 _MAX_ERROR_ULPS = 16
@@ -106,7 +106,7 @@ def dump_map(environment: Environment) -> str:
 def dump_document(document: dict[str, Any]) -> str:
     """Format a JSON document as the text of a map file.
 
-    Line breaks do not depend on the lengths of numbers, so that moving a vertex changes one line of the file.
+    Line breaks do not depend on the lengths of numbers, so moving a vertex changes one line of the file.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _shorten_value(value: Any) -> Any:
 
 
 def _format_members(value: Any, indent: str, *, is_document: bool = False) -> str:
-    """Return a list or object, which is not empty, with its members on lines of their own."""
+    """Return a non-empty list or object with each member on a separate line."""
     inner_indent = indent + "  "
     if isinstance(value, list):
         items = [inner_indent + _format_value(item, inner_indent, len(inner_indent)) for item in value]
@@ -146,7 +146,7 @@ def _format_members(value: Any, indent: str, *, is_document: bool = False) -> st
     lines = []
     for key, item in value.items():
         head = f"{inner_indent}{json.dumps(key, ensure_ascii=False)}: "
-        # Each row of a raster has a line of its own; unlike lists of points, rows are long.
+        # Each row of a raster is on a separate line; unlike lists of points, rows are long.
         has_several_rows = key == "rows" and isinstance(item, list) and len(item) > 1
         if _is_container(item) and (has_several_rows or (is_document and key in _EXPANDED_KEYS)):
             lines.append(head + _format_members(item, inner_indent))
@@ -163,6 +163,7 @@ def _format_value(value: Any, indent: str, column: int) -> str:
     is_point_list = isinstance(value, list) and all(
         isinstance(item, list) and not _is_ring(item) for item in value
     )
+    # Each number counts as two characters, so that the layout does not depend on its digits.
     if is_point_list or column + len(_NUMBER.sub("00", line)) <= _MAX_LINE_CHARACTERS:
         return line
     return _format_members(value, indent)

@@ -10,7 +10,7 @@ from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
 
 TREMBLE_WINDOW_S = 5.0
-"""Length of the period at the end of a run in which trembling is looked for."""
+"""Length of the period at the end of a run that is checked for trembling."""
 MIN_TREMBLE_STEP_M = 0.05
 """Minimum mean displacement of a trembling robot per control step; a robot at rest moves less in 4 s."""
 MIN_TREMBLE_TURN = np.pi / 6.0

@@ -12,7 +12,7 @@ from robocov.arrays import Array
 from robocov.observation.neighbors import Neighbors
 
 _EIGENVALUE_DECIMALS = 12
-"""Decimals to which eigenvalues are rounded; the others are rounding errors."""
+"""Number of decimals of eigenvalues; further ones are rounding errors."""
 
 
 class Connectivity(NamedTuple):

@@ -57,7 +57,7 @@ def compute_cost_history(
 ) -> CostHistory:
     """Compute the coverage cost along a run.
 
-    Only working robots count, and each moment has its own positions of moving obstacles.
+    The cost at each moment counts only the working robots, with moving obstacles where they are at that time.
 
     Parameters
     ----------

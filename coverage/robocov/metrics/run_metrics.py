@@ -19,7 +19,7 @@ from robocov.record import Record, select_nearest_moments
 DEFAULT_RATE_HZ = 2.0
 """Moments per simulated second at which areas and graphs are measured."""
 NEAR_FINAL_TOLERANCE = 0.05
-"""Relative deviation from the final cost up to which a cost counts as near the final one."""
+"""Maximum relative deviation of a cost that counts as near the final cost."""
 
 COLUMNS = {
     "time": "time_s",

@@ -8,7 +8,7 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 _MIN_BINNED_POINTS = 24
-"""Minimum number of points for which bins save time; fewer points all go into one bin."""
+"""Minimum number of points for more than one bin: with fewer points, bins save no time."""
 _SIDE_MARGIN = 1.000001
 """Minimum side of a bin divided by the reach; slightly above 1 to allow for rounding."""
 
@@ -47,7 +47,7 @@ def find_bin(offset: float, scale: float) -> int:
 
 @kernel
 def count_starts(point_count: int) -> int:
-    """Return the length of the array `starts` with which `sort_into_bins` can sort points.
+    """Return the length that the array `starts` needs in `sort_into_bins`.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def count_starts(point_count: int) -> int:
     Returns
     -------
     int
-        Upper bound of the number of bins, which the area and the sides of the points' bounding box limit.
+        Upper bound on the number of bins, which the area and the sides of the points' bounding box limit.
     """
     return 2 * point_count + 8
 

@@ -25,7 +25,7 @@ class Cells(ABC):
     centroid: Array
     """(n, 2) m, C of equation (2). The centroid of an empty cell is its generator."""
     density: Density | None = None
-    """φ, with which mass, centroid and moments are computed. None: 1 everywhere."""
+    """φ, the density of mass, centroid and moments; None stands for 1 everywhere."""
     triangulation: NDArray[np.int32] | None = None
     """Triangulation from which the partition of slightly moved generators can start, or None."""
 

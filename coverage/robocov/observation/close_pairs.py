@@ -10,7 +10,7 @@ from robocov.compiled import kernel
 from robocov.observation.bins import count_starts, find_bin, sort_into_bins
 
 _INITIAL_NEIGHBORS = 8
-"""Number of neighbors per point for which memory is allocated at first."""
+"""Initial size of the arrays, in neighbors per point."""
 
 
 class ClosePairs(NamedTuple):
@@ -109,7 +109,7 @@ def _enlarge(values: NDArray[Any], used: int, capacity: int) -> NDArray[Any]:
 
 @kernel
 def _insert(second: IntArray, distance: Array, begin: int, end: int, point: int, separation: float) -> None:
-    """Insert a point and its distance into ``second[begin:end]``, which stays ascending."""
+    """Insert a point into the ascending ``second[begin:end]``, and its distance; slot `end` must be free."""
     k = end
     while k > begin and second[k - 1] > point:
         second[k] = second[k - 1]

@@ -22,7 +22,7 @@ SIDE_OFFSET = 4
 """Column of a side: scalar product of its start and its normal, m."""
 
 _MIN_BEND = 1e-9
-"""Change of direction at a vertex, rad, up to which it counts as collinear with its neighbors."""
+"""Maximum change of direction, rad, at a vertex that counts as collinear with its neighbors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Region:
 
     @cached_property
     def diameter(self) -> float:
-        """Diagonal of the bounding box, m: an upper bound of the distance between two points inside."""
+        """Diagonal of the bounding box, m: an upper bound on the distance between two points inside."""
         low_x, low_y, high_x, high_y = self.bounds
         return float(np.hypot(high_x - low_x, high_y - low_y))
 
@@ -117,7 +117,7 @@ class Region:
         ----------
         points : (..., 2) array, m
         tolerance : float, m
-            Distance from the boundary up to which points outside count as inside.
+            Points outside count as inside up to this distance from the boundary.
 
         Returns
         -------

@@ -18,9 +18,9 @@ _MIN_DISTANCE_M = 1e-9
 _MIN_CORNER_DISTANCE_M = 1e-3
 """Lower limit of the distances of corners in divisions."""
 _DECREASE = 0.5
-"""Factor by which the fraction of full speed changes if the gradient turns by more than a right angle."""
+"""Factor of the fraction of full speed when the gradient turns by more than a right angle."""
 _INCREASE = 1.2
-"""Factor by which it changes otherwise, up to full speed."""
+"""Factor of that fraction otherwise, up to full speed."""
 
 
 class View(NamedTuple):
@@ -183,10 +183,10 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
 
 
 def compute_speed_fractions(gradient: Array, previous: Array | None, fraction: Array | None) -> Array:
-    """Compute the fraction of full speed with which robots follow discontinuous gradients.
+    """Compute the fraction of full speed at which robots follow discontinuous gradients.
 
     The visible area has ridges, for example at doors. On both sides of a ridge the gradient points toward it,
-    so that a robot would oscillate. The fraction is halved whenever the gradient turns by more than a right
+    so a robot would oscillate. The fraction is halved whenever the gradient turns by more than a right
     angle, and grows again otherwise.
 
     Parameters

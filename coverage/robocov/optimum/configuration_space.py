@@ -22,7 +22,7 @@ _OVERSHOOT = 1.005
 """Robots are pushed apart to this multiple of their spacing. With a factor of 1, they would only converge."""
 
 _RELATIVE_ROUNDING = 1e-9
-"""Fraction of the spacing by which robots may be too close because of rounding."""
+"""Tolerance of the spacing for rounding errors, as a fraction."""
 
 
 class ConfigurationSpace:
@@ -91,7 +91,7 @@ class ConfigurationSpace:
         second = pairs[:, 1]
         offset = positions[second] - positions[first]
         distance = compute_lengths(offset)
-        # Two robots at the same point have no direction apart: use a fixed one that differs between pairs.
+        # The direction between coincident robots is undefined: use a fixed one that differs between pairs.
         is_coincident = distance == 0.0
         numbers = first[is_coincident] + second[is_coincident] * len(positions)
         offset[is_coincident] = compute_spread_directions(numbers)

@@ -171,10 +171,12 @@ def _compute_quasi_newton_direction(gradient: Array, scale: Array, pairs: deque[
     """Return the L-BFGS direction, (n, 2) m, for an initial curvature of `scale`, (n, 1)."""
     moves = np.array([pair.move for pair in pairs]).reshape(len(pairs), -1)
     changes = np.array([pair.gradient_change for pair in pairs]).reshape(len(pairs), -1)
-    # SciPy's recursion starts with a curvature of 1: scale the coordinates so that this is about right.
+    # SciPy's recursion starts from a Hessian equal to the identity. It therefore runs in coordinates
+    # z = root * x, in which the initial Hessian, diag(root²), becomes the identity. As in Nocedal and Wright,
+    # equation 7.20, the initial Hessian is scaled to fit the last move.
     curvature = np.broadcast_to(scale, gradient.shape).ravel()
-    ratio = changes[-1] @ (changes[-1] / curvature) / (moves[-1] @ changes[-1])
-    root = np.sqrt(curvature * ratio)
+    factor = changes[-1] @ (changes[-1] / curvature) / (moves[-1] @ changes[-1])
+    root = np.sqrt(curvature * factor)
     inverse_hessian = scipy.optimize.LbfgsInvHessProduct(moves * root, changes / root)
     direction = inverse_hessian @ (gradient.ravel() / root)
     return np.asarray(-(direction / root).reshape(gradient.shape))

@@ -252,11 +252,12 @@ class _Search:
         self.robots = robots
         self.space = ConfigurationSpace(environment.free, radius)
         _, is_inside = cost.geodesics.snap_to_free_space(cost.points)
+        # A site on the border of two components belongs to the first one.
         site_component = is_inside.argmax(axis=1)
         areas = self.space.components
         site_counts = np.bincount(site_component, minlength=len(areas))
         usable = [k for k, area in enumerate(areas) if not area.is_empty and site_counts[k]]
-        # Components are sorted by area, the largest first.
+        # The robots occupy the largest components; these come first.
         covered = usable[:robots]
         candidates = self._spread_candidates(covered)
         self.component = np.repeat(covered, [len(points) for points in candidates]).astype(np.intp)
@@ -269,7 +270,7 @@ class _Search:
         self.candidates = np.concatenate(candidates)
         groups = self._group_sites(site_component, np.isin(site_component, covered))
         self.table = self._compute_table(groups)
-        # Many restarts find the same sources: descend from these only once.
+        # Many restarts find the same sources; the descent from them is computed only once.
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
 
     def _spread_candidates(self, covered: list[int]) -> list[Array]:

@@ -50,7 +50,7 @@ class Record(Drawable):
     start : str or None
         Name of the start from which the initial positions were sampled.
     seed : int or None
-        Seed with which they were sampled.
+        Seed from which they were sampled.
     dt : float, s
         Control period; also the time between moments, unless the record was thinned.
     time : (T,) s

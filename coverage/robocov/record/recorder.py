@@ -51,7 +51,7 @@ class Recorder:
     start: str | None = None
     """Name of the start from which the positions were sampled."""
     seed: int | None = None
-    """Seed with which they were sampled."""
+    """Seed from which they were sampled."""
     conditions: Conditions | None = None
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ from robocov.arrays import Array, IntArray
 TIME_ROUNDING_S = 5e-7
 """Difference between times that is attributed to rounding: times are sums of control periods."""
 _TIE_DECIMALS = 6
-"""Decimals of a period to which distances are compared; the others are rounding errors."""
+"""Distances are compared to this number of decimals of a period; the rest is rounding error."""
 
 
 def select_nearest_moments(time: Array, rate: float) -> IntArray:

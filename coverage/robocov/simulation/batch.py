@@ -328,7 +328,7 @@ class SimulationBatch:
         start : str or None
             Name of the start from which the positions were sampled, for the records.
         seeds : sequence of int, or None
-            Seed of each run, with which its positions were sampled, for the records.
+            Seed of each run, from which its positions were sampled, for the records.
 
         Returns
         -------

@@ -121,7 +121,7 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
     Raises
     ------
     ParameterError
-        If a robot is to join outside the boundary, or has a position of its own but joins at time zero.
+        If a robot is to join outside the boundary, or joins at a given position at time zero.
     """
     if conditions is None:
         return
@@ -131,7 +131,7 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
         x, y = join.place
         prefix = f"conditions.joins[{k}]"
         if join.time <= TIME_TOLERANCE_S:
-            expected = "expected a time above 0 s for a robot that joins at a place of its own"
+            expected = "expected a time above 0 s for a robot that joins at a given place"
             raise ParameterError(f"{prefix}: {expected}, got robot {join.robot} at {join.time:g} s")
         if not environment.boundary_polygon.covers(shapely.Point(x, y)):
             left, bottom, right, top = environment.boundary_polygon.bounds

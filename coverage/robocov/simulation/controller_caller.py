@@ -47,7 +47,7 @@ class ControllerCaller:
     Raises
     ------
     ParameterError
-        If it is not a controller, or fails.
+        If `controller` is not a controller, or its code raises an error.
     """
 
     def __init__(

@@ -361,7 +361,7 @@ class Simulation:
         start : str or None
             Name of the start from which the positions were sampled, for the record.
         seed : int or None
-            Seed with which they were sampled, for the record.
+            Seed from which they were sampled, for the record.
 
         Returns
         -------

@@ -178,7 +178,7 @@ class ContactSolver:
         mover_states : (m, 4) array, m and m/s
             As `bodies.compute_mover_states` returns them.
         max_speed : (k,) array, m/s
-            Speed to which each robot is limited afterwards: a contact can make it faster than its drive can.
+            Maximum speed of each robot afterwards: a contact can make it faster than its drive can.
         dt : float, s
 
         Returns
@@ -192,7 +192,7 @@ class ContactSolver:
         self._space.add(*bodies)
         try:
             rows = self._arrays.find_rows(bodies)
-            self._arrays.states[:] = 0.0  # also the row of the static body
+            self._arrays.states[:] = 0.0  # This includes the row of the static body.
             self._arrays.states[self._mover_rows] = mover_states
             self._arrays.states[rows] = states
             self._arrays.write_states()

@@ -1,7 +1,7 @@
 """Free motion of robots: viscosity and kinematic limits, combined into one net force per robot.
 
 A controller returns a force. Equation (28) with its sign corrected, m q'' = F - nu q', is solved exactly over
-a substep, so that viscosity is stable for any time step; then the change of velocity and the speed are
+a substep, so viscosity is stable for any time step; then the change of velocity and the speed are
 limited. The net force takes a point mass from its velocity to the resulting one within the substep. It is
 what pymunk integrates.
 """

@@ -56,7 +56,7 @@ class Wheels(NamedTuple):
     max_turning_rate: Array
     """rad/s."""
     is_rolling: BoolArray
-    """Mask of the unicycles on their own wheels. The others are points, or are carried."""
+    """Mask of the unicycles that their wheels move. The others are points, or external forces carry them."""
 
 
 class DriveCommand(NamedTuple):
@@ -176,7 +176,7 @@ def compute_drive_command(
         heading = steering[i, 0]
         hx = math.cos(heading)
         hy = math.sin(heading)
-        # The wheels grip, so that no sideways velocity remains.
+        # The wheels grip, so no sideways velocity remains.
         motion = _Motion(max(vx * hx + vy * hy, 0.0), steering[i, 1])
         limits = _WheelLimits(
             half_track=0.5 * wheels.track_width[i],
@@ -272,7 +272,7 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
 def remove_sideways_velocity(
     velocities: Array, steering: Array, max_speed: Array, is_rolling: BoolArray
 ) -> Array:
-    """Remove velocity that the wheels of unicycles do not allow, after a contact.
+    """Remove the velocity that a contact has caused but the wheels of unicycles do not allow.
 
     Parameters
     ----------
@@ -281,12 +281,12 @@ def remove_sideways_velocity(
     max_speed : (n,) array, m/s
         Largest forward speed.
     is_rolling : (n,) bool array
-        Mask of the unicycles on their own wheels. The others keep their velocity.
+        Mask of the unicycles that their wheels move. All other robots keep their velocity.
 
     Returns
     -------
     (n, 2) array, m/s
-        Forward and at most `max_speed` for unicycles on their wheels.
+        Along the heading and at most `max_speed` for these unicycles.
     """
     remaining = velocities.copy()
     for i in range(len(velocities)):

@@ -32,7 +32,7 @@ MAX_MASS_RATIO = 1000.0
 
 _NO_FORCES = np.zeros((0, 2))
 _ROUNDING = 1e-9
-"""Amount by which the number of substeps may be too large because of rounding."""
+"""Tolerance of the number of substeps for rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ class World:
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
-        """Move by `dt` seconds under the controllers' forces, viscosity and limits.
+        """Advance by `dt` seconds under the controllers' forces, viscosity and limits.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class World:
         dt : float, s
         external_forces : (n, 2) array or None, N
             Further forces to which no limits apply, such as those of a pointer that drags a robot. A robot
-            that they have made faster than its own limit brakes as hard as it can.
+            that they have pushed beyond its maximum speed brakes as hard as it can.
         time : float, s
             Simulation time at the beginning, on which moving obstacles depend.
         """
@@ -266,7 +266,7 @@ class World:
         return _SpeedLimits(driving, pushed)
 
     def _find_rolling(self, external: Array) -> BoolArray:
-        """Return a mask of the unicycles on their own wheels, which no external force carries."""
+        """Return a mask of the unicycles that their wheels move, because no external force carries them."""
         if len(external) > 0:
             return self._is_unicycle & ~external.any(axis=1)
         return self._is_unicycle
