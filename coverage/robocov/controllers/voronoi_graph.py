@@ -60,7 +60,7 @@ class VoronoiGraphCoverage(SharedMapController):
 
     def compute_placement(self, situation: Situation) -> Placement:
         """Compute the placement by vertex substitution, starting from the previous one."""
-        candidates = self._build_vertices(situation)
+        candidates = self._build_candidates(situation)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return Placement(goals=situation.positions, is_final=False)
@@ -76,8 +76,8 @@ class VoronoiGraphCoverage(SharedMapController):
             min_saving = _MIN_FURTHER_SAVING
         return Placement(goals=assign_goals(situation, candidates.positions[chosen]), is_final=True)
 
-    def _build_vertices(self, situation: Situation) -> Candidates:
-        """Build the candidates: the vertices that robots can reach, with distances weighted by mass."""
+    def _build_candidates(self, situation: Situation) -> Candidates:
+        """Build candidates at the vertices that robots can reach, with distances weighted by mass."""
         known_map = situation.known_map
         raster = known_map.raster
         window = Window.build_around(raster, situation.positions[0], math.inf, MAX_BLOCKS)
