@@ -105,6 +105,7 @@ class CoverageCost:
         views = build_corner_views(len(tiles.boxes), indices, lengths)
         self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)
         self._component_areas = np.array([component.area for component in environment.free.geoms])
+        # A first guess, which `_find_paths` doubles whenever the wall index turns out to be too small.
         self._index_entries_per_robot = 2 * SOURCE_BINS
         self._set_density(environment)
 

@@ -142,7 +142,7 @@ def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) 
 
 
 def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Tiles:
-    """Arrange sites at (m, 2) grid steps in tiles."""
+    """Arrange the sites, whose positions are (m, 2) grid steps, in tiles."""
     column = sites.cells % sites.lattice
     row = sites.cells // sites.lattice
     # Sort the sites by tile, so that those of one tile are consecutive entries of `by_tile`.

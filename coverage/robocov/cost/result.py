@@ -88,7 +88,8 @@ class CoverageResult(Drawable):
         """
         if self.speeds is None:
             return self.distances
-        # If no robot can reach a site, its distance is infinite at any speed.
+        # The owner -1 of a site that no robot can reach selects the last speed. This does not matter, because
+        # the distance is infinite.
         return np.asarray(self.distances / self.speeds[self.owner])
 
     @cached_property

@@ -188,7 +188,7 @@ def find_site_paths(
 
 @kernel
 def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
-    """Find the paths from robots at (n, 2) positions; return whether the index had enough entries."""
+    """Find the paths from the robots of a team, (n, 2); return whether the index had enough entries."""
     tiles = cost_map.tiles
     _find_nearest_robots(tiles, search, robots)
     entry_count = 0
@@ -365,9 +365,10 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
 
 @kernel
 def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
-    """Try the straight path to each corner from every robot that may be closer than its path so far is long.
+    """Try the straight path to each corner from every robot that is near enough to shorten its path.
 
-    No other robot can shorten the path. Return the number of corners in the queue.
+    A robot at a larger distance than the length of the path so far cannot shorten it. Return the number of
+    corners in the queue.
     """
     boxes = walls.corner_boxes
     first_leaf = len(boxes) // 2
@@ -446,7 +447,7 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
             if search.hidden_slots[tile]:
                 has_hidden_sites = True
                 _try_corner_paths(cost_map, search, tile)
-                longest = max(longest, _find_longest_hidden(search, tile))
+                longest = max(longest, _find_longest_hidden_path(search, tile))
         if has_hidden_sites:
             _try_other_robots(cost_map, search, robots, group, longest)
 
@@ -467,7 +468,7 @@ def _try_other_robots(cost_map: CostMap, search: Search, robots: Array, group: i
     first_tile = group * TILES_PER_GROUP
     for tile in range(first_tile, min(first_tile + TILES_PER_GROUP, len(tiles.boxes))):
         if search.hidden_slots[tile]:
-            longest_of_tile = _find_longest_hidden(search, tile)
+            longest_of_tile = _find_longest_hidden_path(search, tile)
             tile_robot_count = _list_robots_within(
                 tiles.boxes,
                 tile,
@@ -521,7 +522,7 @@ def _is_better(length: float, robot: int, best_length: float, best_robot: int) -
 
 
 @kernel
-def _find_longest_hidden(search: Search, tile: int) -> float:
+def _find_longest_hidden_path(search: Search, tile: int) -> float:
     """Return the length of the longest path to a hidden site of a tile."""
     hidden_slots = search.hidden_slots[tile]
     longest = 0.0

@@ -13,7 +13,7 @@ from robocov.cost.coverage_cost import CoverageCost
 from robocov.cost.result import CoverageResult
 
 _MAX_CACHED_MAPS = 64
-"""Maximum number of maps whose costs are cached; obstacles that move periodically need them again."""
+"""Maximum number of maps whose costs are cached. The maps recur if obstacles move periodically."""
 
 
 class TimeVaryingCost:

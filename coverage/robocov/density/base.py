@@ -26,12 +26,12 @@ class Density(ABC):
     @property
     @abstractmethod
     def min_value(self) -> float:
-        """A lower bound of the density."""
+        """A lower bound on the density."""
 
     @property
     @abstractmethod
     def max_value(self) -> float:
-        """An upper bound of the density."""
+        """An upper bound on the density."""
 
     @abstractmethod
     def evaluate(self, points: Array) -> Array:
@@ -167,7 +167,7 @@ class Uniform(Density):
         return np.full(len(points), float(self.weight))
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute the moments of cells: those of their areas, times the weight.
+        """Compute the moments of cells: the moments for density 1, times the weight.
 
         Parameters
         ----------

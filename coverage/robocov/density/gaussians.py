@@ -39,8 +39,8 @@ class _Factor(NamedTuple):
 class _StandardMoments(NamedTuple):
     """Moments of the standard Gaussian over cells, or contributions of edges to them, one array each.
 
-    The second moments are stored as deficits, which are what the integrals along edges give: the mass minus
-    the moment xx or yy, and minus the moment xy.
+    The second moments are stored as deficits, which are what the integrals along edges yield: the mass minus
+    the moment xx, the moment xy with its sign reversed, and the mass minus the moment yy.
     """
 
     mass: Array

@@ -177,6 +177,7 @@ def _build_jumps(points: Array, step: float) -> Array:
     """Return the jumps along a closed, counter-clockwise ring inside which φ is larger by `step`."""
     start = points[:-1]
     end = points[1:]
+    # A column, (k, 1), which applies to both coordinates of each end.
     is_falling = start[:, 1:] > end[:, 1:]
     low = np.where(is_falling, end, start)
     high = np.where(is_falling, start, end)

@@ -25,7 +25,7 @@ Interpolation: TypeAlias = Literal["cells", "bilinear"]
 """Whether a raster is constant in each of its pixels, or linear between their centers in both directions."""
 
 _MAX_CACHED_GRIDS = 4
-"""A grid takes ten times the memory of its image. While a user paints a raster, a new one is built for each
+"""A grid takes ten times the memory of its image. While a user paints a raster, a new grid is built for each
 change, but only the last few are still in use."""
 
 _ONE, _U, _V, _UU, _VV = range(5)

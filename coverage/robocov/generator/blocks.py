@@ -210,7 +210,7 @@ def _compute_widening_share(count: int, total_count: int) -> float:
 
 
 def _divide_cell(cell: Cell, fraction: float, street: _Street) -> tuple[Cell, Cell]:
-    """Return the parts of a cell on both sides of a street, the first with a fraction of the extent."""
+    """Divide a cell by a street; `fraction` is the share of its extent that the first part gets."""
     normal_x, normal_y = street.normal
     distances = [edge.x * normal_x + edge.y * normal_y for edge in cell]
     # The extent that is divided excludes the new street, and half of the streets at both ends.
@@ -341,7 +341,7 @@ def _trim_block(block: Cell, trim: Trim) -> Polygon:
 def _draw_trims(
     cells: list[Cell], feasible_widening: float, corner_disc: DiscStart, rng: np.random.Generator
 ) -> list[Trim | None]:
-    """Draw a trim for each block; None for a block that has none, or that it would make too thin."""
+    """Draw a trim for each block; None for a block without one, or if the trimmed block would be too thin."""
     trims: list[Trim | None] = []
     drawn_trims = [_draw_trim(rng) for _ in cells]
     for cell, trim in zip(cells, drawn_trims, strict=True):

@@ -2,8 +2,8 @@
 
 The core of a cave, where the center of a robot may be, is the area in which a random field, raised along the
 boundary, is below a level. Its parts are joined by tunnels, and it is dilated (J. Serra, *Image Analysis and
-Mathematical Morphology*, 1982) by at least half the gap. Where two dilated parts meet in a narrower window, a
-tunnel is cut through it.
+Mathematical Morphology*, 1982) by at least half the gap. Where two dilated parts meet in a window that
+is narrower than the gap, a tunnel is cut through it.
 """
 
 import math
@@ -149,11 +149,14 @@ class _CaveBuilder:
         return shapely.union_all([separate_parts, *tunnels])
 
     def dilate(self, core: BaseGeometry, radius: float) -> Polygon:
-        """Return the area within a radius of a core, with smooth walls and without small pillars."""
+        """Return the free space that results from dilating a core, with smooth walls.
+
+        It includes the start. Only its largest part is returned, without small pillars.
+        """
         unit = self.request.unit
         spike = _SPIKE_UNITS * unit
         inner_rectangle = _build_inner_rectangle(self.request, 0.0)
-        # Dilating by more, and eroding by the rest, removes spikes of rock.
+        # Dilating too far, then eroding by the difference, removes spikes of rock.
         space = core.buffer(radius + spike).buffer(-spike).intersection(inner_rectangle) | self.start
         largest = max(shapely.get_parts(space), key=lambda part: float(part.area))
         pillars = [

@@ -41,16 +41,16 @@ _MAX_ATTEMPTS = 40
 _MIN_TEAM_DISC_M = 0.6
 """Radius of a start in which some robots of the default size fit."""
 _DISC_UNITS = 0.25
-"""Radius of the discs, in sides of a square per obstacle."""
+"""Radius of the discs, as a multiple of `Request.unit`."""
 _MAX_DISC_SIDES = 0.1
-"""Largest radius of the discs, in shorter sides of the map."""
+"""Largest radius of the discs, as a fraction of the shorter side of the map."""
 _MIN_DISC_FRACTION = 0.4
 """Smallest fraction of that radius that remains if walls are near."""
 _DISC_SHRINKAGE = 0.9
 _DISC_MARGIN_SIDES = 0.02
-"""Margin between the disc in the corner and the boundary, in shorter sides of the map."""
+"""Margin between the disc in the corner and the boundary, as a fraction of the shorter side."""
 _MAX_CENTER_OFFSET_SIDES = 0.3
-"""Largest offset of the other disc from the middle along x and y, in shorter sides of the map."""
+"""Largest offset of the other disc from the middle along x and y, as a fraction of the shorter side."""
 _CENTER_CANDIDATES = 41
 """Number of points along x, and along y, that are compared as centers of that disc."""
 _CENTER_DISC_FRACTION = 0.8

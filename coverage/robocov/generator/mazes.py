@@ -242,7 +242,7 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
 
 
 def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
-    """Remove a wall, if possible one that is attached at both ends, because that makes a loop.
+    """Remove a wall, preferably one that is attached at both ends, because that makes a loop.
 
     With the probability `_DEAD_END_PROBABILITY`, a wall at a dead end is removed if possible.
     """

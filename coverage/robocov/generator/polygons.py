@@ -27,7 +27,8 @@ _MAX_REDRAWS = 8
 _VERTEX_PROBABILITIES = {3: 0.1, 4: 0.25, 5: 0.3, 6: 0.2, 7: 0.15}
 """Numbers of vertices of a convex polygon, and their probabilities."""
 _MIN_ANGLE_STEP = 0.4
-"""Smallest angle between consecutive vertices before all are scaled to a full turn; the largest is 1 more."""
+"""Smallest angle between consecutive vertices, before all angles are scaled so that they add up to a full
+turn. The largest angle is 1 more."""
 _MAX_STRETCH = 1.7
 """Largest ratio of the axes of the ellipse on which the vertices of a convex polygon lie."""
 _L_WIDTHS = (1.0, 1.5)

@@ -285,6 +285,7 @@ def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator
         None if rooms would be too small, or cannot be connected by doors.
     """
     plan = FloorPlan(thickness)
+    # Rectangles to divide, and the number of rooms in each.
     waiting = [(Box(0.0, 0.0, float(request.width), float(request.height)), int(request.obstacles))]
     if request.obstacles >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
         box, count = waiting[0]
@@ -304,7 +305,7 @@ def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator
 def _divide_by_wall(
     request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
 ) -> list[tuple[Box, int]] | None:
-    """Add a wall to the plan that divides the longer side of a rectangle.
+    """Divide a rectangle by a wall across its longer side, and add the wall to the plan.
 
     Return the two parts, each with its number of rooms; None if they would be too small.
     """

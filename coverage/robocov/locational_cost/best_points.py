@@ -51,7 +51,7 @@ _MAX_SHORTENING = 0.5
 """Range of the factor by which a step that is not accepted is shortened."""
 _MIN_SLOPE_CHANGE = 1e-300
 _MIN_LENGTH_M = 1e-300
-"""Values that replace smaller ones in divisions, so that nothing is divided by zero."""
+"""Smallest values used as divisors, which prevent division by zero."""
 
 
 class _Search(NamedTuple):
@@ -302,7 +302,10 @@ def _compute_newton_step(
 def _compute_descent_step(
     gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float
 ) -> tuple[float, float]:
-    """Return the Newton step with the absolute values of the Hessian's eigenvalues, which always descends."""
+    """Return the Newton step for the Hessian with the absolute values of its eigenvalues.
+
+    This step always descends.
+    """
     mean = 0.5 * (xx + yy)
     half_difference = 0.5 * (xx - yy)
     radius = np.sqrt(half_difference * half_difference + xy * xy)
@@ -313,10 +316,12 @@ def _compute_descent_step(
         magnitude = abs(large)
         small = (xx * yy - xy * xy) / large
     else:
+        # The Hessian is zero. Any length will do, because the caller limits it.
         magnitude = 1.0
         small = xx * yy - xy * xy
-    # The steps along the eigenvectors of the large and of the small eigenvalue.
+    # The eigenvector of `large`, whose absolute value is the larger eigenvalue of the Hessian times `sign`.
     x, y = _compute_eigenvector(sign * half_difference, sign * xy, radius)
+    # The step along this eigenvector, and along the one perpendicular to it, of the eigenvalue `small`.
     along = -(gradient_x * x + gradient_y * y) / magnitude
     across = -(gradient_y * x - gradient_x * y) / max(abs(small), _MIN_CURVATURE * magnitude)
     return along * x - across * y, along * y + across * x

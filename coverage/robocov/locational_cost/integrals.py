@@ -34,7 +34,7 @@ and 16 nodes per panel leave less than a rounding error."""
 _MIN_RELATIVE_LENGTH = 1e-12
 """Lengths of edges up to this fraction of half the perimeter of the cell may be rounding errors."""
 _MIN_LENGTH_M = 1e-300
-"""Length that replaces shorter ones in divisions, so that nothing is divided by zero."""
+"""Smallest length used as a divisor, which prevents division by zero."""
 _MAX_SERIES_SQUARE = 0.0625
 """Square of x below which x - atan x is computed from a series."""
 _SERIES_TERMS = 15
@@ -89,7 +89,7 @@ class _EdgeIntegral(NamedTuple):
     along: float
     """∫ f'(r)/r s ds, the derivative of `total` as the point moves backwards along the edge."""
     across: float
-    """∫ f'(r)/r d ds, the derivative of `total` by the distance d."""
+    """∫ f'(r)/r d ds, the derivative of `total` with respect to the distance d."""
 
 
 def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -239,7 +239,7 @@ def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
     d = edge.distance
     first = edge.start
     last = edge.start + edge.length
-    # The distance of the rounded ends, from which `edge.length` may differ.
+    # The length between the rounded ends, which may differ from `edge.length`.
     length = last - first
     mean = (first * first + first * last + last * last) / 3.0 + d * d
     return _EdgeIntegral(total=length * mean, along=length * (last + first), across=2.0 * d * length)
@@ -267,7 +267,7 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
     d = edge.distance
     first = edge.start
     last = edge.start + edge.length
-    # The distance of the rounded ends, from which `edge.length` may differ.
+    # The length between the rounded ends, which may differ from `edge.length`.
     length = last - first
     squared_height = height * height
     w = np.sqrt(d * d + squared_height)

@@ -20,7 +20,7 @@ _NODES_ALONG = 16
 _NODES_OUTWARD = 12
 """Nodes from the point to an edge."""
 _MIN_SQUARED_DISTANCE = 1e-300
-"""Squared distance that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
+"""Smallest squared distance used as a divisor, which prevents division by zero, m²."""
 _MIN_RELATIVE_SIZE = 1e-3
 """Size of a cell, relative to the height, below which the nodes are spread evenly: f hardly varies there."""
 
@@ -48,7 +48,7 @@ def compute_weighted_derivatives(
     f : Performance
         `Distance`, or `Sensing` with its sign reversed, so that the cost is to be minimized.
     max_diameter : (n,) array, m
-        Upper bounds of the diameters of the cells.
+        Upper bounds on the diameters of the cells.
     points : (n, 2) array, m
         Relative to the generators.
     is_needed : (n,) bool array
@@ -103,10 +103,10 @@ def _build_gauss_rule(count: int) -> tuple[Array, Array]:
 
 
 def _build_outward_rule(f: Performance, max_diameter: Array, cell: IntArray) -> tuple[Array, Array]:
-    """Return nodes u from the point to each edge, and their weights times u, (e, 12) each.
+    """Return nodes u from the point to each edge, and their weights, (e, 12) each.
 
-    For `Sensing` the rule is one in x, where u = sinh(a x) / sinh(a): the steeper f is near the point, the
-    more nodes lie there.
+    The weights include the factor u of the area element. For `Sensing`, the rule is a Gauss rule in x, where
+    u = sinh(a x) / sinh(a): the steeper f is near the point, the more nodes lie there.
     """
     plain_nodes, plain_weights = _build_gauss_rule(_NODES_OUTWARD)
     nodes = np.tile(plain_nodes, (len(max_diameter), 1))

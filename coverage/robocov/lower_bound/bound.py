@@ -45,8 +45,8 @@ _SLACK = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
 
 _MIN_SCALE = 1e-9
-"""Lower limit of the cost by which a search divides the dual, because the cost of a placement may be zero. It
-is a fraction of what the cost would be if the distance of every site were the size of the map."""
+"""Smallest cost by which a search divides the dual, because the cost of a placement may be zero. It is a
+fraction of the cost that would result if every site were as far away as the map is large."""
 
 _MAX_ITERATIONS = 100
 """Maximum number of iterations of each search for prices."""
@@ -69,7 +69,8 @@ _MAX_TRIANGLES = 1_000_000
 _EROSION = 0.98
 """Fraction of the radius by which the free space is eroded.
 
-Before GEOS offsets walls, it simplifies them by up to 1 % of the offset.
+Before GEOS offsets walls, it simplifies them by up to 1 % of the offset. Eroding by less ensures that no
+possible position is lost.
 """
 
 _ROUNDING = 1e-10
@@ -243,7 +244,8 @@ class _Dual:
         self._unit = geodesics.grid.unit
         self._robot_count = len(positions)
         result = cost(positions)
-        # The robots at (n, 2) grid steps, and whether each component of the free space contains them, (n, c).
+        # The positions of the robots, (n, 2) grid steps, and whether each robot is in each component of the
+        # free space, (n, c).
         robots, is_inside = geodesics.snap_to_free_space(positions)
         self.is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
         self.site_numbers: IntArray = np.flatnonzero(result.owner >= 0)
@@ -252,8 +254,8 @@ class _Dual:
         self.total_weight = float(self._weights.sum())
         if not self.total_weight > 0.0:
             raise ParameterError(
-                f"lattice: expected sites with a weight where the robots are, got none with {cost.lattice} "
-                "cells along a side"
+                f"lattice: expected sites with a weight above 0 in the components that contain robots, got "
+                f"none with {cost.lattice} cells along a side"
             )
         self.placement_cost = float(self._weights @ result.distances[self.site_numbers])
 
@@ -271,7 +273,7 @@ class _Dual:
         self.add_candidates(np.concatenate([robots, candidates]))
 
     def _build_site_data(self, positions: Array) -> SiteData:
-        """Return the data of the sites at (m, 2) m."""
+        """Return the data of the sites, whose positions are (m, 2) m."""
         geodesics = self._geodesics
         sites, _ = geodesics.snap_to_free_space(positions)
         from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
@@ -285,13 +287,17 @@ class _Dual:
     def _choose_candidate_spacing(self, site_spacing: float) -> float:
         """Return a multiple of the spacing of the sites that leaves enough candidates, grid steps."""
         min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self._robot_count)
-        sites_per_side = max(1, int(math.sqrt(len(self.site_numbers) / min_candidates)))
-        return sites_per_side * site_spacing / self._unit
+        stride = max(1, int(math.sqrt(len(self.site_numbers) / min_candidates)))
+        return stride * site_spacing / self._unit
 
     def _build_configuration_space(self, environment: Environment, radius: float) -> shapely.Geometry:
-        """Return the area for the centers of robots, m; it may be a little too large, but never too small."""
+        """Return the area in which the center of a robot may be, with coordinates in meters.
+
+        It may be slightly too large, but never too small, so that the bound holds for every placement.
+        """
         components = np.array(environment.free.geoms)[self.is_covered]
-        # The arcs around corners become chords, which makes the area larger.
+        # With `quad_segs=2`, chords replace the arcs around corners. They pass closer to the corners, which
+        # makes the area larger.
         area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
         if area.is_empty:
             raise ParameterError(
@@ -307,7 +313,7 @@ class _Dual:
         return self._geodesics.grid.snap(rings[:, :3])
 
     def _compute_first_prices(self, robots: Array) -> tuple[Array, Array]:
-        """Return the maximum prices and the initial prices, (m,) m, for a placement at (n, 2) grid steps."""
+        """Return maximum and initial prices, (m,) m each, for the positions of robots, (n, 2) grid steps."""
         sites = self._site_data.sites
         distances = self._geodesics.compute_grid_distances(robots, sites) * self._unit
         missing_distances = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
@@ -316,12 +322,12 @@ class _Dual:
         second = distances[1]
         # An initial price is halfway between the distances of the nearest robot and the next one. If there is
         # only one robot, it exceeds the distances of all sites.
-        beyond = nearest + nearest.max()
-        first_prices = np.where(np.isinf(second), beyond, (nearest + second) / 2.0)
+        single_robot_prices = nearest + nearest.max()
+        first_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
         return distances[_MAX_PRICE_RANK - 1], first_prices
 
     def _thin_out(self, candidates: Array) -> Array:
-        """Return the first position in each square of a grid that is half as wide as `_candidate_spacing`."""
+        """Return the first position in each square of a grid with half the spacing `_candidate_spacing`."""
         squares = np.floor(candidates * 2.0 / self._candidate_spacing)
         _, first = np.unique(squares, axis=0, return_index=True)
         return candidates[np.sort(first)]
@@ -408,9 +414,9 @@ class _Dual:
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost by branch and bound over triangles.
 
-        The bound is at most `tolerance` times the placement's cost below the best one for these prices. A
-        triangle is a leaf if its points cannot earn much more than the best position found so far. All other
-        triangles are halved.
+        The bound falls short of the best one for these prices by at most `tolerance` times the cost of the
+        placement, unless the limit `_MAX_TRIANGLES` is reached. A triangle is a leaf if no robot in it can
+        earn much more than one at the best position found so far. All other triangles are halved.
         """
         slack = tolerance * self.placement_cost / self._robot_count
         best_table_profit = self._table.compute_profits(prices, self._weights).max()
@@ -435,8 +441,9 @@ class _Dual:
             triangles = halve_triangles(triangles[~is_leaf])
         # The next proof starts with these triangles.
         self._triangles = np.concatenate(leaves)
-        rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robot_count
-        bound = float(self._weights @ prices) - self._robot_count * profit_bound - rounding
+        rounding_allowance = _ROUNDING * self._geodesics.size * self.total_weight * self._robot_count
+        bound = float(self._weights @ prices) - self._robot_count * profit_bound - rounding_allowance
+        # The highest profits come first, because `_thin_out` keeps the first candidate in each square.
         by_profit = np.argsort(-np.concatenate(better_profits), kind="stable")
         return _Proof(
             bound=bound,

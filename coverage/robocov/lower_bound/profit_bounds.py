@@ -164,15 +164,16 @@ def _add_site(
     site: int,
     price: float,
 ) -> float:
-    """Add what a site pays to the bounds on the vertices' profits; return what it pays at the center."""
+    """Add what a site pays to the profit bounds of the vertices; return what it pays at the center."""
     site_x = site_data.sites[site, 0]
     site_y = site_data.sites[site, 1]
     dx = center.x - site_x
     dy = center.y - site_y
     straight = np.sqrt(dx * dx + dy * dy)
+    # The whole triangle is within `radius` of its center, so no point of it is nearer to the site than this.
     if straight - center.radius >= price:
         return 0.0
-    # A site pays nothing to a robot that is farther away than its price, so the bounds start at the price.
+    # The distance bounds start at the price: a site pays nothing to a robot at that distance or beyond.
     for vertex in range(3):
         scratch.min_distances[vertex] = price
     distance = np.inf

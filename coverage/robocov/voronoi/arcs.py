@@ -38,7 +38,7 @@ _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(1
 """Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
 _MIN_LENGTH_M = 1e-300
-"""Length that replaces shorter ones in divisions, so that nothing is divided by zero."""
+"""Smallest length used as a divisor, which prevents division by zero."""
 _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
@@ -76,7 +76,8 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
         normal_x = v - y
         normal_y = x - u
         squared_length = normal_x * normal_x + normal_y * normal_y
-        # The moments of the circular segment. The third factor of length of `first` is that of the normal.
+        # The moments of the circular segment. `first` still lacks one factor of length, which comes from the
+        # multiplication by the normal below.
         unit_area, unit_first, unit_polar = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
         area = unit_area * squared_length
         first = unit_first * squared_length

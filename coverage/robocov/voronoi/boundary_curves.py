@@ -75,8 +75,11 @@ _SPARE_PIECES = 64
 """Initial room for pieces, in addition to one for each edge."""
 
 _MIN_SQUARED_SINE = 1e-29
-"""sin² of the angle at which two curves meet, below which rounding alone decides whether and where they do.
-One of them is then treated as within the other, which moves no boundary by more than rounding does."""
+"""Smallest sin² of the angle between two curves for which their intersections are computed.
+
+At smaller angles, rounding alone decides whether and where they meet. One curve is then treated as lying
+within the other, which moves no boundary by more than rounding does.
+"""
 
 
 @kernel
@@ -195,7 +198,7 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
 
 @kernel
 def _compute_reach(pairs: Array, edges: Array) -> float:
-    """Return an upper bound of the distances of a cell's points from its generator, m; -1 if it is empty."""
+    """Return an upper bound on the distance of a cell's points from its generator, m; -1 if it is empty."""
     reach = 0.0
     for e in range(len(edges)):
         reach = max(reach, np.sqrt(edges[e, _EDGE_START_X] ** 2 + edges[e, _EDGE_START_Y] ** 2))
@@ -314,7 +317,7 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
     # On the first curve the condition of the other one is quadratic t² + 2 leftward t + constant <= 0.
     quadratic = a2 * bend * bend - k * outward * bend - c2 * k * k
     constant = a2 * r1 * r1 + r1 * outward - c2
-    # 1 - g² as a sum of minors: if the curves meet at a small angle, g itself would leave only rounding.
+    # 1 - g² as a sum of minors: at small angles, subtracting g² from 1 would leave only rounding errors.
     b_cross = b1x * b2y - b1y * b2x
     across = a1 * c2 - a2 * c1
     squared_sine = b_cross * b_cross - 4.0 * across * across
@@ -322,7 +325,7 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
         (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
     )
     if squared_sine > _MIN_SQUARED_SINE:
-        # The two roots of the quadratic function, in the form in which nothing cancels.
+        # The two roots of the quadratic function, in the form that avoids cancellation.
         large = -leftward - np.copysign(np.sqrt(squared_sine), leftward)
         if leftward >= 0.0:
             return large / quadratic, constant / large, 0
@@ -351,18 +354,20 @@ def _compute_b_and_c(curve: Array) -> tuple[float, float, float]:
 
 @kernel
 def _add_parts(curve: Array, crossings: Array, pieces: Array, piece_count: int) -> int:
-    """Add the parts of a curve that are on the cell's side of all others; return the new number of pieces.
+    """Add the parts of a curve on the cell's side of all other curves; return the new number of pieces.
 
-    The crossings with the other curves, (k, 2), are overwritten.
+    `crossings`, (k, 2), are the crossings with the other curves. They are overwritten.
     """
+    # The crossings with curves that do not intersect this one are nan. Comparisons with nan are false, so
+    # these curves neither limit the interval nor add a gap.
     start = curve[_BEGIN]
     end = curve[_END]
     for other in range(len(crossings)):
         if crossings[other, _ENTER] <= crossings[other, _LEAVE]:
             start = max(start, crossings[other, _ENTER])
             end = min(end, crossings[other, _LEAVE])
-    # If the curve leaves the cell's side of another one before it enters it, there is a gap in between. The
-    # gaps within the interval are written over the first crossings, sorted by their start.
+    # If `leave` comes before `enter`, the curve does not bound the cell between the two: there is a gap. The
+    # gaps within the interval are sorted by their start. They overwrite crossings that were already read.
     gap_count = 0
     for other in range(len(crossings)):
         enter = crossings[other, _ENTER]

@@ -53,7 +53,7 @@ class Workspace(NamedTuple):
     """Working memory for the computation of one cell after another."""
 
     rings: Array
-    """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and one for cuts."""
+    """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and `_EXCESS`."""
     neighbors: Array
     """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARED_DISTANCE`, `ROBOT`."""
 
@@ -247,6 +247,7 @@ def _cut_polygon(rings: Array, ring: int, count: int, neighbor_rows: Array, row:
         _add_crossing(rings, ring, new_count, before, first_cut, robot)
         new_count += 1
     if rings[ring, after, _EXCESS] < 0.0:
+        # The rest of the edge from `last_cut` to `after` still borders on the same robot.
         _add_crossing(rings, ring, new_count, after, last_cut, rings[ring, last_cut, BEYOND])
         new_count += 1
     return new_count
@@ -283,9 +284,10 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, r
 
 @inlined_kernel
 def _add_crossing(rings: Array, ring: int, new_vertex: int, inner: int, outer: int, beyond: float) -> None:
-    """Write the intersection of an edge with the bisector to the other ring.
+    """Write the point where an edge crosses the bisector to the other ring, as its vertex `new_vertex`.
 
-    The edge connects the vertices `inner` and `outer`, which lie on this side of the bisector and beyond it.
+    The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
+    the other side. `beyond` is the robot on the other side of the edge that begins at the new vertex.
     """
     other_ring = 1 - ring
     inner_excess = rings[ring, inner, _EXCESS]

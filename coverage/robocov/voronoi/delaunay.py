@@ -35,7 +35,7 @@ their magnitudes, because the sign may then be a rounding error."""
 _MAX_FLIPS_PER_POINT = 16
 """Average number of flips per point after which the attempt has failed: rounding may cause endless flips."""
 _MIN_CROSS = 1e-300
-"""Cross product that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
+"""Smallest cross product used as a divisor, which prevents division by zero, m²."""
 
 
 @kernel
@@ -245,7 +245,7 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
     """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 on failure."""
     triangle = start
-    # Rounding may lead the walk in a circle.
+    # Because of rounding, the walk could go in circles.
     max_steps = 3 * triangle_count + 3
     for _ in range(max_steps):
         h = _find_edge_to_cross(mesh, points, triangle, x, y)

@@ -14,7 +14,7 @@ _MIN_AREA = 1e-14
 """Area, relative to the square of the radius, below which a part is empty up to rounding."""
 
 _MIN_SQUARED_LENGTH = 1e-300
-"""Squared length that replaces smaller ones in divisions, so that nothing is divided by zero, m²."""
+"""Smallest squared length used as a divisor, which prevents division by zero, m²."""
 
 
 class _Arcs(NamedTuple):
