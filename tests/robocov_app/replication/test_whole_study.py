@@ -495,7 +495,7 @@ class TestPages:
     def test_the_protocol_tells_all_that_is_needed_to_do_it_again(self, content, paper):
         said = plain(content)
         for words in (
-            f"{paper.runs} runs, 0 of which failed",
+            f"{paper.runs} runs; 0 failed",
             *(
                 "0.02 s",
                 "6 s each",
@@ -505,10 +505,10 @@ class TestPages:
                 "rho_0 2 m",
             ),
             *("RAPF (k_rep 1, rho_0 2, k_att 3, no limit); RPF (k_rep 1, rho_0 2)", "attraction_limit 2"),
-            *("the same within 2 %", "(28)", "(18)", "2.0542, 1.6190", "robocov "),
+            *("equal within 2 %", "(28)", "(18)", "2.0542, 1.6190", "robocov "),
         ):
             assert words in said, words
-        assert "all that are not convex but campus" not in said
+        assert "all non-convex ones except campus" not in said
 
     def test_every_claim_and_goal_beyond_is_told(self, more, beyond):
         said = plain(more)
@@ -526,7 +526,7 @@ class TestPages:
         assert "on 1 generated maps (seeds 101)" in said
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
         said = plain(study_pages.build_beyond_page({}, quick))
-        assert "default gains: those that the full study" in said and "120 s on 4 generated maps" in said
+        assert "default gains, found by the full study" in said and "120 s on 4 generated maps" in said
 
     def test_energy_has_its_unit(self, more, beyond):
         for row in rank_contenders(beyond):
@@ -630,7 +630,7 @@ class TestCommand:
         assert len(list((out / "figures").glob("*.pdf"))) == 8
         content = (out / "index.html").read_text(encoding="utf-8")
         assert content.count("<img") == 8 and "Best gains" not in content
-        assert "Verdicts" not in content and "Only the figures were asked for" in content
+        assert "Verdicts" not in content and "Only the figures were requested" in content
 
     def test_beyond_only(self, study, tmp_path, monkeypatch, capsys):
         """With everything but the drawing of figures, which other tests do."""
@@ -647,7 +647,7 @@ class TestCommand:
         assert [claim["key"] for claim in found] == [claim.key for claim in judge_beyond_claims(study[2])]
         page, front = ((out / name).read_text(encoding="utf-8") for name in ("beyond.html", "index.html"))
         assert 'href="index.html"' in page and 'href="beyond.html"' in front
-        assert "without --beyond-only the claims are tested too" in front
+        assert "Without --beyond-only, the claims are tested, too" in front
         for claim in found:
             assert f'href="beyond.html#{claim["key"]}"' in front and f'id="{claim["key"]}"' in page
 
