@@ -62,9 +62,10 @@ def test_free_space_stays(
     # twice: what was drawn may have moved, and so may the primitives from where it was drawn
     assert apart.area <= 2 * (tolerance + 2e-4) * parts[0].length
     assert report.obstacles == len(environment.obstacles)
-    others = [*blocks, *(one.polygon for one in (*circles, *walls))]
+    # A circle at the boundary may cut off a part of the free space. It is a polygon then.
+    others = [ROOM.exterior, *blocks, *(one.polygon for one in (*circles, *walls))]
     for circle in circles:
-        # what is nearer than that may be drawn over the circle
+        # What is nearer than that may be drawn over the circle.
         alone = sum(shapely.dwithin(circle.polygon, other, 1e-3 + tolerance) for other in others) == 1
         if alone and parts[0].buffer(1e-9).covers(circle.polygon.exterior) and circle.radius > 2 * tolerance:
             near = [o for o in environment.obstacles if isinstance(o, CircleObstacle)]

@@ -162,14 +162,16 @@ def test_where_no_run_is_left_nothing_is_written(run, capsys) -> None:
 @pytest.mark.slow
 def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr("robocov_app.report.results.RESTARTS", 2)
+    monkeypatch.setattr("robocov_app.report.results.references.RESTARTS", 2)
     page = run / "report.html"
     assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
     assert main(["report", str(run), "--optimum"]) == 0
     (above,) = re.findall(r"average, ([\d.]+) % above the best placement known", page.read_text())
     assert float(above) > 0.0
     before = page.read_bytes()
-    monkeypatch.setattr("robocov_app.report.results.find_optimum", None)  # nothing is searched for again
+    monkeypatch.setattr(
+        "robocov_app.report.results.references.find_optimum", None
+    )  # nothing is searched for again
     assert main(["report", str(run)]) == 0 and page.read_bytes() == before
     monkeypatch.setenv("ROBOCOV_CACHE", "")
     assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
