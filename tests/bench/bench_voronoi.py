@@ -1,4 +1,4 @@
-"""How long a Voronoi partition takes, as a multiple of scipy's Delaunay triangulation of the same points.
+"""Time of a Voronoi partition, as a multiple of scipy's Delaunay triangulation of the same points.
 
     python tests/bench/bench_voronoi.py [rounds]
 

@@ -1,4 +1,4 @@
-"""How much memory an hour of the window takes: ``python tests/bench/soak_window.py [minutes] [robots]``.
+"""Memory of the window during an hour: ``python tests/bench/soak_window.py [minutes] [robots]``.
 
 Frames follow each other as fast as they can, each as if a sixtieth of a second had passed; now and then
 something is touched, as people do. Prints the resident memory every few minutes of that time.

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 REFUSED = (1.0, 200.0)
-"""What a file that is refused may cost: CPU seconds, MB."""
+"""Limits of a rejected file: CPU seconds, MB."""
 
 READ = (10.0, 500.0)
 """And one that is read."""

@@ -55,7 +55,7 @@ NUMBERS = [
     ),
     *(b"0.30000000000000004", b"1e-7", b"100000", b"65536", b"", b"null", b'"1"', b"[]", b"true"),
 ]
-"""What takes the place of numbers."""
+"""Replacements of numbers."""
 
 _NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 

@@ -30,7 +30,7 @@ _NOSE_HALF_ANGLE = 0.5
 _EDGE_PX = 0.6
 """Width of the edge around discs and noses."""
 _CROSS_HALO_PX = 1.6
-"""How much wider than a cross its halo is."""
+"""Additional width of the halo of a cross."""
 _DIAGONAL_ARM = 0.75
 """Length of the arms of a times sign, as a fraction of those of a plus."""
 _DIGIT_SIZES = (1.5, 1.22, 0.92, 0.72)

@@ -43,7 +43,7 @@ class PointerEvent:
 
 @dataclass(frozen=True)
 class DrawState:
-    """What a tool shows in the map.
+    """The overlay of a tool on the map.
 
     Attributes
     ----------

@@ -82,7 +82,7 @@ class OwnMotion:
 
 @dataclass(frozen=True, eq=False)
 class JamState:
-    """How long one robot has been stuck among others, and until when it moves away from them."""
+    """State of a robot that is stuck among others, and moves away from them for a while."""
 
     stuck_plans: int = 0
     """Number of consecutive plans during which it has been stuck."""

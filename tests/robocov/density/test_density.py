@@ -167,7 +167,7 @@ def test_cells_without_mass_have_the_centroid_of_their_area():
 @given(x=st.floats(4.0, 60.0))
 @settings(max_examples=12, deadline=None)
 def test_centroids_far_from_a_peak_are_continuous(x):
-    """Where the closed form loses all digits, centroids do not jump and stay in their cells."""
+    """If the closed form loses all digits, centroids do not jump and stay in their cells."""
     peak = Gaussians((Gaussian((0.0, 0.0), 1.0, sigma=1.0),))
     cell = Region(np.array([[x, -0.5], [x + 1.0, -0.5], [x + 1.0, 0.5], [x, 0.5]]))
     cells = build_cells(peak, [[x + 0.5, 0.1]], cell)

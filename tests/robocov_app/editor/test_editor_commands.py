@@ -1,4 +1,4 @@
-"""What every action, typed command and field of the editor does to the map."""
+"""Effects of every action, typed command and field of the editor on the map."""
 
 from collections.abc import Iterator
 from itertools import pairwise

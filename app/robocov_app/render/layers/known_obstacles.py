@@ -18,7 +18,7 @@ _CELL_OPACITIES = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}
 """Opacity of the cells of a discovered map; free ones are transparent."""
 _UNKNOWN_FILL_STRENGTH = 0.3
 _UNKNOWN_EDGE_STRENGTH = 0.6
-"""How much of the color of an obstacle remains if no robot has sensed it."""
+"""Fraction of the color of an obstacle that remains if no robot has sensed it."""
 _POINT_RADIUS_PX = 2.1
 """Radius of a sensed point, at scale 1."""
 

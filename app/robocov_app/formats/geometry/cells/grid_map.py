@@ -22,7 +22,7 @@ from robocov_app.formats.reports import format_area
 Cells: TypeAlias = NDArray[np.uint8]
 """`FREE`, `BLOCKED` or `UNKNOWN`, (rows, columns), the top row first."""
 Meaning: TypeAlias = Literal["obstacle", "free", "cut"]
-"""What unknown cells are; with "cut" the map ends around the known ones."""
+"""Treatment of unknown cells; with "cut" the map ends around the known ones."""
 FREE = 0
 BLOCKED = 1
 UNKNOWN = 2
