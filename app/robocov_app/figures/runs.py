@@ -528,7 +528,7 @@ METRIC_PANELS = (
         to_free_area_percent(lambda metrics: metrics.visible_area),
     ),
     MetricPanel("work |F v| (J)", "J", lambda metrics: metrics.work),
-    MetricPanel("way of a robot (m)", "m", lambda metrics: metrics.path_length),
+    MetricPanel("path length of a robot (m)", "m", lambda metrics: metrics.path_length),
 )
 
 

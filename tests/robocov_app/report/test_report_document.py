@@ -175,16 +175,16 @@ def test_empty_sections_are_left_out() -> None:
     headings = re.findall(
         r"<h2[^>]*>([^<]+)", build_report([replace(build_recorded_result([build_run()]), kind="run")]).html
     )
-    assert headings == ["What was run", "Results", "Replay", "Cost over time", "Metrics"]
+    assert headings == ["Setup", "Results", "Replay", "Cost over time", "Metrics"]
     failed = build_report([build_result([build_run(error="it broke")])]).html
-    assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["What was run", "Failures"]
+    assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["Setup", "Failures"]
     assert "it broke" in failed and "No run has a result." in failed
 
 
 def test_a_sweep_has_all_of_its_sections(html) -> None:
     headings = re.findall(r"<h2[^>]*>([^<]+)", html)
     assert headings == [
-        *("What was run", "Results", "Replay", "Cost over time", "Final cost", "In pairs"),
+        *("Setup", "Results", "Replay", "Cost over time", "Final cost", "In pairs"),
         *("What the result depends on", "Trajectories", "Failures"),
     ]
     assert "Not finished: 9 of 40 runs are missing." in html and "1 of 31 runs failed (mine 1 of 1): " in html
