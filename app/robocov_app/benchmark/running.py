@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from robocov.errors import InputError, OutputError
+from robocov.files.result_names import RUNS_FOLDER
 from robocov.files.writing import replace_file
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import (
@@ -16,7 +17,7 @@ from robocov_app.benchmark.results import (
     describe_method,
     identify_suite,
 )
-from robocov_app.sweep.ledger import RUNS_FOLDER, Ledger
+from robocov_app.sweep.ledger import Ledger
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.sweep.tasks import generate_tasks

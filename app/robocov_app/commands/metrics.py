@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from robocov.errors import require_number
+from robocov.files.result_names import METRICS_FILE
 from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import BOLD, RIGHT, print_answer, print_table, write_csv
 from robocov_app.terminal.progress import make_counter, show_progress
@@ -70,7 +71,7 @@ def command(options: Arguments) -> None:
             metrics = _compute_metrics(options, saved)
             target = result.staging / saved.folder.relative_to(folder)
             target.mkdir(exist_ok=True)
-            write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), metrics.rows())
+            write_csv(target / METRICS_FILE, ",".join(COLUMNS.values()), metrics.rows())
             measured_runs.append(MeasuredRun(saved.record.label, saved.record.controller, metrics))
             rows.append(_build_row(saved, metrics))
     if options.plot is not None:
@@ -79,7 +80,7 @@ def command(options: Arguments) -> None:
         columns = [(title, RIGHT if title else BOLD) for title in _COLUMNS]
         print_table(columns, [_format_cells(row) for row in rows])
     folders = ", ".join(row["folder"] for row in rows)
-    print_answer(options, {"runs": rows}, f"written to metrics.csv in {folders}")
+    print_answer(options, {"runs": rows}, f"written to {METRICS_FILE} in {folders}")
 
 
 def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:

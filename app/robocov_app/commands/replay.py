@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import InputError, ParameterError, summarize_names
+from robocov.files.result_names import REPLAY_FILE, SESSION_FILE, STORY_FILE
 from robocov_app.commands.options import JsonOption, VideoOptions, WebOptions
 from robocov_app.terminal.arguments import parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -82,8 +83,8 @@ def command(options: Arguments) -> int:
 def _replay(options: Arguments) -> int:
     options.video.read_layers()
     path = options.run
-    if (path / "story.json").is_file():
-        path = path / "session.robocov"
+    if (path / STORY_FILE).is_file():
+        path = path / SESSION_FILE
     if path.suffix == ".robocov":
         return _replay_session(path, options)
     from robocov_app.runs.saved_runs import load_saved_runs
@@ -189,7 +190,7 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
         runs_on_one_map.append(Run(replace(saved.record, environment=environment), history, {}))
     with create_result(out, "replay", overwrite=options.overwrite) as result, Interruption() as interruption:
         content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
-        write_json(result.staging / "replay.json", content)
+        write_json(result.staging / REPLAY_FILE, content)
         save_videos(
             runs,
             None,

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from robocov.errors import InputError, OutputError, ParameterError, format_count
-from robocov.files.result_folder import REPORT_FILE, extend_result, is_report
+from robocov.files.result_folder import extend_result, is_report
+from robocov.files.result_names import REPORT_FILE
 from robocov.files.writing import replace_file, resolve_target
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import Interruption

@@ -123,6 +123,7 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
     """Simulate the selected branches of a session, each into its own folder, and yield their results."""
     from robocov.errors import InputError
     from robocov.files.result_folder import create_result
+    from robocov.files.result_names import SESSION_FILE
     from robocov.kernel_compilation import compile_kernels
     from robocov_app.viewer.branch_output.parts import SelectedBranch
     from robocov_app.viewer.branch_output.save import save_branch
@@ -136,7 +137,7 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
     for node, step, suffix in branches:
         out = Path(f"{options.out or path.stem}{suffix}")
         with create_result(out, "story", overwrite=options.overwrite) as result:
-            session_copy = result.staging / f"session{path.suffix}"
+            session_copy = result.staging / SESSION_FILE
             save_session(session_copy, session.document, node, step, session.view)
             try:
                 branch = SelectedBranch(session.document, node, step)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import ParameterError, format_count, require_number
+from robocov.files.result_names import SWEEP_PARQUET_FILE, SWEEP_TABLE_FILE
 from robocov.optional_imports import import_optional
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
@@ -172,6 +173,6 @@ def _describe_interruption(totals: Totals, runs: int, out: Path) -> list[str]:
 
 def _describe_tables(out: Path) -> str:
     """Return the paths of the written tables as a line of text."""
-    parquet = out / "results.parquet"
+    parquet = out / SWEEP_PARQUET_FILE
     suffix = f", and as Parquet {parquet}" if parquet.exists() else ""
-    return f"the table is {out / 'results.csv'}{suffix}"
+    return f"the table is {out / SWEEP_TABLE_FILE}{suffix}"

@@ -15,7 +15,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem, translate_message
 from robocov_app.editor.settings import LAYERS, EditorSettings
 from robocov_app.editor.tools.context import EditorContext
-from robocov_app.editor.tools.snap_modes import SNAPS
+from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.tools.snap_targets import count_vertices
 from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.editor.tools.toolbox import EditorToolbox

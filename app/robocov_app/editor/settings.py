@@ -5,7 +5,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from robocov.defaults import DEFAULT_RADIUS_M
-from robocov_app.editor.tools.snap_modes import SNAPS
+from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.toolkit.window_settings import WindowSettings
 
 SETTINGS_FILE = "editor.json"

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from robocov.arrays import Array
-from robocov_app.figures.curves import Curve, draw_curves, format_end_label
+from robocov_app.figures.curves import Curve, CurveMargins, add_curve_axes, draw_curves, format_end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import FigurePage
 from robocov_app.look.curve_styles import CurveStyle
@@ -17,10 +17,9 @@ from robocov_app.look.theme import LIGHT
 _FULL_WEIGHT_WIDTH_PX = 700.0
 """Width of a page from which on lines have their full width. They would fill a small page."""
 _SMALL_WEIGHT = 0.7
-_LEFT_PX = 44
-_TOP_PX = 44
-_HEIGHT_MARGINS_PX = 94
-_LABEL_MARGIN_PX = 30
+_MARGINS = CurveMargins(left=44, top=44, bottom=50, right=30, max_right_fraction=1.0)
+_MAX_NAME_FRACTION = 0.5
+"""Fraction of the page into which shortened names fit, with their values and the margin on the right."""
 
 
 class Band(NamedTuple):
@@ -59,7 +58,6 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
     -------
     matplotlib.figure.Figure
     """
-    width, height = size
     page = FigurePage(size, LIGHT, 1.0)
     curves = []
     quartile_bands: list[tuple[Array, Array] | None] = []
@@ -67,18 +65,15 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
         low, middle, high = compute_quartiles(band.values)
         curves.append(_build_curve(page, band, middle, unit))
         quartile_bands.append((low, high) if len(band.values) > 1 else None)
-    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
-    right = _LABEL_MARGIN_PX + label_width
-    axes = page.add_axes((_LEFT_PX, _TOP_PX, width - _LEFT_PX - right, height - _HEIGHT_MARGINS_PX))
     draw_curves(
-        axes,
+        add_curve_axes(page, curves, _MARGINS, unit=unit),
         curves,
         LIGHT,
         styles=[band.style for band in bands],
         bands=quartile_bands,
         label=label,
         unit=unit,
-        weight=1.0 if width >= _FULL_WEIGHT_WIDTH_PX else _SMALL_WEIGHT,
+        weight=1.0 if page.size[0] >= _FULL_WEIGHT_WIDTH_PX else _SMALL_WEIGHT,
     )
     return page.figure
 
@@ -89,7 +84,7 @@ def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> Curv
     def measure_end_label(name: str) -> float:
         return page.measure_text(format_end_label((name, "", band.time, median), unit), bold=True)
 
-    max_width = 0.5 * page.size[0] - _LABEL_MARGIN_PX
+    max_width = _MAX_NAME_FRACTION * page.size[0] - _MARGINS.right
     name = shorten_text(band.label, measure_end_label, max_width, min_chars=1)
     return name, band.style.name, band.time, median
 

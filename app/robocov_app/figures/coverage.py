@@ -16,7 +16,15 @@ from robocov.environment import Environment
 from robocov.record import Record
 from robocov.team import Team
 from robocov_app.figures import arena
-from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, format_end_label
+from robocov_app.figures.curves import (
+    DISTANCE,
+    TIME,
+    WEIGHED,
+    Curve,
+    CurveMargins,
+    add_curve_axes,
+    draw_curves,
+)
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, check_not_empty, to_plot_color
 from robocov_app.figures.runs import plot_cost
@@ -50,6 +58,7 @@ _CURVES_HEIGHT = 290
 _CAPTION_HEIGHT = 50
 _PANEL_GAP = 16
 _BAR_ROW = 26
+_CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=26)
 
 
 @dataclass(frozen=True, eq=False)
@@ -380,17 +389,8 @@ def _draw_curves(
 
 def _draw_curve_panel(page: FigurePage, curves: Sequence[Curve], box: PageBox, label: str, unit: str) -> None:
     """Draw curves in a box with space for their labels."""
-    scale = page.scale
-    left, top, width, height = box
-    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
-    right = min(26 * scale + label_width, 0.45 * width)
-    axes_box = (
-        left + 34 * scale,
-        top + 34 * scale,
-        width - 34 * scale - right,
-        height - 34 * scale - 50 * scale,
-    )
-    draw_curves(page.add_axes(axes_box), curves, page.theme, label=label, unit=unit)
+    axes = add_curve_axes(page, curves, _CURVE_MARGINS, box=box, unit=unit)
+    draw_curves(axes, curves, page.theme, label=label, unit=unit)
 
 
 def _draw_maps(

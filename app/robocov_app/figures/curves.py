@@ -10,6 +10,8 @@ from robocov.arrays import Array
 from robocov_app.figures.page import (
     POINTS_PER_INCH,
     TEXT,
+    FigurePage,
+    PageBox,
     PlotColor,
     get_figure,
     set_even_ticks,
@@ -48,6 +50,30 @@ _MIN_MOVED_FRACTION = 0.3
 _CONNECTION_START_PT = 4
 _CONNECTION_END_PT = 10
 _LABEL_START_PT = 12
+
+
+class CurveMargins(NamedTuple):
+    """Space between the edges of a box and the axes of curves in it, px at scale 1.
+
+    Attributes
+    ----------
+    left : float
+        For the labels of the ticks.
+    top : float
+        For the label of the axis of values, and titles above it.
+    bottom : float
+        For the labels of the ticks and of the axis of time.
+    right : float
+        In addition to the width of the labels at the ends of the curves.
+    max_right_fraction : float
+        Maximum width to the right of the axes, with the labels, as a fraction of that of the box.
+    """
+
+    left: float
+    top: float
+    bottom: float
+    right: float
+    max_right_fraction: float = 0.45
 
 
 class _CurveEnd(NamedTuple):
@@ -94,6 +120,46 @@ def _format_end_value(value: float, unit: str) -> str:
     if abs(value) < _MIN_THOUSANDS_VALUE:
         return f"{value:.4g}"
     return f"{value:,.0f}"
+
+
+def add_curve_axes(
+    page: FigurePage,
+    curves: Sequence[Curve],
+    margins: CurveMargins,
+    *,
+    box: PageBox | None = None,
+    unit: str = "m",
+) -> Axes:
+    """Add axes for curves to a page, with space for the labels at their ends.
+
+    Parameters
+    ----------
+    page : FigurePage
+    curves : sequence of Curve
+        At least one.
+    margins : CurveMargins
+    box : PageBox, optional
+        Part of the page for the axes and all their labels. By default the whole page.
+    unit : str
+        Of the values at the ends, as for `draw_curves`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    if box is None:
+        page_width, page_height = page.size
+        box = (0.0, 0.0, page_width, page_height)
+    box_left, box_top, box_width, box_height = box
+    scale = page.scale
+    left = margins.left * scale
+    top = margins.top * scale
+    bottom = margins.bottom * scale
+    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
+    right = min(margins.right * scale + label_width, margins.max_right_fraction * box_width)
+    width = box_width - left - right
+    height = box_height - top - bottom
+    return page.add_axes((box_left + left, box_top + top, width, height))
 
 
 def draw_curves(

@@ -15,7 +15,7 @@ from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures import arena
-from robocov_app.figures.curves import Curve, draw_curves, format_end_label
+from robocov_app.figures.curves import Curve, CurveMargins, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import HEADING, TEXT, TITLE, FigurePage, PageBox, check_not_empty, get_figure
 from robocov_app.look.legend import merge_legends
@@ -39,6 +39,9 @@ _PANEL_GAP = 14
 _ONE_LINE_CAPTION = 30
 _TWO_LINE_CAPTION = 54
 _CAPTION_GAP = 16
+_COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=40)
+"""Space around the curves of a page for curves alone: its title is above them."""
+_METRIC_MARGINS = CurveMargins(left=44, top=36, bottom=48, right=24, max_right_fraction=0.5)
 
 
 @plain_style()
@@ -345,13 +348,10 @@ def _create_cost_page(curves: Sequence[Curve], theme: Theme, size: tuple[int, in
     """Create a page for curves alone, whose texts can be large."""
     width, height = size
     page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
-    scale = page.scale
-    left = 52 * scale
-    top = 86 * scale
-    label_width = max(page.measure_text(format_end_label(curve), bold=True) for curve in curves)
-    right = min(40 * scale + label_width, 0.45 * width)
-    page.write(title, left, 30 * scale, points=TITLE, bold=True, max_width=width - left - page.margin)
-    return page.add_axes((left, top, width - left - right, height - top - 56 * scale))
+    left = _COST_MARGINS.left * page.scale
+    title_row = 30 * page.scale
+    page.write(title, left, title_row, points=TITLE, bold=True, max_width=width - left - page.margin)
+    return add_curve_axes(page, curves, _COST_MARGINS)
 
 
 def _create_map_page(
@@ -565,8 +565,5 @@ def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[Curve], 
     width = 600.0
     height = 400.0 - 20 * scale
     row, column = divmod(number, 2)
-    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
-    right = min(24 * scale + label_width, 0.5 * width)
-    left = column * width + 44 * scale
-    top = 40 * scale + row * height + 36 * scale
-    return page.add_axes((left, top, width - 44 * scale - right, height - 84 * scale))
+    box = (column * width, 40 * scale + row * height, width, height)
+    return add_curve_axes(page, curves, _METRIC_MARGINS, box=box, unit=unit)

@@ -11,6 +11,13 @@ import numpy as np
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.errors import format_count
 from robocov.files.result_folder import ResultFolder, create_result
+from robocov.files.result_names import (
+    COMPARISON_FILE,
+    COMPARISON_TABLE_FILE,
+    COST_FIGURE,
+    FIGURE_SUFFIXES,
+    TRAJECTORIES_FIGURE,
+)
 from robocov.kernel_compilation import compile_kernels
 from robocov.scenario import Scenario
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures
@@ -39,7 +46,6 @@ _SUMMARY_COLUMNS = (
 """Entries of a summary that are columns of a comparison."""
 _JSON_ONLY_COLUMNS = ("label", "gains", "notes")
 """Columns of ``comparison.json`` that ``comparison.csv`` does not have."""
-_FIGURE_SUFFIXES = (".png", ".svg")
 
 
 def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tuple[Run, bool]:
@@ -171,7 +177,7 @@ def start_comparison(folder: Path, subfolders: Sequence[str]) -> None:
     OutputError
         If the file cannot be written.
     """
-    write_json(folder / "comparison.json", {**_COMPARISON_HEADER, "folders": list(subfolders), "runs": []})
+    write_json(folder / COMPARISON_FILE, {**_COMPARISON_HEADER, "folders": list(subfolders), "runs": []})
 
 
 def save_comparison(
@@ -195,10 +201,10 @@ def save_comparison(
     """
     rows = build_comparison_rows(runs)
     content = {**_COMPARISON_HEADER, "lattice": settings.lattice, "folders": list(runs), "runs": rows}
-    write_json(folder / "comparison.json", replace_non_finite(content))
+    write_json(folder / COMPARISON_FILE, replace_non_finite(content))
     columns = [name for name in rows[0] if name not in _JSON_ONLY_COLUMNS]
     lines = ([row[name] for name in columns] for row in rows)
-    write_csv(folder / "comparison.csv", ",".join(columns), lines)
+    write_csv(folder / COMPARISON_TABLE_FILE, ",".join(columns), lines)
     save_figures(list(runs.values()), cost, folder, settings, is_comparison=True)
 
 
@@ -231,16 +237,16 @@ def save_figures(
         return
     from robocov_app.figures.files import save_figure
 
-    with show_progress("figures", 2 * len(_FIGURE_SUFFIXES), quiet=settings.quiet) as update:
+    with show_progress("figures", 2 * len(FIGURE_SUFFIXES), quiet=settings.quiet) as update:
         report_figure = make_counter(update)
 
         def save(figure: Figure, stem: str) -> None:
-            for suffix in _FIGURE_SUFFIXES:
+            for suffix in FIGURE_SUFFIXES:
                 save_figure(figure, folder / (stem + suffix))
                 report_figure()
 
-        save(_plot_trajectories(runs, settings, is_comparison=is_comparison), "trajectories")
-        save(_plot_cost(runs, cost, settings), "cost")
+        save(_plot_trajectories(runs, settings, is_comparison=is_comparison), TRAJECTORIES_FIGURE)
+        save(_plot_cost(runs, cost, settings), COST_FIGURE)
 
 
 def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comparison: bool) -> Figure:

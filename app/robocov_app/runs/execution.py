@@ -11,6 +11,7 @@ from typing import Any
 
 from robocov.cost import CoverageCost
 from robocov.files.result_folder import ResultFolder
+from robocov.files.result_names import COST_FILE
 from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarize
 from robocov.metrics.cost_history import DEFAULT_RATE_HZ
 from robocov.record import Record
@@ -145,7 +146,7 @@ def save_numbers(run: Run, folder: Path, lattice: int) -> None:
         If a file cannot be written.
     """
     run.record.save(folder, replace_non_finite(run.summary), lattice=lattice)
-    write_csv(folder / "cost.csv", *build_cost_table(run.history))
+    write_csv(folder / COST_FILE, *build_cost_table(run.history))
 
 
 def build_cost_table(history: CostHistory) -> tuple[str, Iterator[tuple[float, ...]]]:

@@ -14,6 +14,7 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import InputError
 from robocov.files.documents import Document, expect, read_document
 from robocov.files.result_folder import complete_commit
+from robocov.files.result_names import COMPARISON_FILE, COST_FILE, RUN_FILE
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
 from robocov.record import Record
@@ -80,13 +81,13 @@ def load_saved_runs(path: Path) -> list[SavedRun]:
     InputError
         If it is not the folder of a run or a comparison, or a file in it cannot be used.
     """
-    is_file = path.name in ("run.json", "comparison.json") and not path.is_dir()
+    is_file = path.name in (RUN_FILE, COMPARISON_FILE) and not path.is_dir()
     folder = path.parent if is_file else path
     complete_commit(folder)
-    comparison_path = folder / "comparison.json"
+    comparison_path = folder / COMPARISON_FILE
     if comparison_path.is_file():
         return _load_comparison(comparison_path)
-    if not (folder / "run.json").is_file():
+    if not (folder / RUN_FILE).is_file():
         raise InputError(
             f"{folder}: not the folder of a run or a comparison (there is no run.json and no comparison.json)"
         )
@@ -101,14 +102,14 @@ def _load_comparison(path: Path) -> list[SavedRun]:
         if folder.is_symlink():
             raise InputError(f"{folder}: expected a folder in that of the comparison, got a link")
     is_complete = bool(content.runs)
-    saved = [_load_run(folder) for folder in folders if is_complete or (folder / "run.json").is_file()]
+    saved = [_load_run(folder) for folder in folders if is_complete or (folder / RUN_FILE).is_file()]
     if not saved:
         raise InputError(f"{path}: expected at least one run, got none")
     first = build_roster(saved[0].record).environment
     for run in saved[1:]:
         environment = build_roster(run.record).environment
         if (environment.boundary, environment.obstacles) != (first.boundary, first.obstacles):
-            raise InputError(f"{run.folder / 'run.json'}: expected the same map as in {saved[0].folder}")
+            raise InputError(f"{run.folder / RUN_FILE}: expected the same map as in {saved[0].folder}")
     return saved
 
 
@@ -178,6 +179,6 @@ def name_folders(controllers: Sequence[str]) -> list[str]:
 
 
 def _load_run(folder: Path) -> SavedRun:
-    history_path = folder / "cost.csv"
+    history_path = folder / COST_FILE
     history = read_history(history_path) if history_path.exists() else None
     return SavedRun(folder, Record.load(folder), history)

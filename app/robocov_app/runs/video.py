@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from robocov.cost import CoverageCost, TimeVaryingCost
+from robocov.files.result_names import COMPARISON_VIDEO_FILE, FRAMES_FOLDER, RUN_VIDEO_FILE
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.distance_colors import choose_color_limit
@@ -23,8 +24,6 @@ from robocov_app.runs.settings import VideoSettings
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress
 
-RUN_VIDEO = "run.mp4"
-COMPARISON_VIDEO = "comparison.mp4"
 VIDEO_HOLD_S = 1.0
 """Duration for which a video shows its last step."""
 _COLOR_SCALE_FACTOR = 1.3
@@ -33,7 +32,7 @@ _COLOR_SCALE_FACTOR = 1.3
 
 def get_video_name(runs: int) -> str:
     """Return the file name of the video of a number of runs."""
-    return COMPARISON_VIDEO if runs > 1 else RUN_VIDEO
+    return COMPARISON_VIDEO_FILE if runs > 1 else RUN_VIDEO_FILE
 
 
 def draw_comparison_frames(
@@ -193,6 +192,6 @@ def write_frames_and_video(
                 if interruption.requested:
                     return
 
-        frame_folder = path.parent / "frames" if settings.frames else None
+        frame_folder = path.parent / FRAMES_FOLDER if settings.frames else None
         video_path = path if settings.video else None
         save_frames_and_video(report_frames(), frame_folder, video_path, settings.fps)

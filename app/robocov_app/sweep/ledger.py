@@ -24,15 +24,12 @@ from typing import Any, NamedTuple
 from robocov.errors import InputError, OutputError, format_count
 from robocov.files.folder_lock import lock_folder
 from robocov.files.result_folder import report_folder_errors
+from robocov.files.result_names import ERROR_FILE, RUN_FILE, RUNS_FOLDER, STUDY_FILE, SWEEP_TABLE_FILE
 from robocov.files.writing import flush_to_disk
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, list_result_versions
 from robocov_app.terminal.output import write_json
 
-RUNS_FOLDER = "runs"
-"""Name of the folder that contains the folders of the runs."""
-STUDY_FILE = "study.json"
-CSV_FILE = "results.csv"
 _ROW_FILE = "row.json"
 """File in the folder of a run with its figures in the table and the checksums of its other files."""
 _ROW_FORMAT = "robocov-row"
@@ -326,7 +323,7 @@ def open_ledger(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
 
 def count_rows(folder: Path) -> int:
     """Return the number of rows in the table of a sweep, 0 if there is no table."""
-    with suppress(OSError), (folder / CSV_FILE).open("rb") as file:
+    with suppress(OSError), (folder / SWEEP_TABLE_FILE).open("rb") as file:
         return max(0, sum(1 for _ in file) - 1)
     return 0
 
@@ -352,7 +349,7 @@ def is_sweep(folder: Path) -> bool:
 
 def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
     """Read the versions of a run of format 1; raise DamagedRunError if its two files disagree."""
-    file_name = "run.json" if error is None else "error.json"
+    file_name = RUN_FILE if error is None else ERROR_FILE
     run = json.loads(_read_file(folder / file_name))
     if error is not None:
         _require(run["error"] == error)

@@ -13,17 +13,17 @@ from typing import Any, NamedTuple
 from robocov.controllers import get_gains
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
+from robocov.files.result_names import STUDY_FILE, SWEEP_PARQUET_FILE, SWEEP_TABLE_FILE
 from robocov.files.writing import flush_to_disk, resolve_target
 from robocov.metrics.results import read_rows
 from robocov.optional_imports import import_optional
-from robocov_app.sweep.ledger import CSV_FILE, STUDY_FILE, Entry, count_rows, has_all_rows
+from robocov_app.sweep.ledger import Entry, count_rows, has_all_rows
 from robocov_app.sweep.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, MEAN_TIME
 from robocov_app.terminal.output import format_csv_line
 
-PARQUET_FILE = "results.parquet"
 _TEMPORARY_CSV_FILE = ".results.part.csv"
 _TEMPORARY_PARQUET_FILE = ".results.part.parquet"
 _TEMPORARY_STUDY_FILE = ".study.part.json"
@@ -174,23 +174,23 @@ class Table:
         self._folder = folder
         self._columns = columns
         self._study = study
-        self._has_parquet = parquet or (folder / PARQUET_FILE).exists()
+        self._has_parquet = parquet or (folder / SWEEP_PARQUET_FILE).exists()
         self._error: OutputError | None = None
         self._size = 0  # bytes
         self._row_count = -1  # The header is no row.
 
     def __enter__(self) -> Table:
-        resolve_target(self._folder / CSV_FILE)
+        resolve_target(self._folder / SWEEP_TABLE_FILE)
         if self._has_parquet:
-            resolve_target(self._folder / PARQUET_FILE)
-            import_optional("pyarrow", "parquet", f"{self._folder / PARQUET_FILE}: ")
+            resolve_target(self._folder / SWEEP_PARQUET_FILE)
+            import_optional("pyarrow", "parquet", f"{self._folder / SWEEP_PARQUET_FILE}: ")
         # Before the end, an earlier table is only replaced by one that grows beyond it.
         self._earlier_row_count = count_rows(self._folder)
         self._rows_until_shown = math.inf if has_all_rows(self._folder) else self._earlier_row_count
         with ExitStack() as stack:
             for name in (_TEMPORARY_CSV_FILE, _TEMPORARY_PARQUET_FILE):
                 stack.callback((self._folder / name).unlink, missing_ok=True)
-            with _report_write_errors(self._folder / CSV_FILE):
+            with _report_write_errors(self._folder / SWEEP_TABLE_FILE):
                 self._csv = (self._folder / _TEMPORARY_CSV_FILE).open("wb", buffering=0)
             # Another file may be open by then.
             stack.callback(lambda: self._csv.close())
@@ -212,18 +212,22 @@ class Table:
     def _replace_files(self) -> None:
         """Replace the files of an earlier sweep by those of this one, in quick succession."""
         temporary_names = {}
-        with _report_write_errors(self._folder / (PARQUET_FILE if self._has_parquet else CSV_FILE)):
+        with _report_write_errors(
+            self._folder / (SWEEP_PARQUET_FILE if self._has_parquet else SWEEP_TABLE_FILE)
+        ):
             if self._has_parquet:
-                temporary_names[PARQUET_FILE] = _TEMPORARY_PARQUET_FILE
-                self._write_parquet(self._folder / (CSV_FILE if self.is_replaced else _TEMPORARY_CSV_FILE))
+                temporary_names[SWEEP_PARQUET_FILE] = _TEMPORARY_PARQUET_FILE
+                self._write_parquet(
+                    self._folder / (SWEEP_TABLE_FILE if self.is_replaced else _TEMPORARY_CSV_FILE)
+                )
             if not self.is_replaced:
-                temporary_names[CSV_FILE] = _TEMPORARY_CSV_FILE
+                temporary_names[SWEEP_TABLE_FILE] = _TEMPORARY_CSV_FILE
             if self._study is not None and not self._has_study(self._study):
                 temporary_names[STUDY_FILE] = _TEMPORARY_STUDY_FILE
                 (self._folder / _TEMPORARY_STUDY_FILE).write_bytes(self._study)
             written = [self._folder / name for name in temporary_names.values()]
             if self.is_replaced:
-                written.append(self._folder / CSV_FILE)
+                written.append(self._folder / SWEEP_TABLE_FILE)
             flush_to_disk(written)
             for name, temporary_name in temporary_names.items():
                 (self._folder / temporary_name).replace(self._folder / name)
@@ -259,7 +263,7 @@ class Table:
         """Append a line to the CSV file, completely or not at all; show the file when it is long enough."""
         remaining = memoryview(line.encode())
         new_size = self._size + len(remaining)
-        with _report_write_errors(self._folder / CSV_FILE):
+        with _report_write_errors(self._folder / SWEEP_TABLE_FILE):
             try:
                 while remaining:
                     remaining = remaining[self._csv.write(remaining) :]
@@ -276,8 +280,8 @@ class Table:
         """Give the growing CSV file its final name."""
         # Not every system can rename open files.
         self._csv.close()
-        (self._folder / _TEMPORARY_CSV_FILE).replace(self._folder / CSV_FILE)
-        self._csv = (self._folder / CSV_FILE).open("ab", buffering=0)
+        (self._folder / _TEMPORARY_CSV_FILE).replace(self._folder / SWEEP_TABLE_FILE)
+        self._csv = (self._folder / SWEEP_TABLE_FILE).open("ab", buffering=0)
         self._rows_until_shown = math.inf
         self.is_replaced = True
 

@@ -18,6 +18,7 @@ from robocov.controllers.teammates import Teammates
 from robocov.controllers.user_modules import provide_modules
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
+from robocov.files.result_names import COST_FILE, ERROR_FILE, RECORD_FILE, RUN_FILE
 from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
@@ -151,9 +152,9 @@ def _build_files(
     arrays = io.BytesIO()
     np.savez_compressed(arrays, **{name: getattr(thinned_record, name) for name in thinned_record.arrays})
     return {
-        "run.json": format_json(content).encode(),
-        "record.npz": arrays.getvalue(),
-        "cost.csv": format_csv(*build_cost_table(history)).encode(),
+        RUN_FILE: format_json(content).encode(),
+        RECORD_FILE: arrays.getvalue(),
+        COST_FILE: format_csv(*build_cost_table(history)).encode(),
     }
 
 
@@ -185,7 +186,7 @@ def build_failure(message: str, details: str) -> Outcome:
     line = " ".join(message.split()).encode(errors="replace").decode()
     error = line or "no reason was given"
     content = {"error": error, "traceback": details}
-    return Outcome({"error.json": format_json(content).encode()}, {}, error)
+    return Outcome({ERROR_FILE: format_json(content).encode()}, {}, error)
 
 
 def simulate(task: Task) -> Record:

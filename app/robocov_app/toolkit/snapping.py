@@ -1,4 +1,4 @@
-"""Snapping of the pointer to grid, vertices, edges, angles and alignment, never beyond its reach."""
+"""Snapping to grid, vertices, edges, angles and alignment: of the pointer within its reach, and of moves."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ MAX_ALIGNMENT_REACHES = 60.0  # reaches within which marks align: about the widt
 MAX_MOVED_POINTS = 16  # points of dragged objects that may snap
 MAX_EDGE_LINES = 4  # edges near a point that are combined with other lines
 _PARALLEL = 1e-9
+_MIN_SHIFT_M = 1e-9  # a move that is shifted by less along an axis has not snapped along it
 _EDGE_TOLERANCE_M = 1e-9
 
 
@@ -101,6 +102,8 @@ def snap_move(
 ) -> Snap:
     """Snap a move of several points: the one that snaps best decides.
 
+    Along axes without another snap, the first point snaps to the grid, even beyond the reach.
+
     Parameters
     ----------
     points : sequence of Point
@@ -132,7 +135,18 @@ def snap_move(
         if ranked.snap.guides and gap <= settings.reach and (ranked.rank, gap) < best_rank:
             best_rank = (ranked.rank, gap)
             best = Snap(shift, ranked.snap.guides)
-    return best
+    if "grid" not in settings.kinds or settings.grid <= 0.0 or not points:
+        return best
+    return Snap(_snap_remaining_axes(points[0], (dx, dy), best.point, settings.grid), best.guides)
+
+
+def _snap_remaining_axes(first: Point, offset: Point, snapped: Point, grid: float) -> Point:
+    """Snap a point to the grid along the axes along which its displacement has not snapped yet."""
+    shift = list(snapped)
+    for axis in (0, 1):
+        if abs(snapped[axis] - offset[axis]) < _MIN_SHIFT_M:
+            shift[axis] = grid * round((first[axis] + snapped[axis]) / grid) - first[axis]
+    return shift[0], shift[1]
 
 
 def _choose_moved_points(points: Sequence[Point]) -> Sequence[Point]:

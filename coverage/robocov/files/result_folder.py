@@ -19,37 +19,63 @@ from typing import Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, describe_error, quote
 from robocov.files.folder_lock import lock_folder
+from robocov.files.result_names import (
+    COMPARISON_FILE,
+    COMPARISON_TABLE_FILE,
+    COMPARISON_VIDEO_FILE,
+    COST_FIGURE,
+    COST_FILE,
+    FIGURE_SUFFIXES,
+    FRAMES_FOLDER,
+    METRICS_FILE,
+    RECORD_FILE,
+    REPLAY_FILE,
+    REPORT_FILE,
+    RUN_FILE,
+    RUN_VIDEO_FILE,
+    SESSION_FILE,
+    STORY_FILE,
+    TRAJECTORIES_FIGURE,
+)
 from robocov.files.writing import flush_to_disk, replace_file
 
 ResultKind: TypeAlias = Literal["run", "comparison", "replay", "story"]
-REPORT_FILE = "report.html"
-"""Report on a result, which is one of its files."""
 MANIFEST_FILE = ".robocov.json"
 _JOURNAL_FILE = ".robocov-commit.json"
 _STAGING_FOLDER = ".robocov-new"
 _LOCK_FILE = ".robocov.lock"
 _HEADER = {"format": "robocov-folder", "version": 1}
-_METRICS_FILE = "metrics.csv"
-_FRAMES_FOLDER = "frames"
-_FIGURE_FILES = ("trajectories.png", "trajectories.svg", "cost.png", "cost.svg")
+_FIGURE_FILES = tuple(
+    figure + suffix for figure in (TRAJECTORIES_FIGURE, COST_FIGURE) for suffix in FIGURE_SUFFIXES
+)
+_MAIN_FILES: dict[ResultKind, str] = {
+    "comparison": COMPARISON_FILE,
+    "run": RUN_FILE,
+    "replay": REPLAY_FILE,
+    "story": STORY_FILE,
+}
+"""Files that mark a folder as that of a result of each kind."""
 _FILES: dict[ResultKind, tuple[str, ...]] = {
-    "comparison": ("comparison.json", "comparison.csv", "comparison.mp4", *_FIGURE_FILES),
-    "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_FIGURE_FILES),
-    "replay": ("replay.json", "run.mp4", "comparison.mp4"),
-    "story": ("story.json", "session.robocov", "cost.csv", "run.mp4", "comparison.mp4"),
+    "comparison": (COMPARISON_FILE, COMPARISON_TABLE_FILE, COMPARISON_VIDEO_FILE, *_FIGURE_FILES),
+    "run": (RUN_FILE, RECORD_FILE, COST_FILE, RUN_VIDEO_FILE, *_FIGURE_FILES),
+    "replay": (REPLAY_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
+    "story": (STORY_FILE, SESSION_FILE, COST_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
 }
 """Files of a result of each kind, in addition to ``frames/`` and the folders of a comparison's runs."""
 _KNOWN_NAMES = {
     MANIFEST_FILE,
-    _METRICS_FILE,
+    METRICS_FILE,
     REPORT_FILE,
     *(name for names in _FILES.values() for name in names),
 }
 _FRAME_NAME = re.compile(r"\d{6}\.png")
 _FILE_NAME = re.compile(r"(?!\.{1,2}$)[^/\\:\0]+")
 _SIGNATURES = {
-    **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
-    _METRICS_FILE: re.compile(rb"time_s,sensed_area_m2,"),
+    **{
+        main_file: re.compile(rf'"format":\s*"robocov-{kind}"'.encode())
+        for kind, main_file in _MAIN_FILES.items()
+    },
+    METRICS_FILE: re.compile(rb"time_s,sensed_area_m2,"),
     REPORT_FILE: re.compile(rb'<meta name="generator" content="robocov'),
 }
 """Patterns in the first bytes of files that robocov has written."""
@@ -186,7 +212,7 @@ def create_result(
 
 def _list_possible_files(folder: Path, kind: ResultKind, parts: Iterable[str]) -> set[str]:
     """Return the files that a result may have; of the frames, the first one and those that exist."""
-    names = {*_FILES[kind], f"{_FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
+    names = {*_FILES[kind], f"{FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
     for part in parts:
         names.update(f"{part}/{name}" for name in _FILES["run"])
     return names
@@ -407,7 +433,7 @@ def _list_owned_files(folder: Path) -> set[str] | None:
     if kind is None and not os.path.lexists(folder / MANIFEST_FILE):
         return None
     names = {name for name in _FILES[kind or "run"] if _is_file_or_link(folder / name)}
-    names |= {name for name in (_METRICS_FILE, REPORT_FILE) if _has_signature(folder / name, name)}
+    names |= {name for name in (METRICS_FILE, REPORT_FILE) if _has_signature(folder / name, name)}
     if kind == "comparison":
         for part in _list_parts(folder):
             part_names = {*(_list_owned_files(part) or ()), MANIFEST_FILE}
@@ -417,23 +443,23 @@ def _list_owned_files(folder: Path) -> set[str] | None:
 
 def _identify_kind(folder: Path) -> ResultKind | None:
     """Return the kind of the result in a folder without a manifest; None if there is none."""
-    for kind in _FILES:
-        if _has_signature(folder / f"{kind}.json", f"{kind}.json"):
+    for kind, main_file in _MAIN_FILES.items():
+        if _has_signature(folder / main_file, main_file):
             return kind
     return None
 
 
 def _list_frames(folder: Path) -> set[str]:
-    frames = folder / _FRAMES_FOLDER
+    frames = folder / FRAMES_FOLDER
     if frames.is_symlink() or not frames.is_dir():
         return set()
-    return {f"{_FRAMES_FOLDER}/{path.name}" for path in frames.iterdir() if _FRAME_NAME.fullmatch(path.name)}
+    return {f"{FRAMES_FOLDER}/{path.name}" for path in frames.iterdir() if _FRAME_NAME.fullmatch(path.name)}
 
 
 def _list_parts(folder: Path) -> list[Path]:
     """Return the folders of the runs of a comparison without a manifest."""
     try:
-        names = [str(name) for name in json.loads((folder / "comparison.json").read_bytes())["folders"]]
+        names = [str(name) for name in json.loads((folder / COMPARISON_FILE).read_bytes())["folders"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
     # Any other name could lead out of the folder.

@@ -1,7 +1,8 @@
 """Metrics of recorded runs.
 
 - `cost_history`: the coverage cost along a run
-- `motion`: settling, path lengths and stuck robots
+- `settling`: the rule by which a team has settled, and when it did
+- `motion`: path lengths and stuck robots
 - `clearance`: distances to walls and other robots, and contacts
 - `summary`: the summary of a run in ``run.json``
 - `advice`: signs that the parameters of a run are unsuitable
@@ -23,12 +24,12 @@ from robocov.metrics.cost_history import (
     compute_mean_over_run,
     select_sampled_moments,
 )
-from robocov.metrics.motion import (
+from robocov.metrics.motion import compute_path_lengths, count_stuck_robots
+from robocov.metrics.settling import (
     SETTLED_DISTANCE_M,
     SETTLED_WINDOW_S,
-    compute_path_lengths,
-    count_stuck_robots,
     find_settling_time,
+    is_team_at_rest,
 )
 from robocov.metrics.summary import summarize
 
@@ -45,6 +46,7 @@ __all__ = [
     "count_contacts",
     "count_stuck_robots",
     "find_settling_time",
+    "is_team_at_rest",
     "measure_robot_gaps",
     "select_sampled_moments",
     "summarize",

@@ -1,4 +1,4 @@
-"""Motion of a team along a run: settling, path lengths and stuck robots."""
+"""Motion of a team along a run: path lengths and stuck robots."""
 
 from __future__ import annotations
 
@@ -7,60 +7,12 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, compute_point_distances
 from robocov.record import TIME_ROUNDING_S
 
-SETTLED_WINDOW_S = 4.0
-"""Time over which the net displacement of a robot at rest is measured."""
-SETTLED_DISTANCE_M = 0.05
-"""Net displacement in this time below which a robot is at rest."""
-
 STUCK_WINDOW_S = 5.0
 """Time over which the net displacement of a stuck robot is measured."""
 STUCK_DISTANCE_M = 0.05
 """Net displacement in this time below which a robot may be stuck."""
 MIN_STUCK_GOAL_DISTANCE_M = 0.5
 """Distance from its goal above which a robot that does not move is stuck."""
-
-
-def find_settling_time(
-    time: Array,
-    positions: Array,
-    window: float = SETTLED_WINDOW_S,
-    distance: float = SETTLED_DISTANCE_M,
-) -> float | None:
-    """Find when the team came to rest.
-
-    Parameters
-    ----------
-    time : (T,) array, s
-        Evenly spaced.
-    positions : (T, n, 2) array, m
-    window : float, s
-    distance : float, m
-
-    Returns
-    -------
-    float or None
-        Earliest time, s, such that in every window that starts then or later, the net displacement of each
-        robot is below `distance`; None if the team was still moving at the end.
-
-    Notes
-    -----
-    Speed is not a suitable criterion, because a robot may tremble in one place forever.
-
-    Examples
-    --------
-    >>> time = np.arange(0.0, 12.0)
-    >>> x = np.minimum(time, 3.0)
-    >>> find_settling_time(time, np.stack([x, 0.0 * x], axis=1)[:, None, :])
-    3.0
-    """
-    dt = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    window_steps = round(window / dt) if dt > 0 else 0
-    if window_steps == 0 or len(time) <= window_steps:
-        return None
-    displacement = compute_point_distances(positions[window_steps:], positions[:-window_steps])
-    is_moving = np.asarray((displacement >= distance).any(axis=1))
-    first_at_rest = int(np.flatnonzero(is_moving).max(initial=-1)) + 1
-    return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None
 
 
 def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) -> Array:

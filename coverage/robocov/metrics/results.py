@@ -14,6 +14,7 @@ import numpy as np
 
 from robocov.errors import InputError, describe_unknown_name, format_count, quote
 from robocov.files.csv_cells import unquote_cell
+from robocov.files.result_names import COST_FILE, ERROR_FILE, RUNS_FOLDER, STUDY_FILE, SWEEP_TABLE_FILE
 from robocov.metrics.cost_history import CostHistory
 from robocov.optional_imports import import_optional
 from robocov.record import Record
@@ -69,7 +70,7 @@ class Results:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._table = folder / "results.csv"
+        self._table = folder / SWEEP_TABLE_FILE
         self.columns: tuple[str, ...] = tuple(next(_read_lines(self._table), ()))
         if not {"run", "error"} <= set(self.columns):
             raise InputError(f"{self._table}: line 1: expected the header of a table of results")
@@ -84,7 +85,7 @@ class Results:
     @property
     def study(self) -> dict[str, Any]:
         """Content of ``study.json``, which describes the sweep."""
-        path = self.folder / "study.json"
+        path = self.folder / STUDY_FILE
         try:
             return dict(json.loads(path.read_bytes()))
         except (OSError, ValueError, RecursionError) as error:
@@ -185,7 +186,7 @@ class Results:
         InputError
             If there is no such run, or it failed.
         """
-        return read_history(self._find_run_folder(run) / "cost.csv")
+        return read_history(self._find_run_folder(run) / COST_FILE)
 
     def _read_kinds(self) -> dict[str, str]:
         """Return the known kinds of columns: those of every study if ``study.json`` cannot be read."""
@@ -197,12 +198,12 @@ class Results:
 
     def _find_run_folder(self, run: str | int | Mapping[str, Any]) -> Path:
         name = self._find_run_name(run)
-        folder = self.folder / "runs" / name
+        folder = self.folder / RUNS_FOLDER / name
         # A name with a separator could lead out of the folder of the sweep.
         is_plain_name = name != "" and Path(name).name == name
         if not is_plain_name or not folder.is_dir():
             raise InputError(f"{self.folder}: there is no run {quote(name)}")
-        error_file = folder / "error.json"
+        error_file = folder / ERROR_FILE
         if error_file.is_file():
             raise InputError(f"{folder}: the run failed: {_read_error(error_file)}")
         return folder
@@ -256,7 +257,7 @@ def read_results(folder: Path | str) -> Results:
         If it is not the folder of a sweep, or its table cannot be read.
     """
     folder = Path(folder)
-    if not (folder / "results.csv").is_file():
+    if not (folder / SWEEP_TABLE_FILE).is_file():
         raise InputError(f"{folder}: not the folder of a sweep (there is no results.csv)")
     return Results(folder)
 

@@ -7,7 +7,8 @@ from typing import Any
 from robocov.metrics.advice import advise
 from robocov.metrics.clearance import compute_clearances, count_contacts
 from robocov.metrics.cost_history import CostHistory, compute_mean_over_run
-from robocov.metrics.motion import compute_path_lengths, count_stuck_robots, find_settling_time
+from robocov.metrics.motion import compute_path_lengths, count_stuck_robots
+from robocov.metrics.settling import find_settling_time
 from robocov.record import Record
 
 MIN_REPORTED_OFFSET_M = 5e-4

@@ -20,6 +20,7 @@ from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, describe_error, format_count, quote
 from robocov.files.documents import read_document
 from robocov.files.result_folder import complete_commit
+from robocov.files.result_names import RECORD_FILE, RUN_FILE
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
@@ -357,11 +358,11 @@ class Record(Drawable):
         except OSError as error:
             raise OutputError(f"{folder}: cannot be created: {describe_error(error)}") from error
         arrays = {name: getattr(self, name) for name in self.arrays}
-        with replace_file(folder / "record.npz") as temporary, temporary.open("wb") as file:
+        with replace_file(folder / RECORD_FILE) as temporary, temporary.open("wb") as file:
             # Compression would make the file 10 % smaller and take 20 times as long.
             np.savez(file, **arrays)
         text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
-        with replace_file(folder / "run.json") as temporary:
+        with replace_file(folder / RUN_FILE) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
     @classmethod
@@ -385,10 +386,10 @@ class Record(Drawable):
         """
         folder = Path(folder)
         complete_commit(folder)
-        for file in ("run.json", "record.npz"):
+        for file in (RUN_FILE, RECORD_FILE):
             if not (folder / file).is_file():
                 raise InputError(f"{folder}: not the folder of a run (there is no {file})")
-        path = folder / "run.json"
+        path = folder / RUN_FILE
         document = read_document(path, RunDocument, FORMAT, FORMAT_VERSION)
         environment = from_json(document.map, f"{path}: map")
         conditions = None
@@ -399,7 +400,7 @@ class Record(Drawable):
                 conditions.check_team(len(team))
         except ParameterError as error:
             raise InputError(f"{path}: {error}") from error
-        arrays: dict[str, Any] = dict(read_record_arrays(folder / "record.npz", team))
+        arrays: dict[str, Any] = dict(read_record_arrays(folder / RECORD_FILE, team))
         return cls(
             environment=environment,
             team=team,

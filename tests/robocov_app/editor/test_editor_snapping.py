@@ -55,7 +55,13 @@ def test_a_snap_never_moves_farther_than_its_reach_and_tells_why(sketch, point, 
             assert guide.line[-1] == snap.point
         assert guide.label
     moved = snap_move([point, (point[0] + 1.0, point[1])], 0.3, -0.2, targets, snapping)
-    assert math.dist(moved.point, (0.3, -0.2)) <= reach
+    if "grid" in kinds:
+        # Along each axis, a move may snap to the grid beyond the reach.
+        max_shift = max(reach, grid / 2) + 1e-7
+        assert abs(moved.point[0] - 0.3) <= max_shift
+        assert abs(moved.point[1] + 0.2) <= max_shift
+    else:
+        assert math.dist(moved.point, (0.3, -0.2)) <= reach
     if len(kinds) == 1 and snap.guides:
         # what has snapped stays where it is
         assert math.dist(snap_point(snap.point, targets, snapping, origin).point, snap.point) <= 1e-7
@@ -201,6 +207,10 @@ def test_what_is_moved_snaps_with_the_point_that_is_nearest(targets):
     assert snap.point == pytest.approx((-0.5, 0.0))
     assert snap_move(corners, 0.3, 0.2, targets, to()).point == (0.3, 0.2)
     assert snap_move([], 0.3, 0.2, targets, EVERYTHING).point == (0.3, 0.2)
+    # Beyond the reach, the grid still counts along each axis without another snap.
+    snap = snap_move(corners, 0.33, 0.24, targets, to("grid", reach=0.01))
+    assert snap.point == pytest.approx((0.3, 0.2))
+    assert not snap.guides
     many = [(10.0 + math.cos(k), 6.0 + math.sin(k)) for k in range(500)]
     snap = snap_move(many, -4.95, -3.0, targets, to("vertex"))
     assert math.dist(snap.point, (-4.95, -3.0)) <= 0.15

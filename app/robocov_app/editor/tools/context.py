@@ -7,7 +7,7 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Owner, Sketch
 from robocov_app.editor.tools.handles import Handle, list_handles, list_vertex_owners
-from robocov_app.editor.tools.snap_modes import SNAPS
+from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.tools.snap_targets import Dragged, Snapper
 from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.snapping import Snap, SnapSettings, snap_point

@@ -15,7 +15,6 @@ from robocov_app.editor.tools.draw_state import CarriedItems, EditorDrawState
 from robocov_app.editor.tools.handles import Handle, compute_side_position
 from robocov_app.editor.tools.tool import EditorPointerEvent
 from robocov_app.toolkit.geometry import compute_bearing
-from robocov_app.toolkit.snap_targets import SnapTargets
 from robocov_app.toolkit.snapping import Guide, Snap, snap_angle, snap_move
 from robocov_app.toolkit.tool import CursorShape
 
@@ -125,24 +124,10 @@ class MoveDrag(Drag):
         context = self.context
         targets = context.snapper.find_targets(context.sketch, self.selection.owners)
         if targets is not None and not event.ctrl and not event.shift:
-            dx, dy = self._snap_offset(event, (dx, dy), targets)
+            snap = snap_move(self._points, dx, dy, targets, context.build_snap_settings(event.reach))
+            self.guides = snap.guides
+            dx, dy = snap.point
         self._move(dx, dy)
-
-    def _snap_offset(
-        self, event: EditorPointerEvent, offset: tuple[float, float], targets: SnapTargets
-    ) -> tuple[float, float]:
-        """Snap the displacement; along axes without another snap, the first point snaps to the grid."""
-        context = self.context
-        settings = context.build_snap_settings(event.reach)
-        snap = snap_move(self._points, offset[0], offset[1], targets, settings)
-        self.guides = snap.guides
-        snapped = list(snap.point)
-        for axis in (0, 1):
-            has_snapped = abs(snapped[axis] - offset[axis]) >= NO_MOVE_M
-            if not has_snapped and "grid" in context.snaps and self._points:
-                first = self._points[0][axis]
-                snapped[axis] = context.grid * round((first + snapped[axis]) / context.grid) - first
-        return snapped[0], snapped[1]
 
     def _move(self, dx: float, dy: float) -> None:
         self._end = (self._start[0] + dx, self._start[1] + dy)

@@ -9,7 +9,7 @@ from robocov_app.editor.editor import Editor
 from robocov_app.editor.edits import boolean, create, fixes, paths, properties, transform, vertices
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.settings import LAYERS
-from robocov_app.editor.tools.snap_modes import SNAPS
+from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import FAR_STEPS, Edit
 from robocov_app.editor.ui.file_commands import OPEN_SUFFIXES, PICTURE_SUFFIXES, FileCommands

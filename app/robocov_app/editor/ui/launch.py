@@ -18,7 +18,7 @@ from robocov_app.editor.settings import (
     SETTINGS_FILE,
     EditorSettings,
 )
-from robocov_app.editor.tools.snap_modes import SNAPS
+from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui.file_commands import describe_opening, open_or_detect, set_reference_image
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.formats import Importer

@@ -20,7 +20,7 @@ from robocov_app.editor.model.selection import (
 from robocov_app.editor.model.sketch import BOUNDARY, KINDS, Owner
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.settings import LAYERS
-from robocov_app.editor.tools.snap_modes import SNAPS
+from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui.actions import fix_problem, select_owners
 from robocov_app.editor.ui.fields import FIELDS, set_picture_opacity
 from robocov_app.editor.ui.map_facts import list_map_facts

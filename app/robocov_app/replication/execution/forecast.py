@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from robocov.files.result_names import RUNS_FOLDER
 from robocov_app.replication.design import contenders, studies
 from robocov_app.replication.design.contenders import UNTUNED, Contender, build_paper_contenders
 from robocov_app.replication.design.plan import Plan
@@ -114,7 +115,7 @@ def _count_gain_sets(participants: tuple[Contender, ...]) -> int:
 
 
 def _count_runs_left(folder: Path, name: str, study: Study) -> int:
-    finished = list((get_study_folder(folder, name) / "runs").glob("[!.]*"))
+    finished = list((get_study_folder(folder, name) / RUNS_FOLDER).glob("[!.]*"))
     return max(len(study) - len(finished), 0)
 
 
@@ -134,5 +135,5 @@ def _measure_speeds(plan: Plan, *, beyond: bool) -> dict[str, float]:
 
 def is_gain_grid_finished(folder: Path, plan: Plan) -> bool:
     """Return whether all runs of the gain grids of RAPF and RPF are finished."""
-    runs = get_study_folder(folder, "gains") / "runs"
+    runs = get_study_folder(folder, "gains") / RUNS_FOLDER
     return all((runs / task.name).exists() for task in generate_tasks(studies.build_gains_study(plan)))

@@ -19,7 +19,7 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.voronoi import partition
 from robocov_app.figures import arena
-from robocov_app.figures.curves import draw_curves, format_end_label
+from robocov_app.figures.curves import CurveMargins, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, FigurePage, to_plot_color
 from robocov_app.look.colors import mix
@@ -37,6 +37,7 @@ WIDE_PX = 2148
 NARROW_PX = 1050
 """Widths of two columns of a journal (7.16 inches) and of one (3.5 inches)."""
 _COST_HEIGHT_PX = 1050
+_COST_MARGINS = CurveMargins(left=34, top=34, bottom=44, right=34)
 _HIDDEN_M = 0.25
 """Distance from its centroid within which the disc of a robot hides it, on a map of ten meters."""
 _ARRIVED = 0.05
@@ -269,11 +270,7 @@ def draw_costs(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
         (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
     ]
     page = FigurePage((WIDE_PX, _COST_HEIGHT_PX), theme, PAGE_SCALE)
-    edge = 34 * page.scale
-    label_width = max(page.measure_text(format_end_label(curve), bold=True) for curve in curves)
-    width = WIDE_PX - 2 * edge - label_width
-    height = _COST_HEIGHT_PX - edge - 44 * page.scale
-    draw_curves(page.add_axes((edge, edge, width, height)), curves, theme)
+    draw_curves(add_curve_axes(page, curves, _COST_MARGINS), curves, theme)
     return page.figure
 
 

@@ -18,6 +18,7 @@ from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError, quote
 from robocov.files.documents import read_document
 from robocov.files.result_folder import complete_commit
+from robocov.files.result_names import COMPARISON_FILE, RUN_FILE, RUNS_FOLDER, STUDY_FILE
 from robocov.mapfile import from_json
 from robocov.metrics import CostHistory, compute_mean_over_run
 from robocov.metrics.results import read_results
@@ -55,10 +56,10 @@ def load_result(folder: Path) -> ReportedResult:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found, expected the folder of a run, comparison or sweep")
-    if (folder / "study.json").is_file():
+    if (folder / STUDY_FILE).is_file():
         return _load_sweep(folder)
     complete_commit(folder)
-    if not any((folder / name).is_file() for name in ("comparison.json", "run.json")):
+    if not any((folder / name).is_file() for name in (COMPARISON_FILE, RUN_FILE)):
         missing = "(there is no run.json, no comparison.json and no study.json)"
         raise InputError(f"{folder}: not the folder of a run, a comparison or a sweep {missing}")
     return _load_runs(folder)
@@ -69,7 +70,7 @@ def _load_runs(folder: Path) -> ReportedResult:
     kind: ResultKind = "run"
     run_folders = [folder]
     is_unfinished = False
-    path = folder / "comparison.json"
+    path = folder / COMPARISON_FILE
     if path.is_file():
         kind = "comparison"
         document = read_document(path, ComparisonDocument, "robocov-comparison", 1)
@@ -78,7 +79,7 @@ def _load_runs(folder: Path) -> ReportedResult:
     saved_runs: list[SavedRun] = []
     damaged_runs: list[DamagedRun] = []
     for run_folder in run_folders:
-        if is_unfinished and not (run_folder / "run.json").is_file():
+        if is_unfinished and not (run_folder / RUN_FILE).is_file():
             continue
         try:
             saved_run = load_saved_runs(run_folder)[0]
@@ -93,7 +94,7 @@ def _load_runs(folder: Path) -> ReportedResult:
     maps: dict[str, Environment] = {}
     facts: dict[str, Any] = {}
     for saved_run in saved_runs:
-        content = _read_json_object(saved_run.folder / "run.json")
+        content = _read_json_object(saved_run.folder / RUN_FILE)
         run = _build_run(saved_run, content)
         runs.append(run)
         maps.setdefault(run.map, build_roster(saved_run.record).environment)
@@ -120,7 +121,7 @@ def _check_same_map(saved_run: SavedRun, first_run: SavedRun) -> None:
     first_environment = build_roster(first_run.record).environment
     is_same_boundary = environment.boundary == first_environment.boundary
     if not is_same_boundary or environment.obstacles != first_environment.obstacles:
-        path = saved_run.folder / "run.json"
+        path = saved_run.folder / RUN_FILE
         raise InputError(f"{path}: another map than in {first_run.folder.name}")
 
 
@@ -184,7 +185,7 @@ class _SweepStudy:
 def _load_sweep(folder: Path) -> ReportedResult:
     """Load the runs of a sweep from its table."""
     results = read_results(folder)
-    study = _read_study(results.study, folder / "study.json")
+    study = _read_study(results.study, folder / STUDY_FILE)
     rows = list(results.rows())
     if not rows:
         raise InputError(f"{folder}: not one of the {study.run_count} runs of the sweep is done")
@@ -249,7 +250,7 @@ def _build_run_of_row(row: Mapping[str, Any], study: _SweepStudy, folder: Path) 
         gains=_list_gains({name: row.get(get_gain_column(name)) for name in gain_names}),
         figures={name: row.get(name) for name in FIGURE_NAMES} if error is None else {},
         error=None if error is None else replace_unprintable(str(error)),
-        folder=folder / "runs" / Path(str(row["run"])).name,
+        folder=folder / RUNS_FOLDER / Path(str(row["run"])).name,
     )
 
 
@@ -259,7 +260,7 @@ def _read_versions(runs: Iterable[ReportedRun]) -> Any:
         if run.error is not None:
             continue
         try:
-            return _read_json_object(run.folder / "run.json").get("versions")
+            return _read_json_object(run.folder / RUN_FILE).get("versions")
         except InputError:
             continue
     return None

@@ -13,6 +13,7 @@ import numpy as np
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
 from robocov.errors import InputError
+from robocov.files.result_names import COST_FILE, RECORD_FILE
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
 from robocov.record import Record
@@ -233,14 +234,14 @@ class ReportedResult:
             return self.loaded[run.folder].record
         record = Record.load(run.folder)
         if not len(record) or not len(record.team) or not np.isfinite(record.positions).all():
-            raise InputError(f"{run.folder / 'record.npz'}: expected finite positions of robots")
+            raise InputError(f"{run.folder / RECORD_FILE}: expected finite positions of robots")
         return record
 
     def read_history(self, run: ReportedRun) -> CostHistory | None:
         """Read the cost of a run over time; None if it was not saved."""
         if run.folder in self.loaded:
             return self.loaded[run.folder].history
-        path = run.folder / "cost.csv"
+        path = run.folder / COST_FILE
         return read_history(path) if path.exists() else None
 
 

@@ -5,16 +5,16 @@ from pathlib import Path
 from typing import Any
 
 from robocov.errors import InputError, to_one_line
+from robocov.files.result_names import STORY_FILE
 from robocov_app.terminal.output import write_json
 
-BRANCH_FILE = "story.json"
 _FORMAT = "robocov-story"
 _VERSION = 1
 
 
 def write_branch_file(folder: Path, parts: list[dict[str, Any]]) -> None:
     """Write the file that lists the parts of a branch."""
-    write_json(folder / BRANCH_FILE, {"format": _FORMAT, "version": _VERSION, "parts": parts})
+    write_json(folder / STORY_FILE, {"format": _FORMAT, "version": _VERSION, "parts": parts})
 
 
 def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
@@ -35,7 +35,7 @@ def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
     InputError
         If the list is damaged.
     """
-    file = folder / BRANCH_FILE
+    file = folder / STORY_FILE
     try:
         content = json.loads(file.read_bytes())
         if content["format"] != _FORMAT:

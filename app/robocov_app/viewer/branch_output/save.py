@@ -6,6 +6,7 @@ from typing import Any
 
 from robocov.cost import CoverageCost
 from robocov.files.result_folder import ResultFolder
+from robocov.files.result_names import COST_FILE
 from robocov.metrics import summarize
 from robocov.record import Record
 from robocov_app.runs.artifacts import save_comparison, save_figures, start_comparison
@@ -124,7 +125,7 @@ class _BranchWriter:
             header, part_rows = build_cost_table(cost.history)
             for time, *values in part_rows:
                 rows.append((cost.controller, cost.start_time + time, *values))
-        write_csv(self.result.staging / "cost.csv", f"controller,{header}", rows)
+        write_csv(self.result.staging / COST_FILE, f"controller,{header}", rows)
 
     def _write_video(self, parts: list[BranchPart], costs: list[PartCost]) -> None:
         settings = self.settings.video

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
+from robocov.metrics import SETTLED_WINDOW_S, is_team_at_rest
 from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.document import MAX_CACHED_STATES, Node, SessionDocument, replay
 from robocov_app.viewer.session.lockstep import Lockstep
@@ -75,8 +75,7 @@ class Present:
             state = before.states[pane.number]
             if state.setup is not pane.setup:
                 return False
-            displacements = pane.simulation.positions - state.positions
-            if np.hypot(*displacements.T).max() >= SETTLED_DISTANCE_M:
+            if not is_team_at_rest(state.positions, pane.simulation.positions):
                 return False
         return True
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from robocov.controllers import has_memory, inform_controller
 from robocov.errors import InputError
+from robocov.files.result_names import RECORD_FILE
 from robocov.observation import Decision
 from robocov.record import Record
 from robocov_app.runs.saved_runs import SavedRun, build_roster
@@ -110,7 +111,7 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
         even_times = np.arange(len(record)) * record.dt
         elapsed = record.time - record.time[0]
         if not np.allclose(elapsed, even_times, rtol=1e-6, atol=1e-3 * record.dt):
-            file = run.folder / "record.npz"
+            file = run.folder / RECORD_FILE
             raise InputError(f"{file}: time: expected times {record.dt:g} s apart")
         for name, value in _describe_run(record).items():
             if value != first[name]:

@@ -1,0 +1,53 @@
+"""Names of the files and folders in the folder of a result or a sweep.
+
+A run has `RUN_FILE` and `RECORD_FILE`, from which it can be loaded again. The other files are for people and
+other programs: tables, figures, videos and reports.
+"""
+
+RUN_FILE = "run.json"
+"""Scenario of a run, and its summary. The file marks a folder as that of a run."""
+RECORD_FILE = "record.npz"
+"""Arrays of the record of a run."""
+COST_FILE = "cost.csv"
+"""Coverage cost of a run over time; in the folder of a branch, that of all of its parts."""
+METRICS_FILE = "metrics.csv"
+"""Metrics of a run over time."""
+RUN_VIDEO_FILE = "run.mp4"
+"""Video of a single run."""
+
+COMPARISON_FILE = "comparison.json"
+"""Folders and results of the runs of a comparison. The file marks a folder as that of a comparison."""
+COMPARISON_TABLE_FILE = "comparison.csv"
+"""Results of the runs of a comparison as a table."""
+COMPARISON_VIDEO_FILE = "comparison.mp4"
+"""Video of several runs side by side."""
+
+REPLAY_FILE = "replay.json"
+"""Folder of the replayed result. The file marks a folder as that of a rendered replay."""
+
+STORY_FILE = "story.json"
+"""Folders of the parts of a branch. The file marks a folder as that of a branch with several parts."""
+SESSION_FILE = "session.robocov"
+"""Session from which a branch was saved."""
+
+STUDY_FILE = "study.json"
+"""Study of a sweep. The file marks a folder as that of a sweep."""
+SWEEP_TABLE_FILE = "results.csv"
+"""Table of a sweep, with one row per run."""
+SWEEP_PARQUET_FILE = "results.parquet"
+"""The table of a sweep in the format Parquet."""
+RUNS_FOLDER = "runs"
+"""Folder of a sweep that contains the folders of its runs."""
+ERROR_FILE = "error.json"
+"""Error of a run of a sweep that failed; such a run has no `RUN_FILE`."""
+
+TRAJECTORIES_FIGURE = "trajectories"
+"""Figure of the trajectories of one or several runs, without a suffix."""
+COST_FIGURE = "cost"
+"""Figure of the coverage cost of one or several runs over time, without a suffix."""
+FIGURE_SUFFIXES = (".png", ".svg")
+"""Suffixes of each figure's files."""
+FRAMES_FOLDER = "frames"
+"""Folder of the frames of a video, as PNG files."""
+REPORT_FILE = "report.html"
+"""Report on a result."""

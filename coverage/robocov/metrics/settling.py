@@ -1,0 +1,79 @@
+"""Settling of a team: the rule by which it is at rest, and when it came to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, compute_point_distances
+
+SETTLED_WINDOW_S = 4.0
+"""Time over which the net displacement of a robot at rest is measured."""
+SETTLED_DISTANCE_M = 0.05
+"""Net displacement in this time below which a robot is at rest."""
+
+
+def is_team_at_rest(before: Array, after: Array, distance: float = SETTLED_DISTANCE_M) -> BoolArray:
+    """Return whether the net displacement of each robot over a window is below a distance.
+
+    Parameters
+    ----------
+    before, after : (..., n, 2) arrays, m
+        Positions at the start and at the end of the window, `SETTLED_WINDOW_S` by default.
+    distance : float, m
+
+    Returns
+    -------
+    (...) bool array
+
+    Examples
+    --------
+    >>> before = np.zeros((2, 2))
+    >>> bool(is_team_at_rest(before, before + [[0.0, 0.0], [0.01, 0.0]]))
+    True
+    >>> bool(is_team_at_rest(before, before + [[0.0, 0.0], [1.0, 0.0]]))
+    False
+    """
+    is_moving = compute_point_distances(after, before) >= distance
+    return np.asarray(~is_moving.any(axis=-1))
+
+
+def find_settling_time(
+    time: Array,
+    positions: Array,
+    window: float = SETTLED_WINDOW_S,
+    distance: float = SETTLED_DISTANCE_M,
+) -> float | None:
+    """Find when the team came to rest.
+
+    Parameters
+    ----------
+    time : (T,) array, s
+        Evenly spaced.
+    positions : (T, n, 2) array, m
+    window : float, s
+    distance : float, m
+
+    Returns
+    -------
+    float or None
+        Earliest time, s, such that in every window that starts then or later, the net displacement of each
+        robot is below `distance`; None if the team was still moving at the end.
+
+    Notes
+    -----
+    Speed is not a suitable criterion, because a robot may tremble in one place forever.
+
+    Examples
+    --------
+    >>> time = np.arange(0.0, 12.0)
+    >>> x = np.minimum(time, 3.0)
+    >>> find_settling_time(time, np.stack([x, 0.0 * x], axis=1)[:, None, :])
+    3.0
+    """
+    dt = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    window_steps = round(window / dt) if dt > 0 else 0
+    if window_steps == 0 or len(time) <= window_steps:
+        return None
+    is_moving = ~is_team_at_rest(positions[:-window_steps], positions[window_steps:], distance)
+    first_at_rest = int(np.flatnonzero(is_moving).max(initial=-1)) + 1
+    return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None
