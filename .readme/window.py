@@ -16,14 +16,14 @@ from robocov.mapfile import find_map_file, load_map
 from robocov_app.editor.edits.create import add_rectangle
 from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.viewer.launch import HEADLESS_FPS, ViewerLauncher
-from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window.screen_video import copy_pixels
 
 if TYPE_CHECKING:
     from robocov_app.editor.ui.window import EditorWindow
-    from robocov_app.viewer.window import ViewerWindow
+    from robocov_app.viewer.window.window import ViewerWindow
 
 HERE = Path(__file__).parent
 HANDBOOK = HERE.parent / "app/handbook/pictures"

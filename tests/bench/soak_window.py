@@ -15,14 +15,14 @@ import numpy as np
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.toolkit.display import open_display
-from robocov_app.toolkit.window import FPS
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.window.display import open_display
+from robocov_app.toolkit.window.window import FPS
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window.window import ViewerWindow
 
 WARM = 10
 """Minutes until all that is kept is there."""

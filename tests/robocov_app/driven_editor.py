@@ -20,7 +20,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import EditorSettings
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.toolkit.display import open_display
+from robocov_app.toolkit.window.display import open_display
 
 SIZE = (900, 600)
 

@@ -13,18 +13,18 @@ from sample_sessions import HALL, RAPF, start_session
 
 from robocov.environment import Environment
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.toolkit.command import CommandTable
-from robocov_app.toolkit.display import open_display
-from robocov_app.toolkit.input import split_key_name
-from robocov_app.toolkit.page import Widget
-from robocov_app.viewer.commands import list_parameter_commands, list_viewer_commands
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.widgets.page import Widget
+from robocov_app.toolkit.window.display import open_display
+from robocov_app.toolkit.window.input import split_key_name
+from robocov_app.viewer.commands.viewer_commands import list_parameter_commands, list_viewer_commands
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window.screen_video import copy_pixels
+from robocov_app.viewer.window.window import ViewerWindow
 
 SIZE = (900, 600)
 FRAME = 1 / 50

@@ -63,9 +63,9 @@ def played(window, frames: int) -> None:
 def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
     from robocov_app.viewer.launch import ViewerLauncher
-    from robocov_app.viewer.screen_video import copy_pixels
     from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.window.screen_video import copy_pixels
 
     theme, play = SCENES[name]
     session = Session(SessionScenario(load_map("rooms"), robots=4))

@@ -14,8 +14,8 @@ import pygame
 from driven_window import MODIFIERS, build_key_event
 
 from robocov.mapfile import list_bundled_maps, load_map, save_map
-from robocov_app.toolkit.clipboard import Clipboard
-from robocov_app.toolkit.window import BaseWindow
+from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.web import events as page_events
 
 EVENTS_PER_FRAME = 8

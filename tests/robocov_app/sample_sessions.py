@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
-from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.scenario import SessionScenario

@@ -14,15 +14,15 @@ from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Row, measure_in_alternation
 from robocov_app.bench.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.toolkit.display import collect_garbage_rarely, open_display
-from robocov_app.toolkit.window import FPS
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.window.display import collect_garbage_rarely, open_display
+from robocov_app.toolkit.window.window import FPS
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window.window import ViewerWindow
 
 TEAM_SIZES = (6, 50, 200, 1000)
 DRAWING_GOALS_S = {50: 4e-3}

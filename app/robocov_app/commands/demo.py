@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.session import Session
-    from robocov_app.viewer.window import ViewerWindow
+    from robocov_app.viewer.window.window import ViewerWindow
 
 _MAX_CONTROLLERS = 4
 """Maximum number of controllers side by side."""
@@ -92,7 +92,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 def command(options: Arguments) -> int:
     """Run `robocov demo`, and return its exit status."""
     from robocov.kernel_compilation import compile_in_background
-    from robocov_app.toolkit.termination import ending_on_signals
+    from robocov_app.toolkit.window.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
 
     prepare(options, options.folder)
@@ -255,7 +255,7 @@ def _draw_frames(
 ) -> Iterator[Frame]:
     """Draw frames of the window, until the count, the end of the tour, or an interruption."""
     from robocov_app.viewer.launch import HEADLESS_FPS
-    from robocov_app.viewer.screen_video import copy_pixels
+    from robocov_app.viewer.window.screen_video import copy_pixels
 
     for number in range(1, count + 1):
         is_tour_over = is_whole_tour and window.lesson.player is None

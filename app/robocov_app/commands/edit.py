@@ -54,7 +54,7 @@ class Arguments(WindowOptions):
 def command(options: Arguments) -> int:
     """Run `robocov edit`, and return its exit status."""
     from robocov.kernel_compilation import compile_in_background
-    from robocov_app.toolkit.termination import ending_on_signals
+    from robocov_app.toolkit.window.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
 
     prepare(options, options.folder)
@@ -116,7 +116,7 @@ def _save_screenshot(window: EditorWindow, path: Path, page: str) -> None:
     """Draw the window with a page of its panel, and save it as PNG."""
     from robocov.files.writing import replace_file
     from robocov_app.runs.encoding import encode_png
-    from robocov_app.viewer.screen_video import copy_pixels
+    from robocov_app.viewer.window.screen_video import copy_pixels
 
     window.panel.show_tab(page)
     window.editor.message = ""

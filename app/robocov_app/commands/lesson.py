@@ -33,7 +33,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> int:
     """Run `robocov lesson`, and return its exit status."""
     from robocov.kernel_compilation import compile_kernels
-    from robocov_app.viewer.lessons import check_lesson, load_lesson
+    from robocov_app.viewer.lessons.player import check_lesson, load_lesson
 
     saved = load_lesson(options.file)
     assert saved.lesson is not None

@@ -74,7 +74,7 @@ def command(options: Arguments) -> int:
     if options.is_headless:
         return _replay(options)
     from robocov.kernel_compilation import compile_in_background
-    from robocov_app.toolkit.termination import ending_on_signals
+    from robocov_app.toolkit.window.termination import ending_on_signals
 
     with ending_on_signals(), compile_in_background():
         return _replay(options)

@@ -20,8 +20,8 @@ from robocov_app.editor.tools.snap_targets import count_vertices
 from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.editor.tools.toolbox import EditorToolbox
 from robocov_app.jobs.workers import Worker
-from robocov_app.toolkit.clipboard import Clipboard
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
+from robocov_app.toolkit.window.clipboard import Clipboard
 
 MAX_LIVE_VERTICES = 1500  # larger maps are not measured while something is dragged
 GRIDS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)

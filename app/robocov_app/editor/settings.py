@@ -6,7 +6,7 @@ from pydantic import Field
 
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov_app.editor.tools.snap_switches import SNAPS
-from robocov_app.toolkit.window_settings import WindowSettings
+from robocov_app.toolkit.window.window_settings import WindowSettings
 
 SETTINGS_FILE = "editor.json"
 MAX_RECENT = 10  # recent maps

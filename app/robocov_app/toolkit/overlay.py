@@ -10,7 +10,7 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
 from robocov_app.render.surface_cache import cache_surfaces
-from robocov_app.toolkit.layout import Box
+from robocov_app.toolkit.window.layout import Box
 
 _FINE = 4
 """Factor by which rounded boxes are drawn larger, and then smoothly reduced."""

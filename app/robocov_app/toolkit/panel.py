@@ -7,10 +7,10 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov_app.look.theme import LIGHT, Theme
-from robocov_app.toolkit.command import CommandTable
-from robocov_app.toolkit.layout import Layout
-from robocov_app.toolkit.tool import Toolbox
-from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.tools.tool import Toolbox
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.layout import Layout
 
 PanelPage: TypeAlias = Callable[[Ui], None]
 """Shows and edits the content of a page."""

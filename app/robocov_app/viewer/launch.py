@@ -15,18 +15,18 @@ from robocov_app.storage.settings import (
     load_settings,
 )
 from robocov_app.terminal.output import echo
-from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
-from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.layout import MIN_SIZE_PX
-from robocov_app.toolkit.window_settings import WindowSettings, limit_window_size
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
+from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.layout import MIN_SIZE_PX
+from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import ViewerWindow
-from robocov_app.viewer.window_dialogs import build_lesson_offer
+from robocov_app.viewer.window.dialogs import build_lesson_offer
+from robocov_app.viewer.window.window import ViewerWindow
 
 NO_DISPLAY = (
     "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR "

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable
 from robocov.controllers import CONTROLLERS
 from robocov.environment import Environment
 from robocov.errors import RobocovError
-from robocov_app.toolkit.window_model import WindowModel
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.window.window_model import WindowModel
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.pane import Pane

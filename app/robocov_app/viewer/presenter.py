@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from robocov_app.viewer.comparison_actions import ComparisonActions
-from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.file_actions import FileActions
+from robocov_app.viewer.actions.comparison import ComparisonActions
+from robocov_app.viewer.actions.files import FileActions
+from robocov_app.viewer.actions.playback import PlaybackActions
+from robocov_app.viewer.actions.robots import RobotActions
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.model import ViewerModel
-from robocov_app.viewer.playback_actions import PlaybackActions
-from robocov_app.viewer.robot_actions import RobotActions
 from robocov_app.viewer.session.session import Session
 
 

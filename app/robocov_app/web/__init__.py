@@ -11,7 +11,7 @@ from robocov.optional_imports import import_optional
 from robocov_app.terminal.output import echo
 
 if TYPE_CHECKING:
-    from robocov_app.toolkit.window import BaseWindow
+    from robocov_app.toolkit.window.window import BaseWindow
 
 
 def prepare(options: Any, folder: Path) -> None:
@@ -57,7 +57,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         window.run()
         return
     from robocov_app.terminal.interruption import unblock_interrupts
-    from robocov_app.toolkit.termination import ending_on_signals, is_ending
+    from robocov_app.toolkit.window.termination import ending_on_signals, is_ending
     from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
 

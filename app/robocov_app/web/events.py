@@ -8,7 +8,7 @@ import pygame
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter
 from pygame.event import Event
 
-from robocov_app.toolkit.clipboard import Clipboard
+from robocov_app.toolkit.window.clipboard import Clipboard
 
 MIN_PAGE_SIDE_PX = 200
 MAX_PAGE_SIDE_PX = 7680

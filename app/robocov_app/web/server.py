@@ -22,7 +22,7 @@ import numpy as np
 import pygame
 
 from robocov.errors import InputError
-from robocov_app.toolkit.clipboard import Clipboard
+from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.web import events
 from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-    from robocov_app.toolkit.window import BaseWindow
+    from robocov_app.toolkit.window.window import BaseWindow
 
 MAX_COPIED_CHARACTERS = 100_000
 """Maximum length of the text in the clipboard that the controlling page gets."""

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov_app.toolkit.clipboard import Clipboard
+from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.web.events import EventTranslator, InputMessage, PageChanged, Uploaded, get_modifiers
 
 if TYPE_CHECKING:
-    from robocov_app.toolkit.window import BaseWindow
+    from robocov_app.toolkit.window.window import BaseWindow
 
 MAX_WAITING_MESSAGES = 5000
 """Beyond this number of messages, the server reads no more of them until the window has caught up."""

@@ -14,7 +14,7 @@ from robocov_app.cli import main
 from robocov_app.runs.artifacts import start_comparison
 from robocov_app.terminal.output import write_csv
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window.window import ViewerWindow
 
 EMPTY = replace(HALL, obstacles=())
 SMALL = ("--size", "480x320", "--fps", "10", "--film-speed", "1")

@@ -8,7 +8,7 @@ from robocov.errors import ParameterError
 from robocov_app.commands import cost, demo, optimum
 from robocov_app.commands.options import RunOptions, VideoOptions
 from robocov_app.terminal.arguments import parse_gains
-from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.costs.costs import Costs
 
 SQUARE = Environment("square", ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)))
 

@@ -13,7 +13,7 @@ from robocov_app.editor.model.background import (
     level_background,
     scale_to_length,
 )
-from robocov_app.toolkit.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
 

@@ -15,8 +15,8 @@ from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.ui.commands import GROUPS
 from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS, list_typed_commands
+from robocov_app.toolkit.commands.palette import list_options
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.toolkit.palette import list_options
 
 LOW = PolygonObstacle(((1, 1), (4, 1), (4, 4), (1, 4)))
 HIGH = PolygonObstacle(((3, 3), (6, 3), (6, 6), (3, 6)))

@@ -28,7 +28,7 @@ from robocov_app.editor.model.hit_test import find_in_box, find_owners
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch, dump_sketch
-from robocov_app.toolkit.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5, "pillar")

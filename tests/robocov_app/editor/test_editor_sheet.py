@@ -23,8 +23,8 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.camera import Camera
-from robocov_app.toolkit.display import open_display
-from robocov_app.viewer.screen_video import copy_pixels
+from robocov_app.toolkit.window.display import open_display
+from robocov_app.viewer.window.screen_video import copy_pixels
 
 SIZE = (420, 360)
 BOX = (10.0, 30.0, 400.0, 300.0)

@@ -12,8 +12,8 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.model.selection import Vertex, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 from robocov_app.editor.tools.snap_targets import collect_snap_targets
-from robocov_app.toolkit.snap_targets import SnapTargets
-from robocov_app.toolkit.snapping import KINDS, SnapSettings, snap_angle, snap_move, snap_point
+from robocov_app.toolkit.tools.snap_targets import SnapTargets
+from robocov_app.toolkit.tools.snapping import KINDS, SnapSettings, snap_angle, snap_move, snap_point
 
 BOX = PolygonObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0), (1.0, 3.0)))
 PILLAR = CircleObstacle((7.03, 5.04), 0.51)

@@ -20,7 +20,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import format_position, translate_message
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
-from robocov_app.toolkit.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)

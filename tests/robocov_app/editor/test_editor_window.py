@@ -16,11 +16,11 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.fields import format_number
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import EditorPanel
-from robocov_app.toolkit import help_page
-from robocov_app.toolkit.clipboard import Clipboard
+from robocov_app.toolkit.commands import help_page
+from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.toolkit.layout import MIN_SIZE_PX
-from robocov_app.toolkit.menu import Menu
+from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)

@@ -20,7 +20,7 @@ from robocov_app.render.annotations import STRIP_HEIGHT_PX
 from robocov_app.render.camera import Camera
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.toolkit.layout import build_layout
+from robocov_app.toolkit.window.layout import build_layout
 
 pytestmark = MARKS
 

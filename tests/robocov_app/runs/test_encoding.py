@@ -21,7 +21,7 @@ from robocov_app.commands.options import VideoOptions
 from robocov_app.runs.encoding import encode_png, find_encoder, save_frames_and_video, save_video
 from robocov_app.runs.frames import draw_frames, select_frame_rows
 from robocov_app.runs.settings import VideoSettings
-from robocov_app.viewer.screen_video import ScreenVideo
+from robocov_app.viewer.window.screen_video import ScreenVideo
 
 
 def plain(count, width=64, height=48):

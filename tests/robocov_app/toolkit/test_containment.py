@@ -14,13 +14,13 @@ from sample_sessions import start_session
 
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
-from robocov_app.toolkit import faults
-from robocov_app.toolkit.clipboard import Clipboard
-from robocov_app.toolkit.display import open_display, set_title
-from robocov_app.toolkit.faults import LOG_FILE, FaultLog
-from robocov_app.toolkit.input import clean_event
-from robocov_app.toolkit.text_edit import MAX_CHARS, TextEdit
-from robocov_app.toolkit.window import BaseWindow
+from robocov_app.toolkit.widgets.text_edit import MAX_CHARS, TextEdit
+from robocov_app.toolkit.window import faults
+from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.display import open_display, set_title
+from robocov_app.toolkit.window.faults import LOG_FILE, FaultLog
+from robocov_app.toolkit.window.input import clean_event
+from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.viewer.session.session import Session
 from robocov_app.web.events import MESSAGES, EventTranslator
 

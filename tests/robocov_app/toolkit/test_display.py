@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from robocov.errors import InputError
-from robocov_app.toolkit.display import open_display
+from robocov_app.toolkit.window.display import open_display
 
 
 @pytest.mark.parametrize("previous", [None, "x11"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robocov_app.toolkit.drawn_outline import DrawnOutline
+from robocov_app.toolkit.tools.drawn_outline import DrawnOutline
 
 
 def press_points(outline: DrawnOutline, *points: tuple[float, float]) -> list[bool]:

@@ -19,7 +19,7 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.map_draft import find_recoverable
 from robocov_app.editor.model.selection import Selection
 from robocov_app.jobs.workers import LatestWorker
-from robocov_app.toolkit.input import get_wheel_notches
+from robocov_app.toolkit.window.input import get_wheel_notches
 
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links")
 

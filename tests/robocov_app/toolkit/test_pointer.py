@@ -5,9 +5,9 @@ from __future__ import annotations
 import pygame
 import pytest
 
-from robocov_app.toolkit.input import DOUBLE_CLICK_S
 from robocov_app.toolkit.panel import SidePanel
-from robocov_app.toolkit.pointer import Gesture, PanGesture, Pointer
+from robocov_app.toolkit.tools.pointer import Gesture, PanGesture, Pointer
+from robocov_app.toolkit.window.input import DOUBLE_CLICK_S
 
 
 class RecordedPointer(Pointer):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robocov_app.toolkit.dialogs import create_recovery_question
-from robocov_app.toolkit.display import choose_scale
-from robocov_app.toolkit.window_settings import WindowSettings, limit_window_size
+from robocov_app.toolkit.window.display import choose_scale
+from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
 
 
 @pytest.mark.parametrize(

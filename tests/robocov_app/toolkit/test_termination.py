@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from robocov_app.storage.autosave import find_drafts
-from robocov_app.toolkit.termination import ending_on_signals, is_ending
+from robocov_app.toolkit.window.termination import ending_on_signals, is_ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals")
 
@@ -23,7 +23,7 @@ PROGRAM = """
 import sys, time
 from pathlib import Path
 from robocov_app.storage.autosave import Autosaver
-from robocov_app.toolkit.termination import ending_on_signals, is_ending
+from robocov_app.toolkit.window.termination import ending_on_signals, is_ending
 
 def be_busy():
     # Like a compiler, this never checks whether it has to end.

@@ -9,8 +9,8 @@ import pytest
 from driven_window import open_viewer
 from PIL import Image
 
-from robocov_app.toolkit.display import open_display
-from robocov_app.toolkit.window import CALM_S, BaseWindow
+from robocov_app.toolkit.window.display import open_display
+from robocov_app.toolkit.window.window import CALM_S, BaseWindow
 
 
 class Counting(BaseWindow):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from robocov_app.toolkit.command import split_command
-from robocov_app.toolkit.input import format_key
-from robocov_app.toolkit.layout import build_layout, find_max_scale, is_inside
+from robocov_app.toolkit.commands.command import split_command
+from robocov_app.toolkit.window.input import format_key
+from robocov_app.toolkit.window.layout import build_layout, find_max_scale, is_inside
 
 
 def test_the_panel_is_to_the_right_of_the_arena() -> None:

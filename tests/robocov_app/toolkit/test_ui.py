@@ -12,11 +12,11 @@ from driven_window import open_viewer
 
 from robocov.errors import InputError
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.toolkit.command import Argument, Command, CommandTable
+from robocov_app.toolkit.commands.command import Argument, Command, CommandTable
+from robocov_app.toolkit.commands.menu import Menu
+from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, create_file_choice
-from robocov_app.toolkit.menu import Menu
-from robocov_app.toolkit.palette import create_palette
-from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.ui import Ui
 
 KEYS = {"return": pygame.K_RETURN, "tab": pygame.K_TAB, "escape": pygame.K_ESCAPE, "left": pygame.K_LEFT}
 KEYS |= {"up": pygame.K_UP, "down": pygame.K_DOWN, "backspace": pygame.K_BACKSPACE, "space": pygame.K_SPACE}

@@ -15,9 +15,9 @@ from random_events import RandomEvents
 from robocov.environment import Environment
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.model.history import UndoHistory
-from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.window import BaseWindow
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.window import BaseWindow
+from robocov_app.viewer.costs.costs import Costs
 
 EVENTS = 3_000
 FEW_EVENTS = 150

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robocov.errors import MapError
-from robocov_app.toolkit.window_model import MESSAGE_S, WindowModel
+from robocov_app.toolkit.window.window_model import MESSAGE_S, WindowModel
 
 
 class PatientModel(WindowModel):

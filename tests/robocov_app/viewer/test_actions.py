@@ -16,12 +16,12 @@ from pointer_events import build_event
 import robocov_app.viewer as package
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.toolkit.command import Command, find_commands
-from robocov_app.toolkit.input import format_key
-from robocov_app.viewer.commands import GROUPS, list_viewer_commands
+from robocov_app.toolkit.commands.command import Command, find_commands
+from robocov_app.toolkit.window.input import format_key
+from robocov_app.viewer.commands.viewer_commands import GROUPS, list_viewer_commands
 from robocov_app.viewer.inspection import Inspection
-from robocov_app.viewer.lesson_guide import COMMANDS_WITHIN_LESSON
-from robocov_app.viewer.panel import ViewerPanel
+from robocov_app.viewer.lessons.guide import COMMANDS_WITHIN_LESSON
+from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.tools.toolbox import ViewerToolbox
 
 TITLES = {layer.name: layer.title for layer in build_standard_layers()}

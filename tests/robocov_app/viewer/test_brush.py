@@ -15,7 +15,7 @@ from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
 from robocov_app.render.density_shading import compute_density_range
-from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.map_edits import (
     MAX_PAINTED_DENSITY,
     MIN_PAINTED_DENSITY,

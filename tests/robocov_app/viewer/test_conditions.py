@@ -20,7 +20,7 @@ from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import load_saved_runs
-from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.pane import Continuation
 from robocov_app.viewer.session.recorded import build_replay_session

@@ -14,8 +14,8 @@ from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov_app.jobs.workers import DirectWorker
 from robocov_app.render.distance_field import DistanceField
-from robocov_app.viewer import costs as module
-from robocov_app.viewer.costs import Costs, CostService
+from robocov_app.viewer.costs import costs as module
+from robocov_app.viewer.costs.costs import Costs, CostService
 
 POSITIONS = np.array([[1.0, 1.0], [5.0, 3.0]])
 OTHER_POSITIONS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])

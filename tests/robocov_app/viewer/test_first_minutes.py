@@ -16,12 +16,12 @@ from robocov_app.render.fonts import measure_text
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, load_settings
 from robocov_app.toolkit.dialogs import Choice, Question
-from robocov_app.toolkit.display import open_display
+from robocov_app.toolkit.window.display import open_display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import ViewerLauncher, ViewerSettings
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.files.workspace import SessionWorkspace, find_recoverable_drafts
-from robocov_app.viewer.status import describe_cursor, list_facts, suggest_actions
+from robocov_app.viewer.window.status import describe_cursor, list_facts, suggest_actions
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))
 

@@ -14,9 +14,9 @@ from driven_window import KEYS, MODIFIERS, Driver, open_viewer, run_text
 from sample_sessions import RAPF, RPF, compute_penetration
 
 from robocov.environment import Environment
-from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.scenario import MAX_PANES
-from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window.window import ViewerWindow
 
 EVENTS = 5_000
 EVENTS_PER_FRAME = 10

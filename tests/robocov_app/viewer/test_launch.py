@@ -20,7 +20,7 @@ from sample_sessions import start_session
 from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, build_session
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
+from robocov_app.toolkit.window.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.viewer.launch import NO_DISPLAY, ViewerLauncher
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 

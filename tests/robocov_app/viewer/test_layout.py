@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.toolkit.layout import (
+from robocov_app.toolkit.window.layout import (
     MIN_PORTRAIT_SIZE_PX,
     MIN_SIZE_PX,
     Box,

@@ -15,8 +15,8 @@ from sample_sessions import advance_session, start_session
 from robocov.errors import MapError
 from robocov_app.cli import main
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
-from robocov_app.viewer import lessons
-from robocov_app.viewer.lessons import BASE_LAYERS, check_lesson, load_lesson
+from robocov_app.viewer.lessons import player
+from robocov_app.viewer.lessons.player import BASE_LAYERS, check_lesson, load_lesson
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session
 from robocov_app.viewer.session.session import Session
 
@@ -98,7 +98,7 @@ def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsy
         driver.frames(2)
         assert lesson.state == "ended"
         assert lesson.lines == ["✗ Not quite. Correct: Much", "So it is.", "Well done."]
-        lesson.advance(lessons.READING_S)
+        lesson.advance(player.READING_S)
         assert lesson.state == "ended"
         assert not lesson.is_done, "there is something to read"
         driver.key("space")
@@ -208,7 +208,7 @@ def test_answers_use_the_controller_names_of_the_window() -> None:
 
 
 def test_an_unattended_lesson_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lessons, "READING_S", 0.1)
+    monkeypatch.setattr(player, "READING_S", 0.1)
     with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = True
         driver.window.lesson.start(write_short_lesson(tmp_path))

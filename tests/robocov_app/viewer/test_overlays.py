@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.render.fonts import measure_text
-from robocov_app.toolkit import help_page
+from robocov_app.toolkit.commands import help_page
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.viewer.commands import GROUPS
-from robocov_app.viewer.screen_video import copy_pixels
+from robocov_app.viewer.commands.viewer_commands import GROUPS
+from robocov_app.viewer.window.screen_video import copy_pixels
 
 
 @given(st.text(st.characters(whitelist_categories=("Ll", "Zs")), max_size=80), st.integers(60, 300))

@@ -13,7 +13,7 @@ from robocov.controllers import IndividualControllerAdapter
 from robocov.controllers.gains import Gain, gain, get_gains
 from robocov.errors import ParameterError
 from robocov.team import UNITS
-from robocov_app.viewer.parameters import (
+from robocov_app.viewer.panel.parameters import (
     NumberParameter,
     OptionParameter,
     list_gain_parameters,

@@ -13,8 +13,8 @@ from sample_sessions import RAPF, RPF, build_presenter, describe_state, start_se
 
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.window_model import MESSAGE_S
-from robocov_app.viewer.costs import Costs
+from robocov_app.toolkit.window.window_model import MESSAGE_S
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.model import simplify_message
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import MAX_ROBOTS

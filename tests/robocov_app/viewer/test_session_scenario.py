@@ -12,7 +12,7 @@ from sample_sessions import HALL, LLOYD, RAPF, RPF
 from robocov.controllers import make_controller
 from robocov.errors import ParameterError, StartError
 from robocov.team import Team
-from robocov_app.viewer.parameters import list_limit_parameters, replace_limit
+from robocov_app.viewer.panel.parameters import list_limit_parameters, replace_limit
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import MAX_PANES, MAX_ROBOTS, SessionScenario

@@ -5,10 +5,10 @@ import pygame
 import pytest
 
 from robocov_app.look.theme import THEMES
-from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.sentences import ReportLine
-from robocov_app.viewer.panel import show_report
+from robocov_app.viewer.panel.panel import show_report
 
 SIZE = (320, 300)
 ARROWS = 33

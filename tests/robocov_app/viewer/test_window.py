@@ -15,7 +15,7 @@ from sample_sessions import RAPF, start_session
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.viewer.launch import ViewerLauncher
-from robocov_app.viewer.status import describe_cursor
+from robocov_app.viewer.window.status import describe_cursor
 
 # playing
 

@@ -13,9 +13,9 @@ from driven_window import MIDDLE, Driver, open_viewer, resize_window
 from sample_sessions import RAPF, RPF
 
 from robocov.controllers import CONTROLLERS
-from robocov_app.toolkit.input import DOUBLE_CLICK_S, KEY_REPEAT_MS
-from robocov_app.toolkit.tool_tip import TIP_DELAY_S
-from robocov_app.viewer.panel import ViewerPanel, label_controllers
+from robocov_app.toolkit.widgets.tool_tip import TIP_DELAY_S
+from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, KEY_REPEAT_MS
+from robocov_app.viewer.panel.panel import ViewerPanel, label_controllers
 
 # the panel
 

@@ -24,8 +24,8 @@ from robocov.compiled import open_cache_folder
 from robocov.errors import InputError, RobocovError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
-from robocov_app.toolkit.clipboard import Clipboard
-from robocov_app.toolkit.input import get_key_name
+from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.input import get_key_name
 from robocov_app.web.confined import OutsideError, confine_files
 from robocov_app.web.events import (
     MAX_UPLOAD_BYTES,

@@ -31,8 +31,8 @@ from robocov_app.render.density_text import describe_density_range
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.render.layers.density import build_density_entry
 from robocov_app.render.surface_cache import LatestValue
-from robocov_app.toolkit.layout import Layout, is_inside
-from robocov_app.toolkit.viewport import zoom_about
+from robocov_app.toolkit.tools.viewport import zoom_about
+from robocov_app.toolkit.window.layout import Layout, is_inside
 
 # Lengths in pixels at scale 1.
 MARGIN_PX = 26.0  # around the map when all of it is shown

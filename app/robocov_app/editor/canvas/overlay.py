@@ -25,7 +25,7 @@ from robocov_app.render import sprites
 from robocov_app.render.camera import MAX_PIXEL
 from robocov_app.render.canvas import Canvas, TextAnchor
 from robocov_app.toolkit.overlay import draw_tag
-from robocov_app.toolkit.snapping import Guide
+from robocov_app.toolkit.tools.snapping import Guide
 
 # Lengths in pixels at scale 1.
 HANDLE_HALF_PX = 3.5  # half the side of a handle

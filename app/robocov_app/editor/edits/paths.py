@@ -14,7 +14,7 @@ from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import check_point, compute_center, to_array
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.toolkit.geometry import find_nearest_on_edges
+from robocov_app.toolkit.tools.geometry import find_nearest_on_edges
 
 PathEdit: TypeAlias = Callable[[ObstaclePath], ObstaclePath | None]
 DEFAULT_SPEED_M_S = 0.5

@@ -20,7 +20,7 @@ from robocov_app.editor.model.background import rotate_background
 from robocov_app.editor.model.geometry import Box, compute_center, enclose_boxes, round_length
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
-from robocov_app.toolkit.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 Side: TypeAlias = Literal["left", "center", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]

@@ -14,7 +14,7 @@ from robocov.errors import MapError
 from robocov.mapfile.models import to_json_value
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import compute_levelling_angle
-from robocov_app.toolkit.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 MAX_PIXELS = 64_000_000
 DEFAULT_WIDTH_M = 20.0

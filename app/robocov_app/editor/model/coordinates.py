@@ -10,7 +10,7 @@ from robocov.environment import Point
 from robocov.errors import MapError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.toolkit.geometry import compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_cos_sin
 
 _METRIC_UNITS = {"": 1.0, "m": 1.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
 _INCH_M = 0.0254

@@ -13,7 +13,7 @@ from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.toolkit.geometry import compute_bearing, compute_cos_sin
+from robocov_app.toolkit.tools.geometry import compute_bearing, compute_cos_sin
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
 SHIFT_ANGLE_DEG = 15.0  # degrees: with Shift, lines are drawn at multiples of this

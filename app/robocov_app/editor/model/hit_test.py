@@ -11,7 +11,7 @@ from robocov.environment import DiscStart, Point, PointsStart, StartSpec
 from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.selection import Edge, Selection, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
-from robocov_app.toolkit.geometry import find_nearest_on_edges
+from robocov_app.toolkit.tools.geometry import find_nearest_on_edges
 
 MANY_OBJECTS = 8  # of more objects, only those near the point are searched
 

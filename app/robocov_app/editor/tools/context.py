@@ -10,8 +10,8 @@ from robocov_app.editor.tools.handles import Handle, list_handles, list_vertex_o
 from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.tools.snap_targets import Dragged, Snapper
 from robocov_app.render.surface_cache import LatestValue
-from robocov_app.toolkit.snapping import Snap, SnapSettings, snap_point
-from robocov_app.toolkit.window_model import WindowModel
+from robocov_app.toolkit.tools.snapping import Snap, SnapSettings, snap_point
+from robocov_app.toolkit.window.window_model import WindowModel
 
 SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a line that is far off must not win over the grid
 

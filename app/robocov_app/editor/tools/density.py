@@ -14,7 +14,7 @@ from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
-from robocov_app.toolkit.tool import CursorShape
+from robocov_app.toolkit.tools.tool import CursorShape
 
 DEFAULT_WEIGHT = 4.0  # of a new feature, until another weight is typed
 MIN_SIGMA_M = 0.02

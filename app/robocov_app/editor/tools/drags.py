@@ -14,9 +14,9 @@ from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import CarriedItems, EditorDrawState
 from robocov_app.editor.tools.handles import Handle, compute_side_position
 from robocov_app.editor.tools.tool import EditorPointerEvent
-from robocov_app.toolkit.geometry import compute_bearing
-from robocov_app.toolkit.snapping import Guide, Snap, snap_angle, snap_move
-from robocov_app.toolkit.tool import CursorShape
+from robocov_app.toolkit.tools.geometry import compute_bearing
+from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_move
+from robocov_app.toolkit.tools.tool import CursorShape
 
 MANY_POINTS = 1000  # of more vertices, a picture is moved instead of the obstacles
 MAX_SNAPPING_POINTS = 60  # of the vertices that are moved, about so many can snap

@@ -15,7 +15,7 @@ from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
-from robocov_app.toolkit.drawn_outline import SAME_POINT_M, DrawnOutline
+from robocov_app.toolkit.tools.drawn_outline import SAME_POINT_M, DrawnOutline
 
 CLOSING_FRACTION = 0.7  # of the pointer's reach, within which a click on the first point closes the outline
 

@@ -7,7 +7,7 @@ from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Owner, Sketch
 from robocov_app.editor.tools.handles import Handle
-from robocov_app.toolkit.tool import DrawState
+from robocov_app.toolkit.tools.tool import DrawState
 
 
 @dataclass(frozen=True)

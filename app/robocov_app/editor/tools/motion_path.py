@@ -10,7 +10,7 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
-from robocov_app.toolkit.tool import CursorShape
+from robocov_app.toolkit.tools.tool import CursorShape
 
 WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach, within which a waypoint is taken
 LEG_REACH_FRACTION = 0.5  # of the pointer's reach, within which a click inserts into a leg

@@ -11,7 +11,7 @@ from robocov_app.editor.tools.drags import BoxDrag, Drag, MoveDrag, ScaleDrag, T
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.handles import Handle, find_handle
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
-from robocov_app.toolkit.tool import CursorShape
+from robocov_app.toolkit.tools.tool import CursorShape
 
 HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach, within which a handle or an edge is taken
 OBJECT_REACH_FRACTION = 0.5  # of the pointer's reach, within which an object is taken

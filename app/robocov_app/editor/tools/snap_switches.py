@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from robocov_app.toolkit.snapping import SnapKind
+from robocov_app.toolkit.tools.snapping import SnapKind
 
 
 class SnapMode(NamedTuple):

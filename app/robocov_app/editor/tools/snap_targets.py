@@ -13,7 +13,7 @@ from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.sketch import Owner, Sketch, build_geometry
 from robocov_app.render.surface_cache import LatestValue
-from robocov_app.toolkit.snap_targets import Edges, SnapTargets, list_outline_edges
+from robocov_app.toolkit.tools.snap_targets import Edges, SnapTargets, list_outline_edges
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
 MANY_VERTICES = 1500  # vertices of a map from which on the window does not wait for its targets

@@ -8,8 +8,8 @@ from robocov_app.editor.model.geometry import constrain_angle
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import EditorDrawState
-from robocov_app.toolkit.snapping import Guide
-from robocov_app.toolkit.tool import PointerEvent, Tool
+from robocov_app.toolkit.tools.snapping import Guide
+from robocov_app.toolkit.tools.tool import PointerEvent, Tool
 
 
 @dataclass(frozen=True)

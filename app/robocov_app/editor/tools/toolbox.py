@@ -16,7 +16,7 @@ from robocov_app.editor.tools.motion_path import MotionPathTool
 from robocov_app.editor.tools.reference_image import ReferenceImageTool
 from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.tool import EditorTool
-from robocov_app.toolkit.tool import Toolbox
+from robocov_app.toolkit.tools.tool import Toolbox
 
 
 class EditorToolbox(Toolbox[EditorTool]):

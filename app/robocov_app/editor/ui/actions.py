@@ -9,7 +9,7 @@ from robocov_app.editor.edits import clipboard, density, fixes, paths, propertie
 from robocov_app.editor.model import require
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
-from robocov_app.toolkit.viewport import REACH_PX
+from robocov_app.toolkit.tools.viewport import REACH_PX
 
 Edit = Callable[..., Change]
 FAR_STEPS = 10  # grid steps by which arrows nudge with Shift

@@ -13,9 +13,9 @@ from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import FAR_STEPS, Edit
 from robocov_app.editor.ui.file_commands import OPEN_SUFFIXES, PICTURE_SUFFIXES, FileCommands
-from robocov_app.toolkit.command import Command, CommandGroup
-from robocov_app.toolkit.command_window import Action, WindowActions
-from robocov_app.toolkit.viewport import PAN_STEP_PX, ZOOM_STEP
+from robocov_app.toolkit.commands.command import Command, CommandGroup
+from robocov_app.toolkit.tools.viewport import PAN_STEP_PX, ZOOM_STEP
+from robocov_app.toolkit.window.command_window import Action, WindowActions
 
 ArrowAction = Callable[[int, int], object]
 

@@ -23,8 +23,8 @@ from robocov_app.jobs.workers import Worker
 from robocov_app.render.fonts import render_text
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
+from robocov_app.toolkit.widgets.ui import Ui
 
 # Lengths in pixels at scale 1.
 OPTIONS_WIDTH_PX = 300

@@ -10,9 +10,9 @@ from robocov_app.editor.ui.importing import ImportOption, list_options
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.colors import Color
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.text_edit import TextEdit
-from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
+from robocov_app.toolkit.widgets.text_edit import TextEdit
+from robocov_app.toolkit.widgets.ui import Ui
 
 # Lengths in pixels at scale 1.
 OPTION_LABEL_WIDTH_PX = 126

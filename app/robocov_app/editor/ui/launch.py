@@ -29,9 +29,9 @@ from robocov_app.storage.settings import (
     load_settings,
 )
 from robocov_app.toolkit.dialogs import create_recovery_question
-from robocov_app.toolkit.display import choose_scale, fit_to_screen, open_display
-from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.window_settings import limit_window_size
+from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
+from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.window_settings import limit_window_size
 
 NO_DISPLAY = (
     "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "

@@ -24,11 +24,11 @@ from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui.actions import fix_problem, select_owners
 from robocov_app.editor.ui.fields import FIELDS, set_picture_opacity
 from robocov_app.editor.ui.map_facts import list_map_facts
-from robocov_app.toolkit.command import CommandTable
+from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas, wrap_text
 from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
-from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX
+from robocov_app.toolkit.widgets.ui import Ui
 
 TOOL_COLUMNS = 4
 ROW_HEIGHT_PX = 20.0  # of a line of a list

@@ -14,14 +14,14 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.toolkit.input import get_key_name
-from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.file_actions import FileActions
+from robocov_app.toolkit.window.input import get_key_name
+from robocov_app.viewer.actions.files import FileActions
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import ViewerWindow
+from robocov_app.viewer.window.window import ViewerWindow
 
 DRAFT_PAUSE_S = 1.0  # between two drafts of a map that is tried
 FIRST_UPDATE_S = 0.01

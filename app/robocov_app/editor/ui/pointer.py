@@ -8,11 +8,11 @@ from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.tool import EditorPointerEvent
-from robocov_app.toolkit.input import ZOOM_PER_NOTCH, get_wheel_notches
 from robocov_app.toolkit.panel import SidePanel
-from robocov_app.toolkit.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
-from robocov_app.toolkit.snapping import Snap
-from robocov_app.toolkit.viewport import REACH_PX
+from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
+from robocov_app.toolkit.tools.snapping import Snap
+from robocov_app.toolkit.tools.viewport import REACH_PX
+from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
 
 
 class EditorPointer(Pointer):

@@ -3,7 +3,7 @@
 import pygame
 
 from robocov_app.editor.editor import Editor
-from robocov_app.toolkit.input import get_key_name
+from robocov_app.toolkit.window.input import get_key_name
 
 MAX_TYPED_CHARACTERS = 40
 _VALUE_CHARACTERS = frozenset("0123456789.,-+@<*/%°×x; ")

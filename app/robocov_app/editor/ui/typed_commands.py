@@ -12,7 +12,7 @@ from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import parse_angle, parse_length, parse_point, parse_size
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import Edit
-from robocov_app.toolkit.command import Argument, Command
+from robocov_app.toolkit.commands.command import Argument, Command
 
 MIN_SNAP_ANGLE_DEG = 0.1
 MAX_SNAP_ANGLE_DEG = 90.0

@@ -21,15 +21,15 @@ from robocov_app.editor.ui.pointer import EditorPointer
 from robocov_app.editor.ui.tool_text import type_for_tool
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.look.theme import get_theme
-from robocov_app.toolkit.command import CommandTable
-from robocov_app.toolkit.command_window import CommandWindow
-from robocov_app.toolkit.display import set_title
-from robocov_app.toolkit.input import MOUSE_EVENTS
-from robocov_app.toolkit.layout import build_layout
-from robocov_app.toolkit.menu import Menu
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.tool import CursorShape
-from robocov_app.toolkit.viewport import REACH_PX
+from robocov_app.toolkit.tools.tool import CursorShape
+from robocov_app.toolkit.tools.viewport import REACH_PX
+from robocov_app.toolkit.window.command_window import CommandWindow
+from robocov_app.toolkit.window.display import set_title
+from robocov_app.toolkit.window.input import MOUSE_EVENTS
+from robocov_app.toolkit.window.layout import build_layout
 
 STATUS_HINT = "F5 try it · F1 keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"

@@ -7,9 +7,9 @@ from pygame import Rect
 
 from robocov.errors import InputError, RobocovError
 from robocov_app.toolkit.dialogs.dialog import Dialog
-from robocov_app.toolkit.input import ENTER_KEYS
-from robocov_app.toolkit.text_edit import TextEdit
-from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.text_edit import TextEdit
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.input import ENTER_KEYS
 
 VISIBLE_OPTIONS = 9
 _TOP_PX = 64

@@ -2,7 +2,7 @@
 
 from pygame import Rect
 
-from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.ui import Ui
 
 _HEIGHT_FRACTION = 0.42
 """Fraction of the free height that is above a dialog."""

@@ -7,9 +7,9 @@ from pygame import Rect, Surface
 
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.toolkit.dialogs.dialog import Dialog
-from robocov_app.toolkit.input import MOUSE_EVENTS, get_key_name, get_wheel_notches
 from robocov_app.toolkit.overlay import draw_card, draw_veil
-from robocov_app.toolkit.ui import Ui
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.input import MOUSE_EVENTS, get_key_name, get_wheel_notches
 
 _WINDOW_EVENTS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 """Events that the window gets, too, while a dialog is open."""

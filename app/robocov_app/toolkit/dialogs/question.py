@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.dialogs.dialog import Dialog
-from robocov_app.toolkit.input import ENTER_KEYS
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.ui import Ui
 from robocov_app.toolkit.widgets.appearance import TEXT_PX
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.input import ENTER_KEYS
 
 MAX_LINES = 14
 """Lines of the text that are shown."""

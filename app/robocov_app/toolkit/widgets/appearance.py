@@ -6,7 +6,7 @@ from pygame import Rect
 from robocov_app.look.colors import Color, mix
 from robocov_app.render.fonts import render_text, shorten_to_width
 from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_field_color
-from robocov_app.toolkit.page import Page
+from robocov_app.toolkit.widgets.page import Page
 
 # Lengths in pixels at scale 1.
 TEXT_PX = 12.0

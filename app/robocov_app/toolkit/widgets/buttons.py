@@ -10,7 +10,6 @@ from pygame import Rect, Surface
 from robocov_app.look.colors import mix
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import get_accent_ink, get_field_color
-from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import (
     SMALL_TEXT_PX,
     TEXT_PX,
@@ -21,6 +20,7 @@ from robocov_app.toolkit.widgets.appearance import (
     is_drawn,
     shade,
 )
+from robocov_app.toolkit.widgets.page import Page, Widget
 
 # Lengths in pixels at scale 1.
 _MAX_BUTTON_HEIGHT_PX = 32.0

@@ -6,9 +6,9 @@ import pygame
 from pygame import Rect
 
 from robocov_app.render.fonts import measure_text
-from robocov_app.toolkit.open_list import LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
-from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_face, draw_text, is_drawn
+from robocov_app.toolkit.widgets.open_list import LIST_ROW_PX, MAX_LIST_HEIGHT_PX, OpenList
+from robocov_app.toolkit.widgets.page import Page, Widget
 
 
 def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, tip: str = "") -> str | None:

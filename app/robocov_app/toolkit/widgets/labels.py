@@ -2,8 +2,8 @@
 
 from robocov_app.look.colors import Color
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX, draw_text
+from robocov_app.toolkit.widgets.page import Page, Widget
 
 
 def show_header(page: Page, text: str) -> None:

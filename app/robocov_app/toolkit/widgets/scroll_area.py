@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import pygame
 from pygame import Rect
 
-from robocov_app.toolkit.input import get_wheel_notches
-from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import draw_box, shade
+from robocov_app.toolkit.widgets.page import Page, Widget
+from robocov_app.toolkit.window.input import get_wheel_notches
 
 # Lengths in pixels at scale 1.
 BAR_WIDTH_PX = 10.0

@@ -1,7 +1,7 @@
 """Sections of a page, whose content can be hidden."""
 
-from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box, draw_focus_ring, draw_text, shade
+from robocov_app.toolkit.widgets.page import Page, Widget
 
 
 def show_section(page: Page, title: str, *, key: str = "") -> bool:

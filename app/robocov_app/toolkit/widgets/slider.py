@@ -6,8 +6,8 @@ import pygame
 from pygame import Rect
 
 from robocov_app.look.colors import mix
-from robocov_app.toolkit.page import Page, Widget
 from robocov_app.toolkit.widgets.appearance import draw_box, draw_focus_ring, is_drawn, shade
+from robocov_app.toolkit.widgets.page import Page, Widget
 
 # Lengths in pixels at scale 1.
 _TRACK_HEIGHT_PX = 14

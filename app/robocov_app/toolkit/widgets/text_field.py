@@ -7,11 +7,11 @@ from pygame import Rect, Surface
 
 from robocov_app.look.colors import mix
 from robocov_app.render.fonts import measure_text, render_text
-from robocov_app.toolkit.input import ENTER_KEYS
 from robocov_app.toolkit.overlay import get_field_color
-from robocov_app.toolkit.page import Page, Widget
-from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_box, draw_text, is_drawn, shade
+from robocov_app.toolkit.widgets.page import Page, Widget
+from robocov_app.toolkit.widgets.text_edit import TextEdit
+from robocov_app.toolkit.window.input import ENTER_KEYS
 
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 6

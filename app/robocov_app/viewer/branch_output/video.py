@@ -22,10 +22,10 @@ from robocov_app.viewer.branch_output.parts import (
     build_pane_scene,
     build_part_records,
 )
-from robocov_app.viewer.screen_video import copy_pixels
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.window.screen_video import copy_pixels
 
 CAPTION_PX = 30  # height of the strip with the last edit, px at scale 1
 _TIME_TOLERANCE_S = 1e-9

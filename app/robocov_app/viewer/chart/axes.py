@@ -4,7 +4,7 @@ from robocov_app.look.axes import MAX_TIME_INTERVALS, choose_tick_step, list_tic
 from robocov_app.look.colors import mix
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density_text import describe_density
-from robocov_app.toolkit.layout import Box
+from robocov_app.toolkit.window.layout import Box
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import BOTTOM_PX, TOP_PX, ChartScale, TimeScale
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME

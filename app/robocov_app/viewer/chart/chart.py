@@ -4,8 +4,8 @@ import numpy as np
 import pygame
 
 from robocov_app.look.theme import Theme
-from robocov_app.toolkit.layout import Box, Layout, is_inside
 from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.toolkit.window.layout import Box, Layout, is_inside
 from robocov_app.viewer.chart.axes import draw_axes, draw_computation_state, draw_switch, draw_title
 from robocov_app.viewer.chart.captions import draw_captions
 from robocov_app.viewer.chart.curves import (

@@ -6,7 +6,7 @@ import pygame
 
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
-from robocov_app.toolkit.layout import Layout
+from robocov_app.toolkit.window.layout import Layout
 from robocov_app.viewer.chart.scale import BOTTOM_PX, TOP_PX, TimeScale, build_time_scale
 from robocov_app.viewer.session.past.curves import Curve, GhostCurve, PlottedQuantity
 from robocov_app.viewer.session.session import Session

@@ -4,8 +4,8 @@ import numpy as np
 import pygame
 
 from robocov_app.look.colors import mix
-from robocov_app.toolkit.layout import is_inside
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_tag
+from robocov_app.toolkit.window.layout import is_inside
 from robocov_app.viewer.chart.events import describe_events_at
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import TOP_PX

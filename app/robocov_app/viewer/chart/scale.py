@@ -8,7 +8,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov_app.look.axes import Axis, choose_growing_time_limit, choose_growing_value_axis
 from robocov_app.render.fonts import measure_text
-from robocov_app.toolkit.layout import Layout
+from robocov_app.toolkit.window.layout import Layout
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.timeline import Timeline
 

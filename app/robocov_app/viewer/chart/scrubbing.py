@@ -2,7 +2,7 @@
 
 import pygame
 
-from robocov_app.toolkit.pointer import Gesture
+from robocov_app.toolkit.tools.pointer import Gesture
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.presenter import Presenter
 

@@ -6,7 +6,7 @@ from math import dist
 import numpy as np
 
 from robocov.environment import Obstacle, Point
-from robocov_app.toolkit.tool import CursorShape
+from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session

@@ -4,8 +4,8 @@ import numpy as np
 import shapely
 
 from robocov.environment import Environment, Point
-from robocov_app.toolkit.snap_targets import SnapTargets, list_outline_edges
-from robocov_app.toolkit.snapping import SnapKind, SnapSettings, snap_point
+from robocov_app.toolkit.tools.snap_targets import SnapTargets, list_outline_edges
+from robocov_app.toolkit.tools.snapping import SnapKind, SnapSettings, snap_point
 
 SNAP_REACH_FRACTION = 0.6  # of the width of a finger
 _KINDS: frozenset[SnapKind] = frozenset({"vertex", "edge"})

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from robocov.environment import Environment, Obstacle
-from robocov_app.toolkit.tool import DrawState, PointerEvent, Tool
+from robocov_app.toolkit.tools.tool import DrawState, PointerEvent, Tool
 from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.passages import describe_passage_changes
 from robocov_app.viewer.session.session import Session

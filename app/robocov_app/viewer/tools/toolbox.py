@@ -1,6 +1,6 @@
 """All tools of the viewer."""
 
-from robocov_app.toolkit.tool import Toolbox
+from robocov_app.toolkit.tools.tool import Toolbox
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.tools.brush import BrushTool
 from robocov_app.viewer.tools.clicks import AddRobotTool, EraserTool, FailureTool

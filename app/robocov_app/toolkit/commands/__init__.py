@@ -1,0 +1,1 @@
+"""Commands, and where they are listed: menus, palette and help page."""

@@ -1,0 +1,290 @@
+"""Commands: one table for each window. Keys, menus, buttons, help, tool tips and palette come from it."""
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import pygame
+
+from robocov.errors import InputError, describe_unknown_name
+from robocov_app.toolkit.window.input import format_key, get_key_name
+
+Action = Callable[..., object]
+
+
+def _list_nothing() -> Iterable[str]:
+    return ()
+
+
+def _give_no_reason() -> str:
+    return ""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """Argument that is typed after the name of a command.
+
+    Attributes
+    ----------
+    description : str
+        For the palette, such as "number of robots".
+    parse : callable
+        Converts the typed text; raises InputError if it is not valid.
+    list_values : callable
+        Lists the texts that can be typed, if there are few.
+    """
+
+    description: str
+    parse: Callable[[str], object] = str
+    list_values: Callable[[], Iterable[str]] = _list_nothing
+
+
+@dataclass(frozen=True)
+class Command:
+    """Something that can be done in a window.
+
+    Attributes
+    ----------
+    name : str
+        Unique name: the word that is typed for a command with an argument, otherwise as in "save:run".
+    title : str
+        Text in menus, tool tips and help.
+    group : str
+        Heading in the help.
+    run : callable
+        Called with the argument, if there is one. If it returns a text, that is shown as message.
+    keys : tuple of str
+        Keys, such as "ctrl+shift+z"; the last part is pygame's name of the key.
+    get_disabled_reason : callable
+        Returns why the command cannot be run now; an empty text if it can.
+    argument : Argument or None
+    repeats : bool
+        Whether it is run again and again while its key is held down.
+    hidden : bool
+        Whether palette and help leave it out.
+    """
+
+    name: str
+    title: str
+    group: str
+    run: Action
+    keys: tuple[str, ...] = ()
+    get_disabled_reason: Callable[[], str] = _give_no_reason
+    argument: Argument | None = None
+    repeats: bool = False
+    hidden: bool = False
+
+    @property
+    def key_text(self) -> str:
+        """The first key as text for users; empty if there is none."""
+        return format_key(self.keys[0]) if self.keys else ""
+
+    @property
+    def tip(self) -> str:
+        """Title and keys, for a tool tip."""
+        keys = " or ".join(format_key(key) for key in self.keys)
+        return f"{self.title} ({keys})" if keys else self.title
+
+    def run_now(self, *texts: str) -> object:
+        """Run the command.
+
+        Parameters
+        ----------
+        *texts : str
+            The typed argument, if the command has one.
+
+        Raises
+        ------
+        InputError
+            If the command cannot be run now, or if the argument is not valid.
+        """
+        reason = self.get_disabled_reason()
+        if reason:
+            raise InputError(reason)
+        if self.argument is None:
+            return self.run()
+        return self.run(*[self.argument.parse(text) for text in texts])
+
+
+class CommandGroup:
+    """Builds commands with the same heading.
+
+    Parameters
+    ----------
+    heading : str
+        Heading in the help.
+
+    Attributes
+    ----------
+    commands : list of Command
+        The commands that were added.
+    """
+
+    def __init__(self, heading: str) -> None:
+        self.heading = heading
+        self.commands: list[Command] = []
+
+    def add(
+        self,
+        name: str,
+        title: str,
+        action: Action,
+        *keys: str,
+        repeats: bool = False,
+        argument: Argument | None = None,
+        hidden: bool = False,
+    ) -> None:
+        """Add a command.
+
+        Parameters
+        ----------
+        name : str
+            Unique name.
+        title : str
+            Text for users; empty to leave the command out of palette and help.
+        action : callable
+            Runs the command. A text that it returns is shown as message.
+        *keys : str
+            Keys, such as ``ctrl+z``.
+        repeats : bool
+            Whether it is repeated while the key is held down.
+        argument : Argument, optional
+            Argument that is typed after the name.
+        hidden : bool
+            Whether palette and help leave it out.
+        """
+        is_hidden = hidden or not title
+        command = Command(
+            name, title, self.heading, action, keys, argument=argument, repeats=repeats, hidden=is_hidden
+        )
+        self.commands.append(command)
+
+
+def _list_no_commands() -> Iterable[Command]:
+    return ()
+
+
+class CommandTable:
+    """The commands of a window.
+
+    Parameters
+    ----------
+    commands : iterable of Command
+    attempt : callable
+        Calls a function, and shows the text that it returns, or the message of an error that it raises.
+    list_temporary : callable, optional
+        Lists commands that come and go, such as the gains of the present controller.
+
+    Attributes
+    ----------
+    commands : list of Command
+        The commands that always exist.
+    """
+
+    def __init__(
+        self,
+        commands: Iterable[Command],
+        attempt: Callable[[Callable[[], object]], object],
+        list_temporary: Callable[[], Iterable[Command]] = _list_no_commands,
+    ) -> None:
+        self.commands = list(commands)
+        self._attempt = attempt
+        self._list_temporary = list_temporary
+        self._by_name = {command.name: command for command in self.commands}
+        self._by_key = {key: command for command in self.commands for key in command.keys}
+        self._held_keys: set[int] = set()
+
+    def __getitem__(self, name: str) -> Command:
+        return self._by_name[name]
+
+    def run(self, name: str) -> None:
+        """Run a command, and show its message or error."""
+        self.attempt(self._by_name[name])
+
+    def attempt(self, command: Command) -> object:
+        """Run a command, which may be temporary, and show its message or error."""
+        return self._attempt(command.run_now)
+
+    def press_key(self, event: pygame.event.Event) -> Command | None:
+        """Return the command of a key that was pressed; None while it is held, unless the command repeats."""
+        command = self._by_key.get(get_key_name(event))
+        is_held = event.key in self._held_keys
+        self._held_keys.add(event.key)
+        if command is None or (is_held and not command.repeats):
+            return None
+        return command
+
+    def release_key(self, event: pygame.event.Event) -> None:
+        """Note that a key was released."""
+        self._held_keys.discard(event.key)
+
+    def reset_keys(self, *held: int) -> None:
+        """Forget the keys that are held down, except for the given ones."""
+        self._held_keys = set(held)
+
+    def list_all(self) -> list[Command]:
+        """List the temporary commands and those that always exist."""
+        return [*self._list_temporary(), *self.commands]
+
+    def find_with_argument(self, name: str) -> Command | None:
+        """Return the command with an argument that has this name; None if there is none."""
+        return self._list_with_argument().get(name)
+
+    def _list_with_argument(self) -> dict[str, Command]:
+        return {command.name: command for command in self.list_all() if command.argument is not None}
+
+    def run_text(self, text: str) -> object:
+        """Run a command that was typed with its argument.
+
+        Parameters
+        ----------
+        text : str
+            As in "robots 8".
+
+        Returns
+        -------
+        object
+            Return value of the command.
+
+        Raises
+        ------
+        InputError
+            If there is no such command, if it cannot be run now, or if the argument is not valid.
+        """
+        name, argument = split_command(text)
+        commands = self._list_with_argument()
+        if name not in commands:
+            raise InputError(describe_unknown_name("command", name, list(commands)))
+        return commands[name].run_now(argument)
+
+    def search(self, text: str) -> list[Command]:
+        """Return the commands that match a typed text, without hidden ones."""
+        commands = list(self.commands)
+        if text.strip():
+            commands += self._list_temporary()
+        return find_commands([command for command in commands if not command.hidden], text)
+
+
+def split_command(text: str) -> tuple[str, str]:
+    """Split a typed text into the name of a command and its argument, at a blank or an equals sign.
+
+    >>> split_command("k_rep = 0.5")
+    ('k_rep', '0.5')
+    """
+    name, *argument = re.split(r"\s*=\s*|\s+", text.strip(), maxsplit=1)
+    return name, "".join(argument)
+
+
+def find_commands(commands: Sequence[Command], text: str) -> list[Command]:
+    """Return the commands whose titles or names contain all words of a text, the best matches first."""
+    words = text.lower().split()
+    start = text.lower().strip()
+
+    def is_match(command: Command) -> bool:
+        line = f"{command.title} {command.name}".lower()
+        return all(word in line for word in words)
+
+    def is_worse(command: Command) -> bool:
+        return command.name != start and not command.title.lower().startswith(start)
+
+    return sorted(filter(is_match, commands), key=is_worse)

@@ -1,0 +1,153 @@
+"""The help page: the keys of all commands."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pygame import Rect, Surface
+
+from robocov_app.look.colors import mix
+from robocov_app.look.theme import Theme
+from robocov_app.render.fonts import render_text, shorten_to_width
+from robocov_app.toolkit.commands.command import Command
+from robocov_app.toolkit.overlay import draw_card, draw_veil
+from robocov_app.toolkit.window.input import format_key
+
+# Lengths in pixels at scale 1.
+_WIDE_WINDOW_PX = 1150
+_MAX_WIDTH_PX = 1240
+_MAX_ROW_PX = 16.5
+_MARGIN_PX = 20
+_TOP_PX = 44
+_BOTTOM_PX = 14
+_TITLE_SIZE_PX = 16
+_HINT_SIZE_PX = 11
+_KEY_WIDTH_PX = 84
+
+_MIN_TEXT_PX = 8
+"""Size of texts in small windows, at any scale."""
+_HEADING_ROWS = 2.6
+"""Rows that a heading needs, so that it is never alone at the foot of a column."""
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Columns of rows in the card of the help page, px."""
+
+    count: int
+    row_height: float
+    text_size: int
+    box: Rect
+    scale: float
+
+    @property
+    def width(self) -> float:
+        """Width of a column, px."""
+        return (self.box.width - 2 * _MARGIN_PX * self.scale) / self.count
+
+    @property
+    def top(self) -> float:
+        """Upper end of the columns, px."""
+        return self.box.top + _TOP_PX * self.scale
+
+    @property
+    def bottom(self) -> float:
+        """Lower end of the columns, px."""
+        return self.box.bottom - _BOTTOM_PX * self.scale
+
+
+def draw_help_page(
+    screen: Surface,
+    theme: Theme,
+    scale: float,
+    commands: Sequence[Command],
+    *,
+    groups: Sequence[str],
+    hint: str,
+) -> None:
+    """Draw the keys of commands over the window.
+
+    Parameters
+    ----------
+    screen : pygame.Surface
+    theme : Theme
+    scale : float
+        Size of texts; it becomes smaller in windows in which the page does not fit.
+    commands : sequence of Command
+    groups : sequence of str
+        Headings in their order.
+    hint : str
+        Text next to the title.
+    """
+    draw_veil(screen, theme)
+    lines = _list_lines(commands, groups)
+    columns = _arrange_columns(screen, scale, rows=len(lines) + len(groups))
+    draw_card(screen, columns.box, theme, scale)
+    _draw_title(screen, theme, columns, hint)
+    for line, x, y in _place_lines(lines, columns):
+        if isinstance(line, str):
+            size = max(_MIN_TEXT_PX, round(columns.text_size * 0.92))
+            screen.blit(render_text(line.upper(), size, theme.final, True), (round(x), round(y)))
+        else:
+            _draw_command(screen, theme, columns, line, x, y)
+
+
+def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str | Command]:
+    """List headings, each followed by its commands."""
+    lines: list[str | Command] = []
+    for group in groups:
+        lines.append(group)
+        shown = [command for command in commands if command.keys and not command.hidden]
+        lines += [command for command in shown if command.group == group]
+    return lines
+
+
+def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
+    """Choose the number of columns, and the height of rows so that all of them fit."""
+    width, height = screen.get_size()
+    count = 4 if width >= _WIDE_WINDOW_PX * scale else 3
+    rows_per_column = math.ceil(rows / count) + 1
+    row_height = min(_MAX_ROW_PX * scale, (height - 90 * scale) / rows_per_column)
+    box_width = round(min(width - 24 * scale, _MAX_WIDTH_PX * scale))
+    box = Rect(0, 0, box_width, round(rows_per_column * row_height + 66 * scale))
+    box.center = width // 2, height // 2
+    return _Columns(count, row_height, max(_MIN_TEXT_PX, round(row_height * 0.66)), box, scale)
+
+
+def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> None:
+    scale = columns.scale
+    box = columns.box
+    title = render_text("Keys", round(_TITLE_SIZE_PX * scale), theme.ink, True)
+    screen.blit(title, (box.left + round(_MARGIN_PX * scale), box.top + round(12 * scale)))
+    image = render_text(hint, round(_HINT_SIZE_PX * scale), theme.faint)
+    right_end = box.right - round(_MARGIN_PX * scale), box.top + round(22 * scale)
+    screen.blit(image, image.get_rect(midright=right_end))
+
+
+def _place_lines(
+    lines: Sequence[str | Command], columns: _Columns
+) -> Iterator[tuple[str | Command, float, float]]:
+    """Yield each line with its upper left corner, px."""
+    row_height = columns.row_height
+    x = columns.box.left + _MARGIN_PX * columns.scale
+    y = columns.top
+    for line in lines:
+        is_heading = isinstance(line, str)
+        if y + row_height * (_HEADING_ROWS if is_heading else 1.0) > columns.bottom:
+            x += columns.width
+            y = columns.top
+        if is_heading and y > columns.top + columns.scale:
+            y += 0.5 * row_height
+        yield line, x, y
+        y += row_height
+
+
+def _draw_command(
+    screen: Surface, theme: Theme, columns: _Columns, command: Command, x: float, y: float
+) -> None:
+    size = columns.text_size
+    screen.blit(render_text(format_key(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
+    max_width = columns.width - (_KEY_WIDTH_PX + 8) * columns.scale
+    title = shorten_to_width(command.title.partition(":")[0], size, max_width)
+    image = render_text(title, size, mix(theme.panel, theme.ink, 0.8))
+    screen.blit(image, (round(x + _KEY_WIDTH_PX * columns.scale), round(y)))

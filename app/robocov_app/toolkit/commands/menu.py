@@ -1,0 +1,107 @@
+"""Context menus."""
+
+from collections.abc import Callable, Sequence
+
+from pygame import Rect
+
+from robocov_app.render.fonts import measure_text
+from robocov_app.toolkit.commands.command import Command
+from robocov_app.toolkit.dialogs import Dialog
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.input import ENTER_KEYS
+
+# Lengths in pixels at scale 1.
+_ROW_PX = 24
+_SEPARATOR_PX = 7
+_TEXT_MARGINS_PX = 50
+
+_KEY_STEPS = {"up": -1, "down": 1}
+
+
+class Menu(Dialog):
+    """Commands to choose from, at a position of the window.
+
+    Parameters
+    ----------
+    rows : sequence of Command or None
+        None leaves space between groups.
+    position : (x, y), px
+        Upper left corner; the menu moves if it does not fit there.
+    run : callable
+        Runs a command by its name.
+
+    Attributes
+    ----------
+    rows
+        As passed.
+    chosen : int
+        Number of the row that the arrow keys have chosen; -1 if there is none.
+    """
+
+    margin = 5.0, 5.0
+    has_veil = False
+    closes_on_outside_click = True
+
+    def __init__(
+        self, rows: Sequence[Command | None], position: tuple[int, int], run: Callable[[str], object]
+    ) -> None:
+        self.rows = rows
+        self.chosen = -1
+        self._position = position
+        self._run = run
+
+    def show_content(self, ui: Ui) -> None:
+        """Show the commands."""
+        for number, command in enumerate(self.rows):
+            ui.row(height=_SEPARATOR_PX if command is None else _ROW_PX, below=0)
+            if command is None:
+                ui.cell()
+                continue
+            is_clicked = ui.option(
+                command.title,
+                command.key_text,
+                key=command.name,
+                chosen=number == self.chosen,
+                disabled_reason=command.get_disabled_reason(),
+            )
+            if is_clicked:
+                self._choose(command)
+
+    def _choose(self, command: Command | None) -> None:
+        self.is_done = True
+        if command is not None:
+            self._run(command.name)
+
+    def handle_key(self, name: str, ui: Ui) -> bool:
+        """Choose a command by the arrow keys, or run it by Enter."""
+        numbers = [number for number, row in enumerate(self.rows) if _is_enabled(row)]
+        if name in _KEY_STEPS and numbers:
+            self._move(_KEY_STEPS[name], numbers)
+        elif name in ENTER_KEYS and self.chosen in numbers:
+            self._choose(self.rows[self.chosen])
+        return True
+
+    def _move(self, step: int, numbers: list[int]) -> None:
+        """Choose the next row of those that can be chosen, or the first or last one."""
+        if self.chosen in numbers:
+            index = numbers.index(self.chosen) + step
+        else:
+            index = 0 if step > 0 else -1
+        self.chosen = numbers[index % len(numbers)]
+
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        """Move the box to its position, and make it as wide as the longest row."""
+        title_size = round(TEXT_PX * scale)
+        key_size = round(SMALL_TEXT_PX * scale)
+        widths = [
+            measure_text(command.title, title_size) + measure_text(command.key_text, key_size)
+            for command in self.rows
+            if command is not None
+        ]
+        box.update(self._position, (round(_TEXT_MARGINS_PX * scale) + max(widths), box.height))
+        box.clamp_ip(screen)
+
+
+def _is_enabled(command: Command | None) -> bool:
+    return command is not None and not command.get_disabled_reason()

@@ -1,0 +1,1 @@
+"""Tools for a map: gestures, snapping, zooming and outlines."""

@@ -1,0 +1,189 @@
+"""The mouse over the map of a window: presses become gestures, and the wheel zooms."""
+
+from collections.abc import Callable
+from math import dist
+from typing import NamedTuple, TypeAlias
+
+import pygame
+
+from robocov_app.toolkit.panel import SidePanel
+from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, MAX_CLICK_MOVE_PX
+
+LEFT_BUTTON = 1
+RIGHT_BUTTON = 3
+BUTTONS = (1, 2, 3)  # left, middle, right
+_NEVER_S = -1.0
+
+Pixel: TypeAlias = tuple[int, int]
+
+
+class Gesture:
+    """Action of a mouse button while it is held down: base class of the gestures.
+
+    Attributes
+    ----------
+    is_pan : bool
+        Whether it moves the map instead of using the tool.
+    """
+
+    is_pan = False
+
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Handle a move of the mouse; `is_click` while it has not moved farther than during a click."""
+
+    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Handle the release of the button."""
+
+
+class PanGesture(Gesture):
+    """Pans the map with the mouse.
+
+    Parameters
+    ----------
+    pan : callable
+        Moves the map by a number of pixels to the right and down.
+    click : callable
+        Called with the event if the button is released before the mouse has moved.
+    """
+
+    is_pan = True
+
+    def __init__(
+        self, pan: Callable[[float, float], object], click: Callable[[pygame.event.Event], object]
+    ) -> None:
+        self._pan = pan
+        self._click = click
+        self._waiting = (0, 0)  # moves during the click, px, by which the map has not been moved yet
+
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Move the map with the mouse, unless it may still be a click."""
+        dx = self._waiting[0] + event.rel[0]
+        dy = self._waiting[1] + event.rel[1]
+        self._waiting = (dx, dy) if is_click else (0, 0)
+        if not is_click:
+            self._pan(dx, dy)
+
+    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Handle the click if the mouse has not moved."""
+        if is_click:
+            self._click(event)
+
+
+class _Press(NamedTuple):
+    """A press of a button, to find double clicks."""
+
+    time_s: float = _NEVER_S
+    pixel: Pixel = (0, 0)
+    in_a_row: int = 0  # presses, each soon after the one before and at the same pixel
+
+
+class Pointer:
+    """Turns mouse events over a map into gestures; subclasses decide which gesture a press starts.
+
+    Parameters
+    ----------
+    panel : SidePanel
+        The panel, which gets events first unless a button is held down over the map.
+
+    Attributes
+    ----------
+    at : tuple of int
+        Pixel under the mouse.
+    gesture : Gesture or None
+        Gesture of the button that is held down.
+    """
+
+    def __init__(self, panel: SidePanel) -> None:
+        self.at: Pixel = (0, 0)
+        self.gesture: Gesture | None = None
+        self._panel = panel
+        self._button = 0
+        self._pressed_at: Pixel = (0, 0)
+        self._is_click = False  # the mouse has hardly moved since the press
+        self._last_press = _Press()
+
+    # What each window decides
+
+    def get_scale(self) -> float:
+        """Return the scale of the window."""
+        return 1.0
+
+    def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
+        """Return what a press at a time, s, starts; None if it is complete, or means nothing."""
+        return None
+
+    def hover(self, event: pygame.event.Event) -> None:
+        """Handle a move of the mouse, before the gesture does."""
+
+    def leave(self) -> None:
+        """Handle that the mouse has left the map."""
+
+    def turn_wheel(self, event: pygame.event.Event) -> None:
+        """Handle the wheel."""
+
+    # Events
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a button is held down."""
+        return self.gesture is not None
+
+    def reset(self) -> None:
+        """Forget the button that is held down."""
+        self.gesture = None
+        self._button = 0
+
+    def handle_event(self, event: pygame.event.Event, now: float) -> None:
+        """Handle a mouse event at a time, s."""
+        if event.type != pygame.MOUSEWHEEL:
+            self.at = event.pos
+        is_for_panel = not self.is_busy and self._panel.handle_event(event)
+        if event.type == pygame.MOUSEMOTION:
+            self.move(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self.release(event)
+        elif is_for_panel:
+            self.leave()
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self._panel.ui.stop_typing()
+            self.press(event, now)
+        else:
+            self.turn_wheel(event)
+
+    def press(self, event: pygame.event.Event, now: float) -> None:
+        """Handle a press of a button at a time, s; while a button is held, others do nothing."""
+        if self.is_busy or event.button not in BUTTONS:
+            return
+        self._pressed_at = event.pos
+        self._button = event.button
+        self._is_click = True
+        self.gesture = self.start_gesture(event, now)
+
+    def move(self, event: pygame.event.Event) -> None:
+        """Handle a move of the mouse."""
+        self._is_click = self._is_click and self._is_near(self._pressed_at, event.pos)
+        self.hover(event)
+        if self.gesture is not None:
+            self.gesture.move(event, is_click=self._is_click)
+
+    def release(self, event: pygame.event.Event) -> None:
+        """Handle the release of a button; another one than that which is held does nothing."""
+        gesture = self.gesture
+        if gesture is None or event.button != self._button:
+            return
+        self.reset()
+        is_click = self._is_click and self._is_near(self._pressed_at, event.pos)
+        gesture.release(event, is_click=is_click)
+
+    def count_clicks(self, event: pygame.event.Event, now: float) -> int:
+        """Return the number of presses in a row, including this one: 2 for a double click."""
+        last = self._last_press
+        is_quick = now - last.time_s < DOUBLE_CLICK_S
+        is_same_place = self._is_near(last.pixel, event.pos)
+        count = last.in_a_row + 1 if is_quick and is_same_place else 1
+        self._last_press = _Press(now, event.pos, count)
+        return count
+
+    def _is_near(self, first: Pixel, second: Pixel) -> bool:
+        """Return whether the mouse may move from one pixel to the other during a click."""
+        return dist(first, second) < MAX_CLICK_MOVE_PX * self.get_scale()

@@ -1,0 +1,120 @@
+"""Points and edges to which the pointer can snap."""
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from robocov.arrays import Array
+from robocov_app.toolkit.tools.geometry import Point, find_nearest_on_edges
+
+PointKind: TypeAlias = Literal["vertex", "center", "middle"]
+MAX_EDGES = 8  # edges near a point: where there are more, nothing can be told apart
+
+
+class Edges(NamedTuple):
+    """Straight edges.
+
+    Attributes
+    ----------
+    starts, ends : (k, 2) array, m
+        Ends of each edge.
+    """
+
+    starts: Array
+    ends: Array
+
+
+_NO_EDGES = Edges(np.empty((0, 2)), np.empty((0, 2)))
+
+
+class SnapTargets:
+    """Vertices, centers and edges to which points can snap, and the middles of the edges.
+
+    Parameters
+    ----------
+    vertices, centers : (k, 2) array, m
+        Points to snap to; points align with them, too.
+    edges : Edges
+        Edges to snap to, and to their middles.
+    outlines : Edges
+        Edges to snap to, but not to their middles.
+    """
+
+    def __init__(self, vertices: Array, centers: Array, edges: Edges, outlines: Edges = _NO_EDGES) -> None:
+        middles = (edges.starts + edges.ends) / 2
+        points_by_kind = {"vertex": vertices, "center": centers, "middle": middles}
+        self._trees = {
+            kind: (cKDTree(points), points) for kind, points in points_by_kind.items() if len(points)
+        }
+        self._starts = np.concatenate([edges.starts, outlines.starts])
+        self._ends = np.concatenate([edges.ends, outlines.ends])
+        low = np.minimum(self._starts, self._ends)
+        high = np.maximum(self._starts, self._ends)
+        self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
+        # Points align with vertices and centers, sorted along each axis.
+        marks = np.concatenate([vertices, centers])
+        self._sorted_marks = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
+
+    def find_nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
+        """Return the nearest target of a kind within `reach` meters, None if there is none."""
+        if kind not in self._trees:
+            return None
+        tree, points = self._trees[kind]
+        gap, index = tree.query(point, distance_upper_bound=np.nextafter(reach, np.inf))
+        return _to_point(points[index]) if gap <= reach else None
+
+    def list_edges_near(self, point: Point, reach: float) -> list[tuple[Point, Point]]:
+        """Return the ends of the edges within `reach` meters, the nearest first."""
+        x, y = point
+        indices = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
+        starts = self._starts[indices]
+        ends = self._ends[indices]
+        _, gaps = find_nearest_on_edges(starts, ends, point)
+        order = np.argsort(gaps, kind="stable")
+        order = order[gaps[order] <= reach][:MAX_EDGES]
+        return [(_to_point(starts[k]), _to_point(ends[k])) for k in order]
+
+    def find_aligned(self, point: Point, axis: int, reach: float, horizon: float) -> Point | None:
+        """Return the mark that is best aligned with a point.
+
+        Parameters
+        ----------
+        point : Point
+            Position of the pointer, m.
+        axis : int
+            0 for marks with nearly the same x, 1 for the same y.
+        reach : float
+            Maximum difference along the axis, m.
+        horizon : float
+            Maximum distance of the mark, m.
+
+        Returns
+        -------
+        Point or None
+            The mark with the smallest difference along the axis, of several the nearest.
+        """
+        marks = self._sorted_marks[axis]
+        first, last = np.searchsorted(marks[:, axis], (point[axis] - reach, point[axis] + reach))
+        near = marks[first:last]
+        near = near[np.hypot(*(near - point).T) <= horizon]
+        if not len(near):
+            return None
+        differences = np.round(np.abs(near[:, axis] - point[axis]), 9)
+        order = np.lexsort((np.hypot(*(near - point).T), differences))
+        return _to_point(near[order[0]])
+
+
+def list_outline_edges(polygons: Sequence[shapely.Geometry]) -> Edges:
+    """Return the edges of the outlines of polygons."""
+    rings = shapely.get_rings(np.array(polygons, dtype=object))
+    points, ring_numbers = shapely.get_coordinates(rings, return_index=True)
+    is_edge = ring_numbers[1:] == ring_numbers[:-1]
+    return Edges(points[:-1][is_edge], points[1:][is_edge])
+
+
+def _to_point(coordinates: Array) -> Point:
+    x, y = coordinates.tolist()
+    return x, y

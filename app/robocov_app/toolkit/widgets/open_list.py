@@ -1,0 +1,159 @@
+"""The list of a drop-down menu while it is open."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.colors import mix
+from robocov_app.look.theme import Theme
+from robocov_app.render.fonts import render_text, shorten_to_width
+from robocov_app.toolkit.overlay import draw_rounded_box, get_field_color
+from robocov_app.toolkit.window.input import ENTER_KEYS, get_key_name, get_wheel_notches, is_function_key
+
+# Lengths in pixels at scale 1.
+MAX_LIST_HEIGHT_PX = 268.0
+LIST_ROW_PX = 24.0
+_TEXT_PX = 12.0
+
+_TO_END = 9999
+"""Step that leads beyond the end of any list, which limits it."""
+_KEY_STEPS = {"up": -1, "down": 1, "page up": -8, "page down": 8, "home": -_TO_END, "end": _TO_END}
+
+
+class ListResponse(Enum):
+    """Effect of an event on an open list."""
+
+    IGNORED = "ignored"
+    """The event is not for the list."""
+    HANDLED = "handled"
+    CLOSED = "closed"
+    """The list closes, and the value stays."""
+    PICKED = "picked"
+    """An option was picked."""
+
+
+@dataclass
+class OpenList:
+    """An open list of options.
+
+    Attributes
+    ----------
+    key : str
+        Key of its menu.
+    options : list of str
+    rect : pygame.Rect
+        Place in the window.
+    row_height : int
+        Height of an option, px.
+    chosen : int
+        Number of the highlighted option.
+    top : float
+        Length that is scrolled out of view at the top, px.
+    picked : str or None
+        Option that was picked.
+    """
+
+    key: str
+    options: list[str]
+    rect: Rect
+    row_height: int
+    chosen: int = 0
+    top: float = 0.0
+    picked: str | None = None
+
+    @property
+    def max_top(self) -> float:
+        """Maximum of `top`: length of the options that does not fit into the list, px."""
+        return max(len(self.options) * self.row_height + 2 - self.rect.height, 0)
+
+    def get_item_rect(self, number: int) -> Rect:
+        """Return the place of an option, which may be out of view."""
+        y = self.rect.top + 1 + number * self.row_height - round(self.top)
+        return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row_height)
+
+    def find_item(self, pixel: tuple[int, int]) -> int | None:
+        """Return the number of the option at a pixel; None if there is none."""
+        number = int((pixel[1] - self.rect.top - 1 + self.top) // self.row_height)
+        is_item = self.rect.collidepoint(pixel) and 0 <= number < len(self.options)
+        return number if is_item else None
+
+    def choose(self, number: int) -> None:
+        """Highlight an option, or the nearest one that exists, and scroll it into view."""
+        self.chosen = min(max(number, 0), len(self.options) - 1)
+        low = self.chosen * self.row_height
+        high = (self.chosen + 1) * self.row_height + 2 - self.rect.height
+        self.top = min(max(self.top, high, 0.0), low)
+
+    def highlight(self, pixel: tuple[int, int]) -> None:
+        """Highlight the option at a pixel, if there is one."""
+        number = self.find_item(pixel)
+        if number is not None:
+            self.chosen = number
+
+    def handle_event(self, event: pygame.event.Event) -> ListResponse:
+        """Handle an event. While the list is open, it gets all events."""
+        if event.type == pygame.MOUSEBUTTONDOWN:
+            number = self.find_item(event.pos)
+            return ListResponse.CLOSED if number is None else self._pick(number)
+        if event.type == pygame.MOUSEWHEEL:
+            top = self.top - get_wheel_notches(event) * self.row_height
+            self.top = min(max(top, 0.0), self.max_top)
+            return ListResponse.HANDLED
+        if event.type == pygame.KEYDOWN:
+            return self._handle_key(get_key_name(event))
+        if event.type in (pygame.MOUSEBUTTONUP, pygame.TEXTINPUT):
+            return ListResponse.HANDLED
+        return ListResponse.IGNORED
+
+    def _handle_key(self, name: str) -> ListResponse:
+        if name in _KEY_STEPS:
+            self.choose(self.chosen + _KEY_STEPS[name])
+            return ListResponse.HANDLED
+        if name in (*ENTER_KEYS, "space"):
+            return self._pick(self.chosen)
+        if len(name) == 1 and self._choose_by_letter(name):
+            return ListResponse.HANDLED
+        return ListResponse.IGNORED if is_function_key(name) else ListResponse.CLOSED
+
+    def _pick(self, number: int) -> ListResponse:
+        self.picked = self.options[number]
+        return ListResponse.PICKED
+
+    def _choose_by_letter(self, letter: str) -> bool:
+        """Highlight the next option that starts with a letter; return whether there is one."""
+        numbers = [k for k, option in enumerate(self.options) if option.lower().startswith(letter)]
+        if not numbers:
+            return False
+        self.choose(next((number for number in numbers if number > self.chosen), numbers[0]))
+        return True
+
+    def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
+        """Draw the list over the window."""
+        field = get_field_color(theme)
+        edge = mix(theme.panel, theme.ink, 0.4)
+        draw_rounded_box(screen, self.rect, field, edge=edge, radius=round(4 * scale))
+        inner = self.rect.inflate(-2, -2)
+        text_margin = round((24 if self.max_top else 14) * scale)
+        size = round(_TEXT_PX * scale)
+        screen.set_clip(inner)
+        for number, option in enumerate(self.options):
+            item = self.get_item_rect(number)
+            if not item.colliderect(inner):
+                continue
+            if number == self.chosen:
+                screen.fill(mix(field, theme.final, 0.25), item)
+            text = render_text(shorten_to_width(option, size, item.width - text_margin), size, theme.ink)
+            screen.blit(text, text.get_rect(midleft=(item.left + round(8 * scale), item.centery)))
+        if self.max_top:
+            self._draw_scroll_bar(screen, inner, theme, scale)
+        screen.set_clip(None)
+
+    def _draw_scroll_bar(self, screen: Surface, inner: Rect, theme: Theme, scale: float) -> None:
+        full_height = inner.height + self.max_top
+        bar = Rect(0, 0, round(6 * scale), round(inner.height * inner.height / full_height))
+        top = inner.top + round(self.top * inner.height / full_height)
+        bar.topright = inner.right - round(2 * scale), top
+        color = mix(theme.panel, theme.ink, 0.3)
+        draw_rounded_box(screen, bar, color, edge=color, radius=round(3 * scale))

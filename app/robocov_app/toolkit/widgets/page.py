@@ -1,0 +1,287 @@
+"""The page of an immediate-mode interface: it runs for every event, handles the focus, and draws.
+
+`Page` knows no widgets. A widget is a function of a page, in `toolkit.widgets`, that takes a cell, reports
+how the user has used it, and draws itself; `toolkit.ui.Ui` is a page that has them as methods.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import perf_counter
+
+import pygame
+from pygame import Rect, Surface
+
+from robocov_app.look.colors import Color
+from robocov_app.look.theme import Theme
+from robocov_app.toolkit.widgets.open_list import OpenList
+from robocov_app.toolkit.widgets.row_layout import RowLayout
+from robocov_app.toolkit.widgets.text_edit import TextEdit
+from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
+from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
+
+_MAX_RUNS = 3
+"""Runs for one drawing. The height that a page needs is known only after it has run."""
+
+
+@dataclass
+class Widget:
+    """A widget as it appeared in the last run, for tool tips, the focus and tests.
+
+    Attributes
+    ----------
+    kind : str
+        Such as "button".
+    key : str
+        Unique among the widgets of this kind.
+    rect : pygame.Rect
+        Visible part in the window, px.
+    text : str
+    value : object
+    tip : str
+        Tool tip.
+    enabled : bool
+    """
+
+    kind: str
+    key: str
+    rect: Rect
+    text: str = ""
+    value: object = None
+    tip: str = ""
+    enabled: bool = True
+
+
+class Page(RowLayout):
+    """Runs the content of a page in a box of the window.
+
+    Parameters
+    ----------
+    theme : Theme
+    scale : float
+        Size of texts and widgets.
+
+    Attributes
+    ----------
+    background : color or None
+        Color behind the widgets; None if they are drawn over something else.
+    needs_redraw : bool
+        Whether the page may have changed since it was drawn.
+    surface : pygame.Surface or None
+        Surface to draw on; None in a run for an event.
+    pointer : tuple of int
+        Position of the mouse, px.
+    focus : str or None
+        Key of the widget that gets the keys.
+    active : str or None
+        Key of the widget on which a mouse button is held down.
+    grab_offset : float
+        Distance from the start of the knob that is dragged to the pointer, px.
+    edit : TextEdit or None
+        Text with the cursor, if the focused widget has one.
+    clipboard : Clipboard
+        Text that is copied from text fields and pasted into them.
+    open_list : OpenList or None
+        List of the drop-down menu that is open.
+    widgets : dict of str to Widget
+        Widgets of the last run by kind and key, such as "button:pause".
+    folded_sections : set of str
+        Keys of the sections whose content is hidden.
+    scroll_offsets, content_heights : dict of str to float
+        Length that is scrolled out of view, and height of all content, by the key of the scroll area.
+    tool_tip : ToolTip
+        Decides when the tip of the widget under the pointer appears.
+    """
+
+    def __init__(self, theme: Theme, scale: float = 1.0) -> None:
+        super().__init__(scale)
+        self.theme = theme
+        self.background: Color | None = theme.panel
+        self.needs_redraw = True
+        self.surface: Surface | None = None
+        self.pointer = (-1, -1)
+        self.focus: str | None = None
+        self.active: str | None = None
+        self.grab_offset = 0.0
+        self.edit: TextEdit | None = None
+        self.clipboard = Clipboard()
+        self.open_list: OpenList | None = None
+        self.widgets: dict[str, Widget] = {}
+        self.folded_sections: set[str] = set()
+        self.scroll_offsets: dict[str, float] = {}
+        self.content_heights: dict[str, float] = {}
+        self._event: pygame.event.Event | None = None
+        self._image: Surface | None = None
+        self._runs_again = False
+        self._last_click_s = -1.0
+        self._last_click_key = ""
+        self.tool_tip = ToolTip()
+
+    def build(self) -> None:
+        """Show and edit the content; called in every run."""
+
+    def run(self, event: pygame.event.Event | None = None, surface: Surface | None = None) -> None:
+        """Run the content for an event, for drawing, or only to learn its height.
+
+        Parameters
+        ----------
+        event : pygame.event.Event, optional
+        surface : pygame.Surface, optional
+            Surface to draw on.
+        """
+        self._event = event
+        self.surface = surface
+        self.restart()
+        self.widgets = {}
+        self.build()
+        self.end_row()
+        self._event = None
+        self.surface = None
+        if self.focus not in self.list_focusable_keys():
+            # The widget with the focus has disappeared.
+            self.focus = None
+            self.edit = None
+
+    def list_focusable_keys(self) -> list[str]:
+        """Return the keys of the widgets that can have the focus, in the order of Tab."""
+        widgets = self.widgets.values()
+        return [widget.key for widget in widgets if widget.enabled and widget.kind not in ("label", "bar")]
+
+    # Focus
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a text is edited, a list is open or a button is held down."""
+        return self.active is not None or self.edit is not None or self.open_list is not None
+
+    def stop_typing(self) -> None:
+        """Take the focus away from all widgets, and close the open list."""
+        self.focus = None
+        self.edit = None
+        self.open_list = None
+        self.needs_redraw = True
+
+    def set_focus(self, key: str) -> None:
+        """Give the focus to a widget; a text field gets the text cursor, too."""
+        self.focus = key
+        self.open_list = None
+        self.needs_redraw = True
+        entry = self.find("entry", key)
+        self.edit = None if entry is None else TextEdit.select_all(entry.text)
+
+    # Drawing
+
+    def draw(self, screen: Surface) -> None:
+        """Draw the page, or copy the last drawing if nothing has changed."""
+        if not self.needs_redraw and self._image is not None and self._image.get_size() == self.box.size:
+            screen.blit(self._image, self.box)
+            return
+        self.needs_redraw = False
+        for _ in range(_MAX_RUNS):
+            self._runs_again = False
+            if self.background is not None:
+                screen.fill(self.background, self.box)
+            self.run(None, screen)
+            if not self._runs_again:
+                break
+        if self.background is not None:
+            self._image = screen.subsurface(self.box.clip(screen.get_rect())).copy()
+
+    def request_another_run(self) -> None:
+        """Run the content once more for this drawing, because the height of something has changed."""
+        self._runs_again = True
+
+    def draw_overlays(self, screen: Surface) -> None:
+        """Draw the open list and the tool tip, which may be larger than the page."""
+        if self.open_list is not None:
+            self.open_list.draw(screen, self.theme, self.scale)
+        widget = next((widget for widget in self.find_hovered_widgets() if widget.tip), None)
+        if widget is not None and self.active is None and self.tool_tip.is_due:
+            x = self.pointer[0]
+            draw_tool_tip(screen, widget.tip, self.theme, self.scale, x=x, widget=widget.rect)
+
+    # For widgets
+
+    def is_pointer_inside(self) -> bool:
+        """Return whether the pointer is in the box of the page."""
+        return bool(self.box.collidepoint(self.pointer))
+
+    def find_hovered_widgets(self) -> Iterator[Widget]:
+        """Yield the widgets under the pointer; none while a list is open."""
+        if self.open_list is None and self.is_pointer_inside():
+            for widget in self.widgets.values():
+                if widget.rect.collidepoint(self.pointer):
+                    yield widget
+
+    def find(self, kind: str, key: str) -> Widget | None:
+        """Return a widget of the last run; None if there is none with this kind and key."""
+        return self.widgets.get(f"{kind}:{key}")
+
+    def is_event(self, event_type: int) -> bool:
+        """Return whether the run is for an event of a type that no widget has consumed."""
+        return self._event is not None and self._event.type == event_type
+
+    def consume_event(self) -> None:
+        """Hide the event from the following widgets."""
+        self._event = None
+
+    def get_event(self) -> pygame.event.Event | None:
+        """Return the event for which the page runs; None if there is none, or if it was consumed."""
+        return self._event
+
+    def get_key(self, key: str) -> str:
+        """Return the name of the key that was pressed for a widget; empty if there is none."""
+        if self._event is None or self.focus != key or self._event.type != pygame.KEYDOWN:
+            return ""
+        return get_key_name(self._event)
+
+    def is_hovered(self, rect: Rect) -> bool:
+        """Return whether the pointer is over a visible part of the page, and no button or list is in use."""
+        is_free = self.open_list is None and self.active is None
+        return is_free and bool(rect.collidepoint(self.pointer) and self.clip.collidepoint(self.pointer))
+
+    def is_pressed(self, rect: Rect) -> bool:
+        """Return whether the left button was just pressed over a visible part of the page."""
+        return self.is_event(pygame.MOUSEBUTTONDOWN) and self.is_hovered(rect)
+
+    def is_double_click(self, key: str) -> bool:
+        """Note a click on a widget, and return whether it is the second of a double click."""
+        now = perf_counter()
+        is_second = now - self._last_click_s < DOUBLE_CLICK_S and self._last_click_key == key
+        self._last_click_s = now
+        self._last_click_key = key
+        return is_second
+
+    def add_widget(self, widget: Widget, disabled_reason: str = "") -> None:
+        """Add a widget to those of this run.
+
+        Parameters
+        ----------
+        widget : Widget
+            Its rectangle is limited to the visible part.
+        disabled_reason : str
+            Why the widget is disabled, which becomes part of its tool tip; empty if it is enabled.
+        """
+        widget.rect = widget.rect.clip(self.clip)
+        widget.enabled = not disabled_reason
+        widget.tip = ": ".join(text for text in (widget.tip, disabled_reason) if text)
+        self.widgets[f"{widget.kind}:{widget.key}"] = widget
+
+    def add_clickable(self, widget: Widget, disabled_reason: str = "") -> bool:
+        """Add a widget that is clicked, or used by Enter or Space; return whether it just was."""
+        rect = widget.rect
+        key = widget.key
+        self.add_widget(widget, disabled_reason)
+        if disabled_reason:
+            return False
+        if self.is_pressed(rect):
+            self.active = key
+            self.consume_event()
+        elif self.is_event(pygame.MOUSEBUTTONUP) and self.active == key:
+            self.active = None
+            self.consume_event()
+            return bool(rect.collidepoint(self.pointer) and self.clip.collidepoint(self.pointer))
+        elif self.get_key(key) in (*ENTER_KEYS, "space"):
+            self.consume_event()
+            return True
+        return False

@@ -1,0 +1,153 @@
+"""Events of a page: the mouse, keys and typed text."""
+
+import pygame
+
+from robocov_app.toolkit.widgets.open_list import ListResponse
+from robocov_app.toolkit.widgets.page import Page
+from robocov_app.toolkit.window.input import ENTER_KEYS, get_key_name, is_function_key
+
+_WIDGET_KEYS = (*ENTER_KEYS, "space", "left", "right", "up", "down")
+"""Keys that mean something to a focused widget without a text cursor."""
+
+
+class PageEvents:
+    """Passes events to the widgets of a page, with a handler for each type of event.
+
+    Parameters
+    ----------
+    page : Page
+    """
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._handlers = {
+            pygame.MOUSEMOTION: self._handle_motion,
+            pygame.MOUSEBUTTONDOWN: self._handle_press,
+            pygame.MOUSEBUTTONUP: self._handle_release,
+            pygame.MOUSEWHEEL: self._handle_wheel,
+            pygame.KEYDOWN: self._handle_key,
+            pygame.TEXTINPUT: self._handle_text,
+            pygame.TEXTEDITING: self._handle_composition,
+        }
+
+    def handle(self, event: pygame.event.Event) -> bool:
+        """Pass an event to the widgets.
+
+        Returns
+        -------
+        bool
+            Whether the event was meant for the page.
+        """
+        handler = self._handlers.get(event.type)
+        return handler is not None and handler(event)
+
+    def _handle_motion(self, event: pygame.event.Event) -> bool:
+        page = self._page
+        page.pointer = event.pos
+        if page.open_list is not None:
+            page.open_list.highlight(event.pos)
+        if page.active is None:
+            widget = next(page.find_hovered_widgets(), None)
+            hovered = "" if widget is None else f"{widget.kind}:{widget.key}"
+            if page.tool_tip.note_hovered(hovered):
+                page.needs_redraw = True
+            return page.is_pointer_inside()
+        self._run_for(event)
+        return True
+
+    def _handle_press(self, event: pygame.event.Event) -> bool:
+        page = self._page
+        page.pointer = event.pos
+        if event.button != 1:
+            return page.is_pointer_inside()
+        page.tool_tip.restart()
+        if self._pass_to_list(event):
+            return True
+        if page.focus is not None and not self._is_focused_widget_at(event.pos):
+            page.stop_typing()
+        was_held = page.active is not None
+        self._run_for(event)
+        return was_held or page.is_pointer_inside()
+
+    def _handle_release(self, event: pygame.event.Event) -> bool:
+        page = self._page
+        page.pointer = event.pos
+        if self._pass_to_list(event):
+            return True
+        was_held = page.active is not None
+        self._run_for(event)
+        page.active = None
+        return was_held or page.is_pointer_inside()
+
+    def _handle_wheel(self, event: pygame.event.Event) -> bool:
+        if self._pass_to_list(event):
+            return True
+        self._run_for(event)
+        return self._page.active is not None or self._page.is_pointer_inside()
+
+    def _handle_key(self, event: pygame.event.Event) -> bool:
+        page = self._page
+        page.tool_tip.restart()
+        if self._pass_to_list(event):
+            return True
+        name = get_key_name(event)
+        if page.focus is None or (page.edit is not None and is_function_key(name)):
+            return False
+        if name in ("tab", "shift+tab"):
+            self._move_focus(-1 if name == "shift+tab" else 1)
+        elif name == "escape":
+            page.stop_typing()
+        elif page.edit is None and name not in _WIDGET_KEYS:
+            return False
+        self._run_for(event)
+        return True
+
+    def _handle_text(self, event: pygame.event.Event) -> bool:
+        page = self._page
+        if self._pass_to_list(event):
+            return True
+        if page.edit is None:
+            return False
+        page.edit.type(event.text)
+        page.needs_redraw = True
+        return True
+
+    def _handle_composition(self, event: pygame.event.Event) -> bool:
+        """Show the text that an input method is composing."""
+        page = self._page
+        if page.edit is None:
+            return False
+        page.edit.composed = event.text
+        page.needs_redraw = True
+        return True
+
+    def _run_for(self, event: pygame.event.Event) -> None:
+        self._page.needs_redraw = True
+        self._page.run(event)
+
+    def _pass_to_list(self, event: pygame.event.Event) -> bool:
+        """Pass an event to the open list; return whether it was meant for that."""
+        page = self._page
+        if page.open_list is None:
+            return False
+        page.needs_redraw = True
+        response = page.open_list.handle_event(event)
+        if response is ListResponse.CLOSED:
+            page.stop_typing()
+        elif response is ListResponse.PICKED:
+            page.focus = None
+            page.run()  # Its menu reads the picked option.
+            page.open_list = None
+        return response is not ListResponse.IGNORED
+
+    def _move_focus(self, step: int) -> None:
+        page = self._page
+        keys = page.list_focusable_keys()
+        if not keys or page.focus is None:
+            return
+        number = keys.index(page.focus) + step if page.focus in keys else 0
+        page.set_focus(keys[number % len(keys)])
+
+    def _is_focused_widget_at(self, pixel: tuple[int, int]) -> bool:
+        widgets = self._page.widgets.values()
+        return any(widget.key == self._page.focus and widget.rect.collidepoint(pixel) for widget in widgets)

@@ -1,0 +1,1 @@
+"""The main loop of a window, its display, its size and its end."""

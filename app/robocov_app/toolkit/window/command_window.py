@@ -1,0 +1,209 @@
+"""A window with commands, a panel, dialogs, help and a map: base class of the viewer and the editor."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import pygame
+from pygame import Surface
+
+from robocov_app.look.theme import Theme
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.help_page import draw_help_page
+from robocov_app.toolkit.commands.palette import create_palette
+from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.toolkit.panel import CommandPanel
+from robocov_app.toolkit.tools.pointer import Pointer
+from robocov_app.toolkit.window.input import MOUSE_EVENTS
+from robocov_app.toolkit.window.layout import Layout
+from robocov_app.toolkit.window.window import BaseWindow
+from robocov_app.toolkit.window.window_model import WindowModel
+
+Action: TypeAlias = Callable[[], object]
+
+
+@dataclass(frozen=True)
+class WindowActions:
+    """Actions of the window that commands of both windows start.
+
+    Attributes
+    ----------
+    show_next_tab : callable
+        Shows the next page of the panel.
+    toggle_fullscreen : callable
+        Switches full screen on and off.
+    save_screenshot : callable
+        Saves a picture of the window.
+    toggle_help : callable
+        Shows or hides the keys.
+    open_palette : callable
+        Opens the palette.
+    """
+
+    show_next_tab: Action
+    toggle_fullscreen: Action
+    save_screenshot: Action
+    toggle_help: Action
+    open_palette: Action
+
+
+class CommandWindow(BaseWindow):
+    """A window in which events go to the dialog, else to the panel, the keys of commands, or the map.
+
+    Parameters
+    ----------
+    model : WindowModel
+        State of the window.
+    dialogs : Dialogs
+        Open dialogs.
+    size : (width, height), px
+    scale : float
+        Size of texts and widgets.
+    screen : pygame.Surface, optional
+        Surface to draw on; by default a new window is opened.
+
+    Attributes
+    ----------
+    groups : tuple of str
+        Headings of the help, in their order.
+    keys_hint : str
+        Last line of the help.
+    palette_hint : str
+        Faint text in the empty field of the palette.
+    model : WindowModel
+        State of the window.
+    dialogs : Dialogs
+        Open dialogs.
+    is_help_open : bool
+        Whether the keys are shown.
+    commands : CommandTable
+        All commands.
+    panel : CommandPanel
+        The panel.
+    pointer : Pointer
+        The mouse over the map.
+    layout : Layout
+        Boxes of the window.
+    theme : Theme
+        Colors.
+    """
+
+    groups: tuple[str, ...] = ()
+    keys_hint = ""
+    palette_hint = ""
+
+    commands: CommandTable
+    panel: CommandPanel
+    pointer: Pointer
+    layout: Layout
+    theme: Theme
+
+    def __init__(
+        self,
+        model: WindowModel,
+        dialogs: Dialogs,
+        size: tuple[int, int],
+        scale: float,
+        screen: Surface | None = None,
+    ) -> None:
+        super().__init__(size, screen)
+        self.model = model
+        self.dialogs = dialogs
+        self.scale = scale
+        self.is_help_open = False
+
+    # Commands
+
+    def do(self, name: str) -> None:
+        """Run a command by its name; "cancel" closes the help first."""
+        if name == "cancel" and self.is_help_open:
+            self.is_help_open = False
+        else:
+            self.commands.run(name)
+
+    def toggle_help(self) -> None:
+        """Show or hide the keys."""
+        self.is_help_open = not self.is_help_open
+
+    def open_palette(self) -> None:
+        """Open the dialog that finds and runs commands by their names."""
+        self.dialogs.ask(create_palette(self.commands, self.palette_hint, self.show_result))
+
+    def show_result(self, message: str) -> None:
+        """Show the message of a command of the palette; empty for none."""
+        self.model.attempt(lambda: message)
+
+    # Events
+
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Handle an event: by the dialog that is open, else by panel, commands or map."""
+        if event.type == pygame.KEYUP:
+            self.commands.release_key(event)
+        elif event.type == pygame.WINDOWFOCUSLOST:
+            self.commands.reset_keys()
+        if event.type == pygame.QUIT:
+            self.handle_quit()
+        elif not self.dialogs.handle_event(event):
+            self._handle_below_dialogs(event)
+
+    def handle_quit(self) -> None:
+        """Handle that the user closes the window."""
+        self.closed = True
+
+    def open_file(self, path: Path) -> None:
+        """Open a file that was dropped on the window."""
+
+    def use_key(self, event: pygame.event.Event) -> bool:
+        """Use a key for something other than a command; return whether it was."""
+        return self.panel.handle_event(event)
+
+    def handle_mouse(self, event: pygame.event.Event) -> None:
+        """Handle an event of the mouse."""
+        self.pointer.handle_event(event, self.model.now)
+
+    def _handle_below_dialogs(self, event: pygame.event.Event) -> None:
+        if event.type == pygame.DROPFILE:
+            self.model.attempt(lambda: self.open_file(Path(event.file)))
+        elif event.type == pygame.KEYDOWN:
+            self.press_key(event)
+        elif event.type == pygame.MOUSEBUTTONDOWN and self.is_help_open:
+            self.is_help_open = False
+        elif event.type in MOUSE_EVENTS:
+            self.handle_mouse(event)
+        elif event.type == pygame.WINDOWLEAVE:
+            self.pointer.leave()
+        else:
+            self.panel.handle_event(event)
+
+    def press_key(self, event: pygame.event.Event) -> None:
+        """Handle a key: as input, or as the key of a command."""
+        if not self.use_key(event):
+            command = self.commands.press_key(event)
+            if command is not None:
+                self.do(command.name)
+        # The text of the key comes as an event of its own, and is not meant for a dialog that has opened.
+        self.dialogs.ignore_letter(event.unicode)
+
+    # Faults and drawing
+
+    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+        """Show a message on an unexpected exception; if drawing raised it, close what may be the cause."""
+        if in_drawing:
+            self.restore_view()
+        self.model.show_message(message, is_error=True)
+        self.model.revision += 1
+
+    def restore_view(self) -> None:
+        """Close everything that may be the cause of an exception in drawing."""
+        self.is_help_open = False
+        self.dialogs.discard()
+
+    def draw_above_map(self) -> None:
+        """Draw help and dialog, and show the frame."""
+        scale = self.layout.scale
+        if self.is_help_open:
+            commands = self.commands.commands
+            draw_help_page(self.screen, self.theme, scale, commands, groups=self.groups, hint=self.keys_hint)
+        self.dialogs.draw(self.screen, self.theme, scale)
+        self.show_screen()

@@ -1,0 +1,147 @@
+"""The display: SDL's driver, sizes and scale, and the title of the window."""
+
+import gc
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import pygame
+from pygame import Surface
+
+from robocov.errors import InputError
+from robocov.text import remove_controls
+from robocov_app.toolkit.window.input import KEY_REPEAT_MS
+from robocov_app.toolkit.window.layout import MIN_SIZE_PX
+
+_DRIVER_VARIABLE = "SDL_VIDEODRIVER"
+_DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", _DRIVER_VARIABLE)
+"""Environment variables; Linux needs one of them for a visible window."""
+_INVISIBLE_DRIVERS = ("offscreen", "dummy", "evdev")
+"""Drivers that SDL chooses silently if there is no display; the program would run for ever, unseen."""
+_FULL_HD_HEIGHT_PX = 1080
+_MAX_SCALE = 3.0
+_SCALE_STEP = 0.25
+_COLLECTION_THRESHOLD = 50_000
+"""Allocations between two garbage collections: about one collection in a frame (Python's default is 700)."""
+
+
+@contextmanager
+def open_display(*, headless: bool, missing_message: str = "no display") -> Iterator[None]:
+    """Start pygame's display, visible or not.
+
+    Parameters
+    ----------
+    headless : bool
+        Whether windows are drawn without a display.
+    missing_message : str
+        Message if a visible window is not possible.
+
+    Raises
+    ------
+    InputError
+        If a visible window is not possible.
+    """
+    previous_driver = os.environ.get(_DRIVER_VARIABLE)
+    if headless:
+        os.environ[_DRIVER_VARIABLE] = "dummy"
+    try:
+        _start_display(missing_message, may_be_invisible=headless)
+        pygame.font.init()
+        pygame.key.set_repeat(*KEY_REPEAT_MS)
+        try:
+            yield
+        finally:
+            pygame.display.quit()
+    finally:
+        # Otherwise a later window of this process would be invisible, too.
+        if previous_driver is None:
+            os.environ.pop(_DRIVER_VARIABLE, None)
+        else:
+            os.environ[_DRIVER_VARIABLE] = previous_driver
+
+
+def _start_display(missing_message: str, *, may_be_invisible: bool) -> None:
+    """Start pygame's display, or raise an InputError with a message if it would be invisible but must not."""
+    has_display = sys.platform != "linux" or any(os.environ.get(name) for name in _DISPLAY_VARIABLES)
+    if not has_display:
+        raise InputError(missing_message)
+    try:
+        pygame.display.init()
+    except pygame.error:
+        raise InputError(missing_message) from None
+    driver = pygame.display.get_driver()
+    is_requested = may_be_invisible or driver == os.environ.get(_DRIVER_VARIABLE, "")
+    if driver in _INVISIBLE_DRIVERS and not is_requested:
+        pygame.display.quit()
+        raise InputError(missing_message)
+
+
+def get_screen_scale() -> float:
+    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
+    height = max((size[1] for size in pygame.display.get_desktop_sizes()), default=_FULL_HD_HEIGHT_PX)
+    scale = round(height / _FULL_HD_HEIGHT_PX / _SCALE_STEP) * _SCALE_STEP
+    return float(min(max(scale, 1.0), _MAX_SCALE))
+
+
+def choose_scale(requested: float | None, *, has_display: bool) -> float:
+    """Return the scale of a window: the requested one, or the one that suits the display.
+
+    Parameters
+    ----------
+    requested : float or None
+        Scale from an option or the settings.
+    has_display : bool
+        Whether the window is visible.
+    """
+    if requested:
+        return requested
+    return get_screen_scale() if has_display else 1.0
+
+
+def fit_to_screen(size: tuple[int, int]) -> tuple[int, int]:
+    """Return a size in pixels that is not larger than the screen."""
+    max_width, max_height = max(pygame.display.get_desktop_sizes(), default=size)
+    width, height = size
+    return min(width, max_width), min(height, max_height)
+
+
+def open_window(size: tuple[int, int]) -> Surface:
+    """Open the window that the user can resize, and return its surface.
+
+    Parameters
+    ----------
+    size : (width, height), px
+
+    Returns
+    -------
+    pygame.Surface
+    """
+    screen = pygame.display.set_mode(size, pygame.RESIZABLE)
+    with suppress(AttributeError, pygame.error), warnings.catch_warnings():
+        # There is no other way yet to give a window of the display module a minimum size.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pygame.Window.from_display_module().minimum_size = MIN_SIZE_PX
+    return screen
+
+
+def set_title(title: str) -> None:
+    """Set the title of the window, without control characters, if it has changed."""
+    title = remove_controls(title, single_line=True)
+    if title != pygame.display.get_caption()[0]:
+        pygame.display.set_caption(title)
+
+
+@contextmanager
+def collect_garbage_rarely() -> Iterator[None]:
+    """Exempt existing objects from garbage collection, which would delay a frame by 25 ms."""
+    previous_threshold = gc.get_threshold()
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(_COLLECTION_THRESHOLD, *previous_threshold[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*previous_threshold)
+        gc.unfreeze()

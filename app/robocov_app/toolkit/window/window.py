@@ -1,0 +1,351 @@
+"""A window and its loop: events come in, and a frame is drawn if something has changed."""
+
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from time import perf_counter
+from typing import Protocol
+
+import pygame
+from pygame import Surface
+
+from robocov.files.writing import replace_file
+from robocov_app.look.theme import LIGHT
+from robocov_app.terminal.output import find_free_path
+from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.window.display import collect_garbage_rarely, open_window
+from robocov_app.toolkit.window.faults import FaultLog
+from robocov_app.toolkit.window.input import clean_event
+from robocov_app.toolkit.window.mouse_cursor import MouseCursor
+from robocov_app.toolkit.window.termination import is_ending
+
+FPS = 60
+"""Frames per second while something moves."""
+CALM_S = 0.8
+"""Time without changes after which the loop waits for events. Tool tips appear earlier."""
+MAX_WAIT_S = 0.1
+"""Maximum time between two checks for changes while the loop waits."""
+
+_MIN_SURFACE_PX = (320, 240)
+"""Size of what is drawn, however small the window is."""
+_MAX_FAULTS_IN_A_ROW = 5
+"""Faults of the same action after which it is tried only every `_RETRY_S` seconds."""
+_RETRY_S = 1.0
+_RATE_WEIGHT = 0.05
+"""Weight of a frame in the mean frame rate."""
+_MAX_RATE = 1000.0
+
+RollBack = Callable[[], None]
+"""A function that reverts all changes since it was created."""
+
+
+class Remote(Protocol):
+    """A place other than the screen where a window is displayed and used."""
+
+    def wait(self, seconds: float) -> None:
+        """Wait until a message arrives, at most for some seconds."""
+
+    def receive(self, window: "BaseWindow") -> None:
+        """Give the window the size and appearance that are requested there, and post the input."""
+
+    def send(self, surface: Surface, cursor: int) -> None:
+        """Show the present frame, and the shape of the cursor."""
+
+
+class BaseWindow:
+    """A window that is drawn while something moves, and otherwise only when something has changed.
+
+    An unexpected exception never ends it. The exception is logged by `faults` and reported in the window, the
+    changes that the event has made are reverted, and the loop continues.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    screen : pygame.Surface, optional
+        Surface to draw on; by default a new window is opened.
+
+    Attributes
+    ----------
+    contains_faults : bool
+        Whether unexpected exceptions are reported instead of raised. Tests set it to False.
+    screen : pygame.Surface
+        Surface on which the window is drawn.
+    windowed_size : tuple of int or None
+        Size before full screen, px; None if the window does not fill the screen.
+    closed : bool
+        Whether the loop ends.
+    inner : BaseWindow or None
+        Window that is shown in its place for a while.
+    remote : Remote or None
+        Where the window is displayed, if that is not the screen.
+    cursor : MouseCursor
+    faults : FaultLog
+    frame_rate : float
+        Mean number of frames per second.
+    """
+
+    contains_faults = True
+
+    def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
+        self.screen = screen or open_window(size)
+        self.windowed_size: tuple[int, int] | None = None
+        self.closed = False
+        self.inner: BaseWindow | None = None
+        self.remote: Remote | None = None
+        self.cursor = MouseCursor()
+        self.faults = FaultLog()
+        self.frame_rate = float(FPS)
+        self._faults_in_a_row: dict[str, int] = {}
+        self._retry_at_s: dict[str, float] = {}
+        self._calm_s = 0.0
+        self._had_events = False
+        self._drawn_state: object = None
+
+    # Methods that windows override
+
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Handle an event."""
+
+    def update(self, seconds: float) -> None:
+        """Let time pass."""
+
+    def draw(self) -> None:
+        """Draw everything, and show it."""
+
+    def get_visible_state(self) -> object:
+        """Return a key of everything that changes the frame without an event; None while something moves."""
+        return None
+
+    def close(self) -> None:
+        """Stop everything that runs besides the window."""
+
+    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
+        """Adopt the appearance that suits the place where the window is displayed.
+
+        Parameters
+        ----------
+        scale : float
+            Size of texts and widgets.
+        theme : str
+        panel : bool or None
+            Whether the panel is shown; None to leave it as it is.
+        """
+
+    def create_save_point(self) -> RollBack:
+        """Return a function that reverts all later changes; it is called if an event raises."""
+        return _revert_nothing
+
+    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+        """Show a message about an unexpected exception; if drawing raised it, close what may be the cause."""
+
+    # Loop
+
+    def run(self) -> None:
+        """Run the window until it is closed or the process has to end."""
+        clock = pygame.time.Clock()
+        previous_s = perf_counter()
+        try:
+            with collect_garbage_rarely():
+                while not (self.closed or is_ending()):
+                    now_s = perf_counter()
+                    self.run_frame(now_s - previous_s)
+                    previous_s = now_s
+                    self._wait(clock, now_s)
+        finally:
+            self._run_contained("closing", self.close)
+
+    def _wait(self, clock: pygame.time.Clock, frame_start_s: float) -> None:
+        """Wait for the next frame; while the window rests, until something happens."""
+        if self.remote is not None:
+            wait_s = MAX_WAIT_S if self.is_resting else 1.0 / FPS
+            self.remote.wait(frame_start_s + wait_s - perf_counter())
+            return
+        clock.tick(FPS)
+        # SDL's own function that waits for events polls a thousand times a second.
+        while self.is_resting and perf_counter() - frame_start_s < MAX_WAIT_S and not pygame.event.peek():
+            clock.tick(FPS)
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether nothing has changed for a while."""
+        return self._calm_s >= CALM_S
+
+    def run_frame(self, seconds: float) -> None:
+        """Handle the events, let time pass, and draw what has changed."""
+        was_resting = self.is_resting
+        self.advance(seconds)
+        if self.closed:
+            return
+        self._run_contained("drawing", lambda: self._draw_if_changed(seconds, was_resting=was_resting))
+        remote = self.remote
+        if remote is not None:
+            self._run_contained("sending a picture", lambda: remote.send(self.screen, self.cursor.shape))
+
+    def _draw_if_changed(self, seconds: float, *, was_resting: bool) -> None:
+        window = self.inner or self
+        state = window.get_visible_state()
+        if self._had_events or state is None:
+            self._calm_s = 0.0
+        else:
+            self._calm_s += seconds
+        is_unchanged = was_resting and self.is_resting and state == self._drawn_state
+        if not is_unchanged:
+            self._drawn_state = None  # It is drawn again if drawing fails.
+            window.draw()
+        self._drawn_state = state
+
+    def advance(self, seconds: float) -> None:
+        """Handle all events that have arrived, and let time pass."""
+        remote = self.remote
+        if remote is not None:
+            self._run_contained("receiving messages of a page", lambda: remote.receive(self))
+        events = pygame.event.get()
+        self._had_events = bool(events)
+        for event in events:
+            if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
+                self.adopt_display()
+            self._handle_safely(event)
+        if self.closed:
+            return
+        if seconds > 0 and not self.is_resting:
+            self.frame_rate += _RATE_WEIGHT * (min(1.0 / seconds, _MAX_RATE) - self.frame_rate)
+        window = self.inner or self
+        self._run_contained(
+            "updating", lambda: self.update(seconds), create_save_point=window.create_save_point
+        )
+
+    # Faults
+
+    def _handle_safely(self, event: pygame.event.Event) -> None:
+        cleaned_event = clean_event(event)
+        if cleaned_event is None:
+            return
+        window = self.inner or self
+        succeeded = self._run_contained(
+            f"handling {pygame.event.event_name(event.type)}",
+            lambda: window.handle_event(cleaned_event),
+            create_save_point=window.create_save_point,
+        )
+        if event.type == pygame.QUIT and not succeeded:
+            self.closed = True  # Drafts are kept.
+
+    def _run_contained(
+        self,
+        action: str,
+        call: Callable[[], object],
+        *,
+        create_save_point: Callable[[], RollBack] | None = None,
+    ) -> bool:
+        """Run one part of a frame; log and report any exception, and revert the changes before it.
+
+        An action that fails again and again is tried only now and then, so that the window can be used.
+        MemoryError, and everything that is raised after the display was closed, is passed on.
+
+        Returns
+        -------
+        bool
+            Whether it succeeded.
+        """
+        if perf_counter() < self._retry_at_s.get(action, 0.0):
+            return False
+        if not self.contains_faults:
+            call()
+            return True
+        roll_back: RollBack | None = None
+        try:
+            if create_save_point is not None:
+                roll_back = create_save_point()
+            call()
+        except MemoryError:
+            raise
+        except Exception as error:
+            if not pygame.display.get_init():
+                raise
+            self._handle_fault(error, action, roll_back)
+            return False
+        self._faults_in_a_row.pop(action, None)
+        self._retry_at_s.pop(action, None)
+        return True
+
+    def _handle_fault(self, error: Exception, action: str, roll_back: RollBack | None) -> None:
+        count = self._faults_in_a_row.get(action, 0) + 1
+        self._faults_in_a_row[action] = count
+        if count >= _MAX_FAULTS_IN_A_ROW:
+            self._retry_at_s[action] = perf_counter() + _RETRY_S
+        message = self.faults.record(error, action)
+        if roll_back is not None and self._revert(roll_back):
+            message += " The action was undone."
+        message += " Save your work."
+        in_drawing = action == "drawing"
+        try:
+            (self.inner or self).report_fault(message, in_drawing=in_drawing)
+            if in_drawing:
+                self._draw_fault(message)
+        except Exception as second_error:
+            self.faults.record(second_error, "reporting an error")
+
+    def _revert(self, roll_back: RollBack) -> bool:
+        """Revert changes; return whether that succeeded."""
+        try:
+            roll_back()
+        except Exception as error:
+            self.faults.record(error, "undoing an action")
+            return False
+        return True
+
+    def _draw_fault(self, message: str) -> None:
+        """Draw a message over what was drawn before drawing failed."""
+        width, height = self.screen.get_size()
+        draw_message(self.screen, message, (0, 0, width, height), LIGHT, 1.0, is_error=True)
+        self.show_screen()
+
+    # Display
+
+    def adopt_display(self) -> None:
+        """Draw on the display from now on; if it is tiny, on a larger surface of which it shows a part.
+
+        Tiling window managers may make a window as small as a pixel, in which nothing can be laid out.
+        """
+        display = pygame.display.get_surface()
+        if display is None:
+            return
+        width, height = display.get_size()
+        min_width, min_height = _MIN_SURFACE_PX
+        if width < min_width or height < min_height:
+            self.screen = Surface((max(width, min_width), max(height, min_height)), 0, 32)
+        else:
+            self.screen = display
+
+    def show_screen(self) -> None:
+        """Show what was drawn."""
+        display = pygame.display.get_surface()
+        if display is not None and display is not self.screen:
+            display.blit(self.screen, (0, 0))
+        pygame.display.flip()
+
+    def toggle_fullscreen(self) -> None:
+        """Fill the screen, or return to the size before that."""
+        if self.remote is not None:
+            # The window has the size of a page, and a browser can do this by itself.
+            return
+        # pygame's own function keeps the size: the window would be in the middle of a black screen.
+        size = self.windowed_size
+        if size is None:
+            self.windowed_size = self.screen.get_size()
+            self.screen = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+        else:
+            self.windowed_size = None
+            self.screen = open_window(size)
+
+    def save_screenshot(self, folder: Path) -> str:
+        """Write the present frame to a new file, and return a message."""
+        target = find_free_path(folder, "robocov", ".png")
+        image = BytesIO()
+        pygame.image.save(self.screen, image, ".png")
+        with replace_file(target) as part:
+            part.write_bytes(image.getvalue())
+        return f"screenshot saved: {target}"
+
+
+def _revert_nothing() -> None:
+    pass

@@ -1,0 +1,74 @@
+"""The state that every window has: a status message, a clock, and actions whose errors are shown."""
+
+from collections.abc import Callable
+
+from robocov.errors import RobocovError
+from robocov_app.toolkit.window.faults import describe_os_error
+
+MESSAGE_S = 5.0
+"""Time for which a status message is shown."""
+
+
+class WindowModel:
+    """State of a window without pictures and events: base class of the models of both windows.
+
+    Attributes
+    ----------
+    error_message_s : float
+        Time for which an error message is shown.
+    revision : int
+        Grows whenever the window has to be drawn again.
+    message : str
+        Status message; empty after a few seconds.
+    has_error_message : bool
+        Whether the message reports an error.
+    now : float
+        Time since the window was opened, s.
+    """
+
+    error_message_s = MESSAGE_S
+
+    def __init__(self) -> None:
+        self.revision = 0
+        self.message = ""
+        self.has_error_message = False
+        self.now = 0.0
+        self._message_time = 0.0
+
+    def show_message(self, text: str, *, is_error: bool = False) -> None:
+        """Show a status message; an empty one leaves the present message."""
+        if text:
+            self.message = text
+            self.has_error_message = is_error
+            self._message_time = self.now
+
+    def clear_message(self) -> None:
+        """Remove the status message."""
+        self.message = ""
+
+    def pass_time(self, seconds: float) -> None:
+        """Advance the clock, and remove the status message once it has been shown long enough."""
+        self.now += seconds
+        duration = self.error_message_s if self.has_error_message else MESSAGE_S
+        if self.now - self._message_time > duration:
+            self.clear_message()
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Carry an action out; show the message that it returns, or its error."""
+        try:
+            self.carry_out(action)
+        except RobocovError as error:
+            self.show_message(self.describe_error(error), is_error=True)
+        except OSError as error:
+            self.show_message(describe_os_error(error), is_error=True)
+
+    def carry_out(self, action: Callable[[], object]) -> None:
+        """Carry an action out, and show the message that it returns; errors are raised."""
+        self.revision += 1
+        message = action()
+        if isinstance(message, str):
+            self.show_message(message)
+
+    def describe_error(self, error: RobocovError) -> str:
+        """Return the message of an error as the window shows it."""
+        return str(error)

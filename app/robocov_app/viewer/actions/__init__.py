@@ -1,0 +1,1 @@
+"""Actions of the user, grouped by subject."""

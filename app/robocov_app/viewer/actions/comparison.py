@@ -1,0 +1,86 @@
+"""Actions on controllers: choose one, compare several side by side, set gains and limits."""
+
+from robocov.controllers.gains import Value
+from robocov_app.viewer.actions.playback import find_next
+from robocov_app.viewer.model import ViewerModel
+from robocov_app.viewer.panel.parameters import (
+    Parameter,
+    list_gain_parameters,
+    list_limit_parameters,
+    replace_limit,
+)
+from robocov_app.viewer.session.controller_choice import ControllerChoice
+
+
+class ComparisonActions:
+    """Chooses controllers and their gains, in one pane or in several.
+
+    Parameters
+    ----------
+    viewer : ViewerModel
+        The viewer.
+    """
+
+    def __init__(self, viewer: ViewerModel) -> None:
+        self._viewer = viewer
+
+    def add_pane(self) -> None:
+        """Add a pane with a controller that is not shown yet, and restart."""
+        viewer = self._viewer
+        present = {pane.controller.name for pane in viewer.session.timeline.panes}
+        absent = [name for name in viewer.controllers if name not in present]
+        name = absent[0] if absent else viewer.controllers[0]
+        viewer.session.add_pane(ControllerChoice(name))
+        viewer.inspection.active_pane = len(viewer.session.timeline.panes) - 1
+        viewer.show_message("all controllers restart from the same starts")
+
+    def remove_pane(self) -> None:
+        """Remove the active pane."""
+        self._viewer.session.remove_pane(self._viewer.pane)
+
+    def activate_next_pane(self) -> None:
+        """Make the next pane the active one, whose controller and gains are edited."""
+        viewer = self._viewer
+        viewer.inspection.active_pane = (viewer.active_pane + 1) % len(viewer.session.timeline.panes)
+
+    def choose_next_controller(self) -> None:
+        """Use the next controller in the active pane."""
+        viewer = self._viewer
+        name = find_next(viewer.controllers, viewer.session.displayed.get_setup(viewer.pane).controller.name)
+        viewer.session.set_controller(viewer.pane, ControllerChoice(name))
+
+    def set_controller(self, number: int, name: str) -> None:
+        """Use a controller in the pane with an index; its gains stay if it is already used there."""
+        session = self._viewer.session
+        pane = session.timeline.panes[number]
+        if session.displayed.get_setup(pane).controller.name != name:
+            session.set_controller(pane, ControllerChoice(name))
+        self._viewer.inspection.active_pane = number
+
+    def use_controller(self, name: str) -> None:
+        """Use a controller in the active pane, even one that is not in the list yet.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such controller.
+        """
+        viewer = self._viewer
+        ControllerChoice(name).build()
+        if name not in viewer.controllers:
+            viewer.controllers.append(name)
+        self.set_controller(viewer.active_pane, name)
+
+    def list_parameters(self) -> list[Parameter]:
+        """Return the gains of the active pane's controller and the limits of the team."""
+        setup = self._viewer.session.displayed.get_setup(self._viewer.pane)
+        return [*list_gain_parameters(setup.controller), *list_limit_parameters(setup.properties)]
+
+    def set_parameter(self, name: str, value: Value) -> None:
+        """Set a gain, or a limit with the prefix ``team.``."""
+        viewer = self._viewer
+        setup = viewer.session.displayed.get_setup(viewer.pane)
+        if name.startswith("team."):
+            viewer.session.set_properties(replace_limit(setup.properties, name, value))
+        else:
+            viewer.session.set_controller(viewer.pane, setup.controller.with_gain(name, value))

@@ -1,0 +1,1 @@
+"""The canvas: panes of the controllers, the legend, and overlays of tools."""

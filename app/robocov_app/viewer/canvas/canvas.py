@@ -1,0 +1,306 @@
+"""The canvas: one painted pane for each controller, one camera for all, and previews of tools on top."""
+
+from dataclasses import replace
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array
+from robocov.environment import Environment, Point
+from robocov_app.look.colors import mix
+from robocov_app.look.legend import merge_legends
+from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.theme import Theme
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.density_text import format_cost, get_cost_name
+from robocov_app.render.distance_colors import choose_color_limit
+from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
+from robocov_app.render.layers.robots import compute_drawn_radii
+from robocov_app.render.painter import Painter
+from robocov_app.render.scene import Scene
+from robocov_app.toolkit.tools.viewport import REACH_PX, zoom_about
+from robocov_app.toolkit.window.layout import Layout, is_inside
+from robocov_app.viewer.canvas.shared_legend import SharedLegend
+from robocov_app.viewer.canvas.tool_overlay import (
+    FAILED_RADIUS_PX,
+    draw_drag,
+    draw_failed_selection,
+    draw_hovered_robot,
+    draw_tool_state,
+)
+from robocov_app.viewer.costs.costs import KnownCost
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.states import PaneSetup
+from robocov_app.viewer.view import FADE_S
+
+MAX_RAYS_PER_SCAN = 120
+MAX_RAYS_PER_PANE = 720
+MIN_RAYS_PER_SCAN = 24  # with fewer, scans are not drawn
+UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimited
+MAX_COST_LAG_S = 0.25  # an older cost is shown with its time
+
+# Lengths in pixels at scale 1.
+_HIT_MARGIN_PX = 3.0  # around a robot
+_COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while it is filled to a fraction between these
+_NO_ROBOT = (-1, -1)
+
+
+class ViewerCanvas:
+    """Draws the panes of a session, and finds points and robots at pixels.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    theme : Theme
+        Colors.
+
+    Attributes
+    ----------
+    hovered : tuple of int
+        Index of the pane and number of the robot under the cursor; -1 for none.
+    layout : Layout
+        Layout of the window, from `arrange`.
+    """
+
+    layout: Layout
+
+    def __init__(self, viewer: Presenter, theme: Theme) -> None:
+        self.viewer = viewer
+        self.theme = theme
+        self.hovered = _NO_ROBOT
+        self._painters: list[Painter] = []
+        self._scenes: list[Scene] = []
+        self._environment: Environment | None = None
+        self._camera: Camera | None = None  # None while the whole map is shown
+        self._color_limit = 1.0  # end of the color scale of distances, m
+        self._legend = SharedLegend(theme)
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Build the painters of the panes for a layout of the window."""
+        self.layout = layout
+        self.theme = theme
+        self._environment = self.viewer.session.displayed.environment
+        self._painters = []
+        for _, _, width, height in layout.panes:
+            layers = build_standard_layers()
+            if len(layout.panes) > 1:
+                # Panes share the time, which is in the window's own status line.
+                layers = [layer for layer in build_pane_layers() if layer.name != "status"]
+            painter = Painter(self._environment, (width, height), theme, layers, layout.scale)
+            if self._camera is not None:
+                painter.camera = self._camera.with_view(painter.camera.view)
+            self._painters.append(painter)
+        self._legend.theme = theme
+
+    def fit(self) -> None:
+        """Show the whole map."""
+        self._camera = None
+        for painter in self._painters:
+            painter.fit()
+
+    def zoom(self, factor: float, pixel: tuple[float, float]) -> None:
+        """Zoom by a factor about a pixel."""
+        pane = self.find_pane(pixel) or 0
+        left, top, _, _ = self.layout.panes[pane]
+        camera = self._painters[pane].camera
+        map_size = float(np.ptp(self._get_bounds(), axis=0).max())
+        self._set_camera(zoom_about(camera, factor, (pixel[0] - left, pixel[1] - top), map_size))
+
+    def pan(self, dx: float, dy: float) -> None:
+        """Move the map by a number of pixels; the center of the panes stays within its bounds."""
+        camera = self._painters[0].camera.pan(dx, dy)
+        x, y = np.clip(camera.center, *self._get_bounds()).tolist()
+        self._set_camera(replace(camera, center=(x, y)))
+
+    def _get_bounds(self) -> Array:
+        """Return the bounds of the map, lowest and highest x and y, (2, 2) m."""
+        return np.reshape(self.viewer.session.displayed.environment.region.bounds, (2, 2))
+
+    def _set_camera(self, camera: Camera) -> None:
+        self._camera = camera
+        for painter in self._painters:
+            painter.camera = camera.with_view(painter.camera.view)
+
+    def find_pane(self, pixel: tuple[float, float]) -> int | None:
+        """Return the index of the pane at a pixel."""
+        for pane, box in enumerate(self.layout.panes):
+            if is_inside(box, pixel):
+                return pane
+        return None
+
+    def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
+        """Return the point of the map at a pixel of a pane, m."""
+        x, y = self._painters[pane].camera.to_world(np.subtract(pixel, self.layout.panes[pane][:2])).tolist()
+        return x, y
+
+    def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
+        """Return the pixel at which a pane shows a point of the map, m."""
+        left, top, _, _ = self.layout.panes[pane]
+        x, y = self._painters[pane].camera.to_pixels(np.array(point)).tolist()
+        return x + left, y + top
+
+    def get_reach(self, pane: int) -> float:
+        """Return the width of a finger on the map, m."""
+        return REACH_PX * self.layout.scale / self._painters[pane].camera.zoom
+
+    def find_robot(self, pixel: tuple[float, float], pane: int) -> int | None:
+        """Return the number of the robot, or failed robot, at a pixel of a pane."""
+        if pane >= len(self._scenes):
+            return None
+        scene = self._scenes[pane]
+        point = np.array(self.to_world(pixel, pane))
+        canvas = self._build_canvas(pygame.Surface((1, 1)), pane, scene)
+        distances = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
+        radii = np.array(compute_drawn_radii(canvas, scene)) + _HIT_MARGIN_PX * self.layout.scale
+        rows = np.flatnonzero(distances <= radii).tolist()
+        hits = [(float(distances[row]), scene.get_number(row)) for row in rows]
+        for number, position in scene.failed.items():
+            distance = float(np.hypot(*(np.array(position) - point))) * canvas.camera.zoom
+            if distance <= FAILED_RADIUS_PX * self.layout.scale:
+                hits.append((distance, number))
+        return min(hits, key=lambda hit: hit[0])[1] if hits else None
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw all panes."""
+        session = self.viewer.session
+        self._update_environment(session.displayed.environment)
+        self._scenes = []
+        panes = session.timeline.panes
+        # A pane that was just added has no place in the layout yet.
+        for pane, painter, box in zip(panes, self._painters, self.layout.panes, strict=False):
+            # The caption of a pane cannot be hidden.
+            fixed_layers = {"caption"} & {layer.name for layer in painter.layers}
+            painter.visible = self.viewer.view.layers | fixed_layers
+            scene = self._build_scene(pane, painter)
+            surface = screen.subsurface(pygame.Rect(box))
+            painter.draw(surface, scene)
+            self._draw_overlay(surface, len(self._scenes), scene)
+            self._scenes.append(scene)
+        if len(self._scenes) > 1:
+            self._draw_frames(screen)
+            self._legend.draw(screen, self._list_legend_entries(), self.layout, self._get_layers())
+
+    def _update_environment(self, environment: Environment) -> None:
+        """Let the painters show the present map; show all of it if its bounds have changed."""
+        before = self._environment
+        if environment is before:
+            return
+        self._environment = environment
+        for painter in self._painters:
+            painter.environment = environment
+        if before is not None and before.region.bounds != environment.region.bounds:
+            self.fit()
+
+    def _build_scene(self, pane: Pane, painter: Painter) -> Scene:
+        viewer = self.viewer
+        displayed = viewer.session.displayed
+        setup = displayed.get_setup(pane)
+        snapshot = displayed.get_snapshot(pane)
+        known = viewer.costs.known.get(pane.number)
+        selected = viewer.selected_robot
+        row = setup.numbers.index(selected) if selected in setup.numbers else None
+        if known is not None and painter.needs_field:
+            self._update_color_limit(known.field.max_distance)
+        return pane.build_scene(
+            setup,
+            snapshot,
+            displayed.get_trail(pane),
+            trail_fade=FADE_S if viewer.view.fades_trajectories else None,
+            field=known.field if known is not None and painter.needs_field else None,
+            field_limit=self._color_limit,
+            cost=self._describe_cost(pane),
+            selected=row,
+            scans=self._list_scans(pane, setup, snapshot.positions, row),
+            sensed=pane.sensed,
+            path=self._get_path(known),
+        )
+
+    def _update_color_limit(self, largest: float) -> None:
+        """Let the color scale follow the largest distance, m, without changing it in every frame."""
+        low, high = _COLOR_LIMIT_RANGE
+        if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
+            self._color_limit = choose_color_limit(1.1 * largest)
+
+    def _get_path(self, known: KnownCost | None) -> Array | None:
+        """Return the path from the cursor to its nearest robot, (k, 2) m."""
+        if known is None or self.viewer.inspection.cursor is None:
+            return None
+        return known.path
+
+    def _list_scans(
+        self, pane: Pane, setup: PaneSetup, positions: Array, selected: int | None
+    ) -> list[tuple[Array, Array]]:
+        """Return the scan of the selected robot; without one, those of all robots unless there are too many.
+
+        Returns
+        -------
+        list of tuple of array
+            Position of a robot, (2,) m, and the ends of its rays, (k, 2) m.
+        """
+        if "scan" not in self.viewer.view.layers:
+            return []
+        rows = range(len(setup.numbers)) if selected is None else range(selected, selected + 1)
+        rays = min(MAX_RAYS_PER_SCAN, MAX_RAYS_PER_PANE // len(rows))
+        if rays < MIN_RAYS_PER_SCAN:
+            return []
+        ranges = setup.team.sensing_range
+        reach = np.where(np.isfinite(ranges), ranges, UNLIMITED_SCAN_RANGE_M).tolist()
+        sensor = pane.simulation.sensor
+        return [(positions[row], sensor.scan_from(positions[row], rays, reach[row])[1]) for row in rows]
+
+    def _describe_cost(self, pane: Pane) -> str:
+        """Return the caption of a pane's cost. All panes show the cost of the same time."""
+        displayed = self.viewer.session.displayed
+        time, distances = displayed.get_costs()
+        _, travel_times = displayed.get_costs("time")
+        if pane.number not in distances:
+            return ""
+        name = get_cost_name(displayed.get_setup(pane).environment)
+        text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
+        return f"{text} at {time:.1f} s" if displayed.time - time > MAX_COST_LAG_S else text
+
+    def _build_canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
+        hues = choose_robot_hues(len(scene.team))
+        return Canvas(surface, self._painters[pane].camera, self.theme, self.layout.scale, hues)
+
+    def _draw_overlay(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
+        """Draw drags, highlights and previews on top of a pane."""
+        canvas = self._build_canvas(surface, pane, scene)
+        surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
+        session = self.viewer.session
+        draw_drag(canvas, scene, session.timeline.drag)
+        draw_failed_selection(canvas, scene, self.viewer.selected_robot)
+        if pane == self.hovered[0]:
+            draw_hovered_robot(canvas, scene, self.hovered[1])
+        draw_tool_state(canvas, self.viewer.tool.build_draw_state(session))
+        surface.set_clip(None)
+
+    def _draw_frames(self, screen: pygame.Surface) -> None:
+        """Draw a frame around each pane, and a bar in the color of the controller above the active one."""
+        theme = self.theme
+        for pane, box in enumerate(self.layout.panes):
+            rect = pygame.Rect(box)
+            pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
+            if pane == self.viewer.active_pane:
+                bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * self.layout.scale))))
+                controller = self.viewer.session.timeline.panes[pane].controller
+                screen.fill(theme.get_controller_color(controller.name), bar)
+
+    def count_legend_rows(self) -> int:
+        """Return the number of rows of the legend that the panes share; 0 for a single pane."""
+        if len(self._scenes) < 2:
+            return 0
+        return self._legend.count_rows(self._list_legend_entries(), self.layout, self._get_layers())
+
+    def _get_layers(self) -> frozenset[str]:
+        return frozenset(self.viewer.view.layers)
+
+    def _list_legend_entries(self) -> list[LegendEntry]:
+        # A pane that was just added has no scene yet.
+        pairs = zip(self._painters, self._scenes, strict=False)
+        return merge_legends(
+            (painter.legend_entries(scene) for painter, scene in pairs), lambda entry: entry.key
+        )

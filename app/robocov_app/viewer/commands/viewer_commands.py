@@ -1,0 +1,275 @@
+"""Commands of the viewer that need no window: keys, buttons, tool tips, help and palette read this list."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+
+from robocov.errors import ParameterError
+from robocov_app.toolkit.commands.command import Argument, Command, CommandGroup
+from robocov_app.viewer.panel.parameters import Parameter
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.clock import SPEEDS, format_speed
+
+GROUPS = ("Run", "Time", "Compare", "Edit", "Tools", "View", "File", "Help", "Show")
+"""Headings of the help, in their order."""
+
+RESIZE_STEP = 1.25  # factor of the keys [ and ]
+MIN_SPEED = 0.01
+MAX_SPEED = 1000.0
+
+_LAYER_KEYS = {
+    "cells": "1",
+    "centroids": "2",
+    "trajectories": "3",
+    "velocities": "4",
+    "force_attraction": "5",
+    "force_repulsion_robots": "6",
+    "force_repulsion_obstacle": "7",
+    "force_viscosity": "8",
+    "force_resultant": "9",
+    "links": "0",
+    "distances": "shift+1",
+    "geodesic_cells": "shift+2",
+    "path": "shift+3",
+    "scan": "shift+4",
+    "sensed": "shift+5",
+    "sensing": "shift+6",
+    "communication": "shift+7",
+    "obstacle_points": "shift+8",
+    "goals": "shift+9",
+    "starts": "shift+0",
+    "obstacles": "alt+1",
+    "boundary": "alt+2",
+    "grid": "alt+3",
+    "robots": "alt+4",
+    "failed": "alt+5",
+    "selection": "alt+6",
+    "legend": "alt+7",
+    "scale_bar": "alt+8",
+    "status": "alt+9",
+    "color_bar": "alt+0",
+    "density": "alt+d",
+}
+
+
+def list_viewer_commands(viewer: Presenter, layer_titles: dict[str, str]) -> list[Command]:
+    """Return the commands that need no window.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    layer_titles : dict of str to str
+        Titles of the layers by their names.
+
+    Returns
+    -------
+    list of Command
+        The commands, in the order of help and palette.
+    """
+    return [
+        *_list_run_commands(viewer),
+        *_list_time_commands(viewer),
+        *_list_compare_commands(viewer),
+        *_list_edit_commands(viewer),
+        *_list_view_commands(viewer),
+        *_list_file_commands(viewer),
+        *_list_tool_commands(viewer),
+        *_list_layer_commands(viewer, layer_titles),
+    ]
+
+
+def _list_run_commands(viewer: Presenter) -> list[Command]:
+    playback = viewer.playback
+    files = viewer.files
+    add_robot = partial(playback.restart_with_more_robots, 1)
+    remove_robot = partial(playback.restart_with_more_robots, -1)
+    slower = partial(playback.change_speed, -1)
+    faster = partial(playback.change_speed, 1)
+    next_map = partial(files.open_next_map, 1)
+    previous_map = partial(files.open_next_map, -1)
+    speeds = [format_speed(speed).rstrip("×") for speed in SPEEDS]
+    robots_argument = _build_whole_number_argument("robots")
+    start_argument = Argument("start", list_values=playback.list_starts)
+    map_argument = Argument("map or file", list_values=files.list_maps)
+    speed_argument = Argument("factor", _read_speed, lambda: speeds)
+
+    def set_robots(robots: int) -> None:
+        playback.restart(robots=robots)
+
+    def set_seed(seed: int) -> None:
+        playback.restart(seed=seed)
+
+    def set_start(name: str) -> None:
+        playback.restart(start=name)
+
+    group = CommandGroup("Run")
+    group.add("pause", "Play or pause", playback.toggle_pause, "space")
+    group.add("step", "Single step", playback.step, ".", repeats=True)
+    group.add("restart", "Restart", playback.restart, "r")
+    group.add("settle", "Play until settled, then stop", playback.toggle_settling, "s")
+    group.add("slower", "Slower", slower, "-", repeats=True)
+    group.add("faster", "Faster", faster, "=", "+", repeats=True)
+    group.add("seed:next", "New starting positions (next seed)", playback.restart_with_next_seed, "n")
+    group.add("start:next", "Next start of the map", playback.restart_at_next_start, "shift+n")
+    group.add("more", "Restart with one more robot", add_robot, "shift+=", "shift++", repeats=True)
+    group.add("fewer", "Restart with one fewer robot", remove_robot, "shift+-", repeats=True)
+    group.add("map:next", "Next map", next_map, "page down")
+    group.add("map:previous", "Previous map", previous_map, "page up")
+    group.add("robots", "Number of robots", set_robots, argument=robots_argument)
+    group.add("seed", "Seed", set_seed, argument=_build_whole_number_argument("seed"))
+    group.add("start", "Start of the map", set_start, argument=start_argument)
+    group.add("map", "Open a map", files.open_map, argument=map_argument)
+    group.add("speed", "Speed", playback.set_speed, argument=speed_argument)
+    return group.commands
+
+
+def _list_time_commands(viewer: Presenter) -> list[Command]:
+    playback = viewer.playback
+    step_back = partial(playback.look_by, -1)
+    step_forward = partial(playback.look_by, 1)
+    second_back = partial(playback.look_by_seconds, -1.0)
+    second_forward = partial(playback.look_by_seconds, 1.0)
+    go_to_start = partial(playback.look_at, 0.0)
+    previous_branch = partial(playback.enter_next_branch, -1)
+    next_branch = partial(playback.enter_next_branch, 1)
+    time_argument = Argument("seconds", partial(_read_positive_number, "time"))
+    branch_argument = Argument("branch", list_values=playback.list_branch_names)
+    group = CommandGroup("Time")
+    group.add("back", "Step back", step_back, "left", repeats=True)
+    group.add("forward", "Step forward", step_forward, "right", repeats=True)
+    group.add("back:second", "Back by a second", second_back, "shift+left", repeats=True)
+    group.add("forward:second", "Forward by a second", second_forward, "shift+right", repeats=True)
+    group.add("first", "Go to the start", go_to_start, "home")
+    group.add("live", "Go to the present", playback.look_at_present, "end")
+    group.add("branch:here", "Continue from here", playback.branch, "b")
+    group.add("branch:previous", "Previous branch", previous_branch, "alt+left")
+    group.add("branch:next", "Next branch", next_branch, "alt+right")
+    group.add("time", "Go to a time", playback.look_at, argument=time_argument)
+    group.add("branch", "Enter a branch", playback.enter_branch, argument=branch_argument)
+    return group.commands
+
+
+def _list_compare_commands(viewer: Presenter) -> list[Command]:
+    comparison = viewer.comparison
+    controller_argument = Argument("controller", list_values=lambda: viewer.controllers)
+    group = CommandGroup("Compare")
+    group.add("controller:next", "Next controller in this pane", comparison.choose_next_controller, "o")
+    group.add("pane:add", "Compare with one more controller", comparison.add_pane, "k")
+    group.add("pane:remove", "Remove this pane", comparison.remove_pane, "shift+k")
+    group.add("pane:next", "Next pane", comparison.activate_next_pane, "`")
+    group.add("controller", "Controller", comparison.use_controller, argument=controller_argument)
+    return group.commands
+
+
+def _list_edit_commands(viewer: Presenter) -> list[Command]:
+    playback = viewer.playback
+    robots = viewer.robots
+    select_next = partial(robots.select_next, 1)
+    select_previous = partial(robots.select_next, -1)
+    enlarge = partial(viewer.resize_tool, RESIZE_STEP)
+    shrink = partial(viewer.resize_tool, 1 / RESIZE_STEP)
+    robot_argument = _build_whole_number_argument("robot", lambda: map(str, viewer.robot_numbers))
+    group = CommandGroup("Edit")
+    group.add("undo", "Undo", playback.undo, "ctrl+z", repeats=True)
+    group.add("redo", "Redo", playback.redo, "ctrl+y", "ctrl+shift+z", repeats=True)
+    group.add("robot:next", "Inspect the next robot", select_next, "tab", repeats=True)
+    group.add("robot:previous", "Inspect the previous robot", select_previous, "shift+tab", repeats=True)
+    group.add("robot:fail", "Fail or revive selected robot", robots.fail_or_revive, "shift+d")
+    group.add("robot:remove", "Remove selected robot", robots.remove, "delete")
+    group.add("finish", "Finish drawing", viewer.finish_drawing, "return", "enter")
+    group.add("cancel", "Cancel", viewer.cancel, "escape")
+    group.add("wider", "Wider walls; a larger brush", enlarge, "]", repeats=True)
+    group.add("narrower", "Narrower walls; a smaller brush", shrink, "[", repeats=True)
+    group.add("robot", "Inspect a robot", robots.select, argument=robot_argument)
+    return group.commands
+
+
+def _list_view_commands(viewer: Presenter) -> list[Command]:
+    view = viewer.view
+    group = CommandGroup("View")
+    group.add("theme", "Light or dark", view.toggle_theme, "t")
+    group.add("fade", "Fading trajectories", view.toggle_fading, "shift+t")
+    group.add("suggestions", "Suggestions when settled", view.toggle_suggestions, "shift+h")
+    group.add("panel", "Hide or show the panel", view.toggle_panel, "h")
+    return group.commands
+
+
+def _list_file_commands(viewer: Presenter) -> list[Command]:
+    files = viewer.files
+    session_argument = Argument("file", Path, files.list_sessions)
+    target_argument = Argument("file", _read_path)
+    group = CommandGroup("File")
+    group.add("save:session", "Save session", files.save_session, "ctrl+s")
+    group.add("recover", "Recover a session", files.recover, "ctrl+shift+o")
+    group.add("save:map", "Save map", files.save_map, "ctrl+shift+s")
+    group.add("open", "Open a session", files.open_session, argument=session_argument)
+    group.add("save", "Save session as", files.save_session, argument=target_argument)
+    return group.commands
+
+
+def _list_tool_commands(viewer: Presenter) -> list[Command]:
+    group = CommandGroup("Tools")
+    for tool in viewer.toolbox.by_name.values():
+        choose = partial(viewer.choose_tool, tool.name)
+        group.add(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", choose, tool.key)
+    return group.commands
+
+
+def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
+    """Return the commands that show or hide layers: those with keys first, in the order of the keys."""
+    names = [name for name in _LAYER_KEYS if name in titles]
+    names += [name for name in titles if name not in _LAYER_KEYS]
+    group = CommandGroup("Show")
+    for name in names:
+        keys = [_LAYER_KEYS[name]] if name in _LAYER_KEYS else []
+        group.add(f"layer:{name}", titles[name], partial(viewer.view.toggle_layer, name), *keys)
+    return group.commands
+
+
+def list_parameter_commands(viewer: Presenter) -> Iterator[Command]:
+    """Yield a typed command for each gain of the controller in use and each limit of the team."""
+    for parameter in viewer.comparison.list_parameters():
+        title = f"Set {parameter.label}"
+        set_value = partial(viewer.comparison.set_parameter, parameter.name)
+        argument = _build_parameter_argument(parameter)
+        short_name = parameter.name.removeprefix("team.")
+        yield Command(short_name, title, "Run", set_value, argument=argument)
+        if short_name != parameter.name:
+            yield Command(parameter.name, title, "Run", set_value, argument=argument, hidden=True)
+
+
+def _build_parameter_argument(parameter: Parameter) -> Argument:
+    return Argument(f"now {parameter.format()}", parameter.parse, lambda: parameter.choices)
+
+
+def _build_whole_number_argument(name: str, options: Callable[[], Iterable[str]] = tuple) -> Argument:
+    def read(text: str) -> int:
+        try:
+            return int(text)
+        except ValueError:
+            raise ParameterError(f"{name}: expected a whole number, got {text!r}") from None
+
+    return Argument("whole number", read, options)
+
+
+def _read_path(text: str) -> Path | None:
+    """Return a path; None for an empty text, for the session's own file."""
+    return Path(text) if text else None
+
+
+def _read_speed(text: str) -> float:
+    if text in ("max", "inf"):
+        return math.inf
+    return _read_positive_number("speed", text, MIN_SPEED, MAX_SPEED)
+
+
+def _read_positive_number(name: str, text: str, low: float = 0.0, high: float = 1e300) -> float:
+    try:
+        value = float(text.rstrip("×x"))
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        raise ParameterError(f"{name}: expected a positive number, got {text!r}")
+    return value

@@ -1,0 +1,94 @@
+"""Commands of the viewer that need its window: camera, screenshots, videos, help."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from robocov_app.toolkit.commands.command import Command, CommandGroup
+from robocov_app.toolkit.tools.viewport import PAN_STEP_PX, ZOOM_STEP
+from robocov_app.toolkit.window.command_window import Action, WindowActions
+from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.chart.chart import Chart
+
+
+@dataclass(frozen=True)
+class ViewerWindowActions(WindowActions):
+    """Actions of the window that commands start.
+
+    Attributes
+    ----------
+    show_next_tab, toggle_fullscreen, save_screenshot, toggle_help, open_palette
+        See `WindowActions`.
+    zoom : callable
+        Zooms by a factor.
+    toggle_recording : callable
+        Starts or stops a video.
+    save_run : callable
+        Saves the run in a new folder.
+    open_file : callable
+        Asks for a session or a map, and opens it.
+    list_branches : callable
+        Asks for a branch, and enters it.
+    toggle_lesson : callable
+        Starts a lesson, leaves it, or returns to it.
+    quit : callable
+        Closes the window.
+    """
+
+    zoom: Callable[[float], None]
+    toggle_recording: Action
+    save_run: Action
+    open_file: Action
+    list_branches: Action
+    toggle_lesson: Action
+    quit: Action
+
+
+def list_window_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindowActions) -> list[Command]:
+    """Return the commands that need a window."""
+    return [
+        *_list_view_commands(canvas, chart, actions),
+        *_list_file_commands(actions),
+        *_list_help_commands(actions),
+    ]
+
+
+def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindowActions) -> list[Command]:
+    zoom_in = partial(actions.zoom, ZOOM_STEP)
+    zoom_out = partial(actions.zoom, 1 / ZOOM_STEP)
+    pan_left = partial(canvas.pan, PAN_STEP_PX, 0)
+    pan_right = partial(canvas.pan, -PAN_STEP_PX, 0)
+    pan_up = partial(canvas.pan, 0, PAN_STEP_PX)
+    pan_down = partial(canvas.pan, 0, -PAN_STEP_PX)
+    group = CommandGroup("View")
+    group.add("fit", "Show the whole map", canvas.fit, "f")
+    group.add("zoom:in", "Zoom in", zoom_in, "ctrl+=", "ctrl++", repeats=True)
+    group.add("zoom:out", "Zoom out", zoom_out, "ctrl+-", repeats=True)
+    group.add("pan:left", "Pan left", pan_left, "ctrl+left", repeats=True)
+    group.add("pan:right", "Pan right", pan_right, "ctrl+right", repeats=True)
+    group.add("pan:up", "Pan up", pan_up, "ctrl+up", repeats=True)
+    group.add("pan:down", "Pan down", pan_down, "ctrl+down", repeats=True)
+    group.add("plot", "Plot mean distance or mean time", chart.switch_quantity, "y")
+    group.add("tab", "Next page of the panel", actions.show_next_tab, "ctrl+tab")
+    group.add("fullscreen", "Full screen", actions.toggle_fullscreen, "f11")
+    return group.commands
+
+
+def _list_file_commands(actions: ViewerWindowActions) -> list[Command]:
+    group = CommandGroup("File")
+    group.add("screenshot", "Screenshot", actions.save_screenshot, "f12")
+    group.add("video", "Start or stop a video", actions.toggle_recording, "f9")
+    group.add("save:run", "Save run", actions.save_run, "ctrl+e")
+    group.add("open:file", "Open a session or a map", actions.open_file, "ctrl+o")
+    return group.commands
+
+
+def _list_help_commands(actions: ViewerWindowActions) -> list[Command]:
+    help_group = CommandGroup("Help")
+    help_group.add("help", "Keys", actions.toggle_help, "f1", "shift+/")
+    help_group.add("palette", "Commands by name", actions.open_palette, "ctrl+k", "/")
+    help_group.add("tour", "The lesson, or just play", actions.toggle_lesson, "f2")
+    help_group.add("quit", "Quit", actions.quit, "ctrl+q")
+    time_group = CommandGroup("Time")
+    time_group.add("branches", "List of branches", actions.list_branches, "ctrl+b")
+    return [*help_group.commands, *time_group.commands]

@@ -1,0 +1,1 @@
+"""The coverage cost of the panes, computed in another process."""

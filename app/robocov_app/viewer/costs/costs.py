@@ -1,0 +1,387 @@
+"""The exact coverage cost of all panes, computed in another process; each answer has its own time."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
+from robocov.defaults import DEFAULT_LATTICE
+from robocov.environment import Environment
+from robocov.errors import InputError, RobocovError
+from robocov.kernel_compilation import call_cost_kernels, compile_kernels
+from robocov_app.jobs.messages import Channel, Wire
+from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
+from robocov_app.render.distance_field import DistanceField
+from robocov_app.render.field_lattice import FieldLattice
+
+PROGRESS_INTERVAL_S = 0.05  # between two reports on the preparation of a map
+MIN_LISTED_TIME_S = 1.0  # a shorter remaining time is not shown
+
+
+@dataclass(frozen=True, eq=False)
+class KnownCost:
+    """The latest known cost of a pane.
+
+    Attributes
+    ----------
+    time : float
+        Time to which it belongs, s.
+    result : CoverageResult
+        The cost.
+    path : (k, 2) array, m, or None
+        Path from the cursor to its nearest robot; empty if there is none.
+    get_lattice : callable
+        Returns the sites for drawing.
+    travel_time : float or None
+        Mean time until the first robot arrives, s.
+    """
+
+    time: float
+    result: CoverageResult
+    path: Array | None
+    get_lattice: Callable[[], FieldLattice]
+    travel_time: float | None = None
+
+    @cached_property
+    def field(self) -> DistanceField:
+        """Distance field for drawing."""
+        return DistanceField(self.get_lattice(), self.result)
+
+
+class _SharedSites(NamedTuple):
+    """Data that all results on a map share: sites, corners of geodesics, and weights of the sites."""
+
+    sites: Sites
+    corners: Array
+    weights: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class CostQuestion:
+    """Request for the cost on a map; without positions, a request to prepare the map.
+
+    Attributes
+    ----------
+    number : int
+        Number of the map.
+    environment : Environment or None
+        The map; it is sent only once.
+    lattice : int
+        Number of sites along the longer side of the map.
+    time : float
+        Time, s.
+    positions : (n, 2) array, m, or None
+        Positions of the robots.
+    point : (2,) array, m, or None
+        Start of a path to its nearest robot.
+    speeds : (n,) array, m/s, or None
+        Maximum speeds of the robots, for the mean time.
+    is_for_curve : bool
+        Whether the answer is meant for a curve, and is not the latest cost of its pane.
+    """
+
+    number: int
+    environment: Environment | None
+    lattice: int
+    time: float = 0.0
+    positions: Array | None = None
+    point: Array | None = None
+    speeds: Array | None = None
+    is_for_curve: bool = False
+
+
+class Costs:
+    """Costs of the panes of a window.
+
+    Parameters
+    ----------
+    lattice : int
+        Number of sites along the longer side of the map.
+    direct : bool
+        Whether to compute costs at once instead of in another process: for pictures that must not depend on
+        its speed.
+
+    Attributes
+    ----------
+    known : dict of int to KnownCost
+        Latest costs by the number of the pane.
+    state : str
+        Progress of the preparation of a map, or why there is no cost; otherwise empty.
+    lattice : int
+        Number of sites along the longer side of the map.
+    """
+
+    def __init__(self, lattice: int = DEFAULT_LATTICE, *, direct: bool = False) -> None:
+        self.known: dict[int, KnownCost] = {}
+        self.state = ""
+        self.lattice = lattice
+        self._worker: Worker[KnownCost | _SharedSites] = DirectWorker(CostService(), _CostWire())
+        if not direct:
+            service = "robocov_app.viewer.costs.costs:CostService"
+            self._worker = LatestWorker(service, "computes the cost", _CostWire)
+        self._map_question: CostQuestion | None = None
+        self._asked: CostQuestion | None = None
+        self._map_number = 0
+        self._is_prepared = False
+        self._waiting: dict[int, CostQuestion] = {}
+        self._asked_pane: int | None = None  # None if the answer is no longer wanted
+
+    def set_environment(self, environment: Environment) -> None:
+        """Prepare the costs on another map."""
+        self._map_number += 1
+        self._map_question = CostQuestion(self._map_number, environment, self.lattice)
+        self.known = {}
+        self._waiting = {}
+        self._prepare_map()
+        self.poll()
+
+    def forget(self) -> None:
+        """Drop all costs and questions, because they belong to another run."""
+        self._waiting = {}
+        self.known = {}
+        self._asked_pane = None
+
+    def ask(
+        self,
+        pane: int,
+        time: float,
+        positions: Array,
+        point: Array | None = None,
+        speeds: Array | None = None,
+        *,
+        is_for_curve: bool = False,
+    ) -> None:
+        """Ask for the cost of a pane. A question about it that is still pending is replaced.
+
+        Parameters
+        ----------
+        pane : int
+            Number of the pane.
+        time : float
+            Time, s.
+        positions : (n, 2) array, m
+            Positions of the robots.
+        point : (2,) array, m, optional
+            Start of a path to its nearest robot.
+        speeds : (n,) array, m/s, optional
+            Maximum speeds of the robots, for the mean time.
+        is_for_curve : bool
+            Whether the answer is meant for a curve only.
+        """
+        if self._map_question is None:
+            return
+        # A replaced question keeps its place, so that panes take turns.
+        self._waiting[pane] = replace(
+            self._map_question,
+            time=time,
+            positions=np.array(positions),
+            point=point,
+            speeds=speeds,
+            is_for_curve=is_for_curve,
+        )
+
+    def poll(self) -> list[tuple[int, KnownCost]]:
+        """Ask the next question; return the answers since the last call, with the numbers of their panes."""
+        answers: list[tuple[int, KnownCost]] = []
+        while self._asked is not None or self._ask_next():
+            answer = self._worker.poll()
+            if self._worker.is_busy:
+                self._show_progress()
+                break
+            asked = self._asked
+            self._asked = None
+            if asked is self._map_question:
+                self._is_prepared = answer is not None
+                self.state = "" if self._is_prepared else f"no cost: {self._worker.problem}"
+            elif isinstance(answer, KnownCost):
+                if self._asked_pane is not None:
+                    answers.append((self._asked_pane, answer))
+                    if asked is None or not asked.is_for_curve:
+                        self.known[self._asked_pane] = answer
+            elif not self._worker.is_alive:
+                # The process has died. It starts again to prepare the map; if it dies during that, there is
+                # no cost.
+                self._prepare_map()
+        return answers
+
+    def close(self) -> None:
+        """End the process."""
+        self.forget()
+        self._worker.close()
+
+    def _show_progress(self) -> None:
+        if self._worker.progress is None:
+            return
+        fraction, remaining = self._worker.progress
+        text = f", {remaining:.0f} s left" if remaining >= MIN_LISTED_TIME_S else ""
+        self.state = f"cost: preparing the map, {fraction:.0%}{text}"
+
+    def _prepare_map(self) -> None:
+        self._is_prepared = False
+        self.state = "cost: preparing the map"
+        self._asked = self._map_question
+        self._asked_pane = None
+        self._worker.put(self._map_question)
+
+    def _ask_next(self) -> bool:
+        """Ask the question that has waited longest; return whether there was one."""
+        if not self._waiting or not self._is_prepared:
+            return False
+        self._asked_pane = next(iter(self._waiting))
+        self._asked = self._waiting.pop(self._asked_pane)
+        self._worker.put(self._asked)
+        return True
+
+
+class _Answer(NamedTuple):
+    """Answer of the service; with the shared sites only if they have changed."""
+
+    shared: _SharedSites | None
+    time: float = 0.0
+    result: CoverageResult | None = None
+    path: Array | None = None
+    travel_time: float | None = None
+
+
+class _CostWire(Wire):
+    """Sends each map once, and completes answers with the sites that were sent once."""
+
+    def __init__(self) -> None:
+        self._sent_map = -1
+        self._shared: _SharedSites | None = None
+        self._get_lattice: Callable[[], FieldLattice] | None = None
+
+    def encode(self, question: CostQuestion) -> CostQuestion:
+        """Leave the map out if it was sent already."""
+        if question.number == self._sent_map or question.environment is None:
+            return replace(question, environment=None)
+        self._sent_map = question.number
+        # A copy has no cached properties, which take long to send and are quickly computed again.
+        return replace(question, environment=replace(question.environment))
+
+    def decode(self, answer: _Answer) -> KnownCost | _SharedSites:
+        """Add the shared sites to an answer."""
+        if answer.shared is not None:
+            self._shared = answer.shared
+            sites = answer.shared.sites
+            self._get_lattice = cache(lambda: FieldLattice(sites))
+        assert self._shared is not None and self._get_lattice is not None
+        if answer.result is None:
+            return self._shared
+        result = replace(
+            answer.result,
+            owner=answer.result.owner.astype(np.intp),
+            first_corner=answer.result.first_corner.astype(np.intp),
+            last_corner=answer.result.last_corner.astype(np.intp),
+            points=self._shared.sites.points,
+            corners=self._shared.corners,
+            weights=self._shared.weights,
+        )
+        return KnownCost(answer.time, result, answer.path, self._get_lattice, answer.travel_time)
+
+
+class CostService:
+    """Prepares the latest map, and answers the latest question about it."""
+
+    failure_message = "the cost could not be computed"
+
+    def __init__(self) -> None:
+        # If another process is compiling these kernels already, wait for it.
+        compile_kernels([call_cost_kernels])
+        self._cost: CoverageCost | None = None
+        self._sent_cost: CoverageCost | None = None  # whose sites were sent last
+        self._varying_cost: TimeVaryingCost | None = None
+
+    def __call__(self, questions: list[CostQuestion], channel: Channel) -> _Answer:
+        """Answer the last of several questions."""
+        maps = [question for question in questions if question.environment is not None]
+        if maps:
+            self._prepare(maps[-1], channel)
+        cost = self._cost
+        varying_cost = self._varying_cost
+        question = questions[-1]
+        if cost is None or varying_cost is None:
+            raise InputError("the map has no cost")
+        answer = _Answer(None)
+        if question.positions is not None:
+            answer = _evaluate(varying_cost, question, question.positions)
+            cost = varying_cost.get_cost(question.time)
+        shared = None
+        if cost is not self._sent_cost:
+            shared = _SharedSites(cost.sites, cost.corners, cost.weights)
+        self._sent_cost = cost
+        return answer._replace(shared=shared)
+
+    def _prepare(self, question: CostQuestion, channel: Channel) -> None:
+        """Build the cost of a map; raise RobocovError as soon as there is a question about a newer map."""
+        environment = question.environment
+        assert environment is not None
+        started_at = time.perf_counter()
+        reported_at = started_at
+
+        def stop_for_newer_map(fraction: float) -> None:
+            if any(newer.environment is not None for newer in channel.get_newer_questions()):
+                raise RobocovError("there is a newer map")
+
+        def report_progress(fraction: float) -> None:
+            nonlocal reported_at
+            stop_for_newer_map(fraction)
+            now = time.perf_counter()
+            if now - reported_at > PROGRESS_INTERVAL_S and fraction > 0.0:
+                reported_at = now
+                remaining_s = (now - started_at) * (1.0 - fraction) / fraction
+                channel.report_progress((fraction, remaining_s))
+
+        self._varying_cost = None
+        before = self._cost
+        is_reusable = (
+            before is not None
+            and before.lattice == question.lattice
+            and before.environment.has_same_geometry(environment)
+        )
+        if before is not None and is_reusable:
+            self._cost = before.with_density(environment)
+        else:
+            self._cost = CoverageCost(environment, question.lattice, progress=report_progress)
+        self._varying_cost = TimeVaryingCost(self._cost, progress=stop_for_newer_map)
+
+
+def _evaluate(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> _Answer:
+    """Compute the answer to a question, without the data that all results on a map share."""
+    result = cost.evaluate_all_robots(question.time, positions)
+    if result is None:
+        raise InputError("positions: expected at least one at a free position, got none")
+    path: Array | None = None
+    if question.point is not None:
+        # There is no path from a point that is not free.
+        with suppress(RobocovError):
+            available = cost.find_available_robots(question.time, positions)
+            path = cost.get_cost(question.time).find_path(positions[available], question.point)
+    # Integers of 32 bits take half as long to send.
+    result = replace(
+        result,
+        owner=result.owner.astype(np.int32),
+        first_corner=result.first_corner.astype(np.int32),
+        last_corner=result.last_corner.astype(np.int32),
+        points=np.empty((0, 2)),
+        corners=np.empty((0, 2)),
+        weights=None,
+        environment=None,
+        sites=None,
+    )
+    travel_time = _compute_travel_time(cost, question, positions)
+    return _Answer(None, question.time, result, path, travel_time)
+
+
+def _compute_travel_time(cost: TimeVaryingCost, question: CostQuestion, positions: Array) -> float | None:
+    """Return the mean time until the first robot arrives, s, if speeds are given."""
+    if question.speeds is None:
+        return None
+    result = cost(question.time, positions, speeds=question.speeds)
+    return None if result is None else result.mean_time

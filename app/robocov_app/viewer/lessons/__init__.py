@@ -1,0 +1,1 @@
+"""Lessons: played, drawn, and used with the mouse and keys."""

@@ -1,0 +1,173 @@
+"""The lesson in the window: started, drawn, clicked, left and ended."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pygame
+
+from robocov_app.look.theme import Theme
+from robocov_app.toolkit.window.layout import Layout
+from robocov_app.viewer.lessons.page import ClickArea, draw_caption, draw_lesson_page
+from robocov_app.viewer.lessons.player import FIRST_LESSON, LessonPlayer, LessonState, load_lesson
+from robocov_app.viewer.presenter import Presenter
+
+COMMANDS_WITHIN_LESSON = frozenset(
+    {
+        "help",
+        "theme",
+        "screenshot",
+        "video",
+        "panel",
+        "fullscreen",
+        "quit",
+        "pause",
+        "slower",
+        "faster",
+        "fit",
+        "zoom:in",
+        "zoom:out",
+        "plot",
+        "tour",
+    }
+)
+"""Commands after which the lesson continues; with all others the user takes over."""
+
+_ANSWER_KEYS = ("1", "2", "3", "4")
+
+
+class LessonGuide:
+    """Runs a lesson in a window.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    fit_view : callable
+        Shows the whole map.
+    is_unattended : bool
+        Whether there is no user who answers and does tasks.
+
+    Attributes
+    ----------
+    player : LessonPlayer or None
+        The lesson, if there is one.
+    click_areas : list of ClickArea
+        Answers and chapters on the page.
+    """
+
+    def __init__(self, viewer: Presenter, fit_view: Callable[[], None], *, is_unattended: bool) -> None:
+        self.player: LessonPlayer | None = None
+        self.click_areas: list[ClickArea] = []
+        self.is_unattended = is_unattended
+        self._viewer = viewer
+        self._fit_view = fit_view
+
+    @property
+    def shown(self) -> LessonPlayer | None:
+        """The lesson while it is in place of the panel; None while the user plays with it."""
+        if self.player is None or self.player.state is LessonState.LEFT:
+            return None
+        return self.player
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether the user has taken over from a chapter, and can return to it."""
+        return self.player is not None and self.shown is None
+
+    @property
+    def visible_state(self) -> object:
+        """Everything that determines how the lesson is drawn."""
+        player = self.player
+        if player is None:
+            return None
+        return player.state, player.number, player.progress
+
+    def start(self, path: Path = FIRST_LESSON) -> None:
+        """Start a lesson.
+
+        Raises
+        ------
+        MapError
+            If the lesson cannot be loaded.
+        """
+        saved = load_lesson(path)
+        self.player = LessonPlayer(self._viewer, self._fit_view, saved, is_unattended=self.is_unattended)
+
+    def toggle(self) -> None:
+        """Start the first lesson; if there is a lesson, leave it or return to it."""
+        if self.player is None:
+            self.start()
+        elif self.player.state is LessonState.LEFT:
+            self.player.skip(0)
+        else:
+            self.player.leave(during_task=True)
+
+    def leave(self) -> None:
+        """Let the user take over from the lesson."""
+        if self.player is not None:
+            self.player.leave()
+
+    def end(self) -> bool:
+        """End the lesson; return whether there was one."""
+        if self.player is None:
+            return False
+        self.player.end()
+        self.player = None
+        return True
+
+    def advance(self, seconds: float) -> None:
+        """Let real time pass."""
+        if self.player is None:
+            return
+        self.player.advance(seconds)
+        if self.player.is_done:
+            self.player = None
+
+    def handle_command(self, name: str) -> bool:
+        """Let the lesson handle a command of the window; return whether it did."""
+        if self.shown is not None and name in ("back", "forward"):
+            self.shown.skip(1 if name == "forward" else -1)
+            return True
+        if name == "pause" and self.player is not None:
+            return self._handle_pause(self.player)
+        if name == "cancel" and self.end():
+            return True
+        if name not in COMMANDS_WITHIN_LESSON:
+            self.leave()
+        return False
+
+    def _handle_pause(self, player: LessonPlayer) -> bool:
+        if player.state is LessonState.ASKING:
+            self._viewer.show_message("answer first: press the number of your answer, or click it")
+            return True
+        if player.state is LessonState.ENDED:
+            self._viewer.show_message(player.toggle_hold())
+            return True
+        return False
+
+    def handle_key(self, character: str) -> bool:
+        """Answer with a key; return whether it was an answer."""
+        player = self.player
+        if player is None or player.state is not LessonState.ASKING or character not in _ANSWER_KEYS:
+            return False
+        player.reply(int(character))
+        return True
+
+    def click(self, pixel: tuple[int, int]) -> bool:
+        """Answer with a click, or choose a chapter; return whether there is something to click."""
+        for area in self.click_areas:
+            if area.box.collidepoint(pixel):
+                area.action()
+                return True
+        return False
+
+    def draw(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> bool:
+        """Draw the lesson; return whether it is in place of the panel."""
+        self.click_areas = []
+        if self.shown is None:
+            return False
+        if layout.panel[2]:
+            self.click_areas = draw_lesson_page(screen, layout, theme, self.shown)
+        else:
+            draw_caption(screen, layout, theme, self.shown)
+        return True

@@ -1,0 +1,398 @@
+"""The panel at the right: settings that are often used stay visible, the others are on pages."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from itertools import chain, zip_longest
+from pathlib import Path
+
+import numpy as np
+
+from robocov.controllers import get_controller_label, load_controller_class
+from robocov.errors import ParameterError
+from robocov_app.render.fonts import shorten_to_width
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
+from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX
+from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.viewer.explanation.explain import RobotReport
+from robocov_app.viewer.explanation.quantities import MIN_FORCE_N
+from robocov_app.viewer.explanation.sentences import ReportLine
+from robocov_app.viewer.panel.parameters import NumberParameter, OptionParameter, Parameter
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.clock import SPEEDS, find_speed_index, format_speed
+from robocov_app.viewer.session.scenario import MAX_PANES
+
+TOOL_COLUMNS = 5
+LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
+"""Layers that are nearly always visible. Their keys still toggle them."""
+
+_FILE_BUTTONS = (
+    PanelButton("Screenshot", "screenshot"),
+    PanelButton("Record video", "video"),
+    PanelButton("Save session", "save:session"),
+    PanelButton("Recover…", "recover"),
+    PanelButton("Save run", "save:run"),
+    PanelButton("Save map", "save:map"),
+    PanelButton("◀ Branch", "branch:previous"),
+    PanelButton("Branch ▶", "branch:next"),
+    PanelButton("Undo", "undo"),
+    PanelButton("Redo", "redo"),
+    PanelButton("Keys", "help"),
+    PanelButton("Commands…", "palette"),
+    PanelButton("Lesson", "tour"),
+    PanelButton("Full screen", "fullscreen"),
+)
+_REDRAW_INTERVAL_S = 0.25  # while the simulation runs
+_NO_ROBOT_TEXT = "Click a robot, or press Tab, to see why it moves and why it does not."
+_NO_ROBOT_REASON = "no robot is selected: click one first, or press Tab"
+
+# Lengths in pixels at scale 1.
+_ARROW_PX = 13.0
+_MIN_ARROW_FRACTION = 0.35
+_ARROW_CENTER_PX = (14, 8)
+_REPORT_INDENT_PX = 34.0
+_LABEL_PX = 100
+_RESET_PX = 22
+_PARAMETER_GAP_PX = 3
+# Columns of the rows with the controllers; each has a button that removes its pane, and a gap.
+_SINGLE_CONTROLLER_PX = (0, 0)  # with the button that adds a second one
+_TWO_CONTROLLERS_PX = (0, 24, 3, 0, 24, 3, 28)  # with the button that adds a third one
+_CONTROLLER_PAIR_PX = (0, 24, 3, 0, 24)  # two of three or four
+
+
+class ViewerPanel(CommandPanel):
+    """Shows the session's settings and lets the user change them.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    layer_titles : dict of str to str
+        Titles of the layers by their names.
+    commands : CommandTable
+        The window's commands.
+    run_command : callable
+        Runs a command by its name.
+
+    Attributes
+    ----------
+    commands : CommandTable
+        The window's commands.
+    report : RobotReport or None
+        Explanation of the selected robot.
+    """
+
+    tabs = ("parameters", "show", "robot", "file")
+    tab_widths = (86, 64, 64, 64)
+
+    def __init__(
+        self,
+        viewer: Presenter,
+        layer_titles: dict[str, str],
+        commands: CommandTable,
+        run_command: Callable[[str], object],
+    ) -> None:
+        super().__init__(commands, run_command)
+        self.viewer = viewer
+        self.titles = layer_titles
+        self.report: RobotReport | None = None
+        self._age_s = 0.0  # of the picture
+
+    def list_pages(self) -> dict[str, PanelPage]:
+        """Return the pages by the names of their tabs."""
+        return {
+            "parameters": self._show_parameters,
+            "show": self._show_layers,
+            "robot": self._show_robot,
+            "file": self._show_files,
+        }
+
+    def update(self, seconds: float) -> None:
+        """Redraw the panel if its content has changed."""
+        self._age_s += seconds
+        if self.is_covered and self.ui.is_busy:
+            self.ui.stop_typing()
+        viewer = self.viewer
+        session = viewer.session
+        content = (viewer.revision, self.tab, viewer.view.theme, session.playback.is_playing, id(self.report))
+        is_running = session.playback.is_playing and not session.timeline.is_settled
+        is_old = is_running and self._age_s >= _REDRAW_INTERVAL_S
+        if content != self.drawn_state or is_old:
+            self.drawn_state = content
+            self._age_s = 0.0
+            self.ui.needs_redraw = True
+
+    def show_content(self, ui: Ui) -> None:
+        """Show the settings that stay visible, and the chosen page."""
+        ui.inset(12, 8, 12)
+        self._show_environment(ui)
+        self._show_controllers(ui)
+        self._show_run(ui)
+        self.show_tools(ui, self.viewer.toolbox, TOOL_COLUMNS)
+        self.show_pages(ui, {})
+
+    def _show_environment(self, ui: Ui) -> None:
+        viewer = self.viewer
+        scenario = viewer.session.timeline.scenario
+        files = viewer.files
+        labels = shorten_names(files.list_maps())
+        maps = {label: name for name, label in labels.items()}
+        ui.header("ENVIRONMENT")
+        ui.row(172, 0, height=28, below=5)
+        label = ui.dropdown("map", list(maps), labels.get(files.map_name, files.map_name))
+        if label is not None:
+            viewer.attempt(partial(files.open_map, maps[label]))
+        start = ui.dropdown("start", viewer.playback.list_starts(), scenario.start_name)
+        if start is not None:
+            viewer.attempt(partial(viewer.playback.restart, start=start))
+        ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
+        ui.label("Robots")
+        robots = ui.text_field("robots", str(len(viewer.robot_numbers)))
+        if robots is not None:
+            viewer.attempt(partial(self.commands.run_text, f"robots {robots}"))
+        self.show_button(ui, "−", "fewer")
+        self.show_button(ui, "+", "more")
+        ui.cell()
+        ui.label("Seed")
+        seed = ui.text_field("seed", str(scenario.seed))
+        if seed is not None:
+            viewer.attempt(partial(self.commands.run_text, f"seed {seed}"))
+        self.show_button(ui, "↻", "seed:next")
+
+    def _show_controllers(self, ui: Ui) -> None:
+        viewer = self.viewer
+        session = viewer.session
+        choices = [session.displayed.get_setup(pane).controller for pane in session.timeline.panes]
+        labels = label_controllers(viewer.controllers, {choice.name: choice.label for choice in choices})
+        names = {label: name for name, label in labels.items()}
+        count = len(choices)
+        ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
+        if count == 1:
+            ui.row(*_SINGLE_CONTROLLER_PX, height=28, gap=6, below=4)
+        else:
+            ui.row(*(_TWO_CONTROLLERS_PX if count == 2 else _CONTROLLER_PAIR_PX), height=28, gap=2, below=4)
+        for k, choice in enumerate(choices):
+            label = ui.dropdown(f"controller:{k}", list(names), labels[choice.name])
+            if label is not None:
+                viewer.attempt(partial(viewer.comparison.set_controller, k, names[label]))
+            if count == 1:
+                continue
+            if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
+                viewer.inspection.active_pane = k
+                self._run_command("pane:remove")
+            if count == 2 or k % 2 == 0:
+                ui.cell()
+        if count < MAX_PANES:
+            self.show_button(ui, "+ compare" if count != 2 else "+", "pane:add")
+        ui.space(4)
+
+    def _show_run(self, ui: Ui) -> None:
+        session = self.viewer.session
+        ui.header("RUN")
+        ui.row(0, 0, 0, 0, height=28, below=5)
+        self.show_button(
+            ui,
+            "Pause" if session.playback.is_playing else "Play",
+            "pause",
+            chosen=not session.playback.is_playing,
+        )
+        self.show_button(ui, "Step", "step")
+        self.show_button(ui, "Settle", "settle", chosen=session.playback.stop_when_settled)
+        self.show_button(ui, "Restart", "restart")
+        ui.row(46, 0, 42, height=22)
+        ui.label("Speed")
+        index = float(find_speed_index(session.playback.clock.speed))
+        chosen = ui.slider("speed", index, 0.0, len(SPEEDS) - 1.0, step=1.0)
+        if chosen is not None:
+            self.viewer.attempt(partial(self.viewer.playback.set_speed, SPEEDS[round(chosen)]))
+        ui.label(format_speed(session.playback.clock.speed), key="speed")
+
+    def _show_parameters(self, ui: Ui) -> None:
+        controller = self.viewer.session.displayed.get_setup(self.viewer.pane).controller
+        parameters = self.viewer.comparison.list_parameters()
+        gains = [parameter for parameter in parameters if not parameter.name.startswith("team.")]
+        limits = [parameter for parameter in parameters if parameter.name.startswith("team.")]
+        groups = {f"GAINS OF {controller.label.upper()}": gains, "ROBOTS": limits}
+        with ui.scroll(f"parameters:{controller.name}"):
+            for title, group in groups.items():
+                if ui.section(title, key=title.split()[0]):
+                    self._show_parameter_group(ui, group)
+
+    def _show_parameter_group(self, ui: Ui, parameters: list[Parameter]) -> None:
+        if not parameters:
+            ui.label("none", style="unit")
+        for parameter in parameters:
+            if isinstance(parameter, OptionParameter):
+                self._show_options(ui, parameter)
+            else:
+                self._show_slider(ui, parameter)
+        ui.space(4)
+
+    def _set(self, name: str, value: float | str | None) -> None:
+        self.viewer.attempt(partial(self.viewer.comparison.set_parameter, name, value))
+
+    def _show_slider(self, ui: Ui, parameter: NumberParameter) -> None:
+        name = parameter.name
+        unit = parameter.unit
+        ui.row(_LABEL_PX, 0, 50, 34, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        ui.label(parameter.label, tip=f"{parameter.meaning} ({unit})" if unit else parameter.meaning)
+        position = ui.slider(name, parameter.compute_position(), 0.0, 1.0)
+        if position is not None:
+            self._set(name, parameter.compute_value(position))
+        text = ui.text_field(name, parameter.format())
+        if text is not None:
+            self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
+        ui.label(unit, key=f"unit:{name}", style="unit")
+        default = "no limit" if parameter.default is None else f"{parameter.default:g} {unit}".rstrip()
+        self._show_reset(ui, parameter, default)
+
+    def _show_options(self, ui: Ui, parameter: OptionParameter) -> None:
+        """Show the choices next to each other if they fit, otherwise as a menu."""
+        name = parameter.name
+        choices = parameter.choices
+        free = ui.width - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
+        width = (free - _PARAMETER_GAP_PX * (len(choices) - 1)) / len(choices)
+        fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
+        columns = [0.0] * (len(choices) if fits else 1)
+        ui.row(_LABEL_PX, *columns, _RESET_PX, height=24, gap=_PARAMETER_GAP_PX, below=3)
+        ui.label(parameter.label, tip=parameter.meaning)
+        if fits:
+            for choice in choices:
+                is_on = choice == parameter.value
+                key = f"{name}:{choice}"
+                if ui.button(choice, key=key, tip=parameter.meaning, chosen=is_on, small=True):
+                    self._set(name, choice)
+        else:
+            chosen = ui.dropdown(name, choices, parameter.value, tip=parameter.meaning)
+            if chosen:
+                self._set(name, chosen)
+        self._show_reset(ui, parameter, parameter.default)
+
+    def _show_reset(self, ui: Ui, parameter: Parameter, default: str) -> None:
+        tip = f"Back to the default: {default}"
+        if ui.button("↺", key=f"reset:{parameter.name}", tip=tip, small=True):
+            self._set(parameter.name, parameter.default)
+
+    def _show_layers(self, ui: Ui) -> None:
+        view = self.viewer.view
+        names = [name for name in self.titles if name not in LAYERS_WITHOUT_CHECK_BOX]
+        rows = math.ceil(len(names) / 2)
+        with ui.scroll("show"):
+            ui.row(0, 0, height=21, below=3)
+            # The names continue from the bottom of the first column at the top of the second.
+            for name in chain.from_iterable(zip_longest(names[:rows], names[rows:])):
+                if name is None:
+                    ui.cell()
+                    continue
+                tip = self.commands[f"layer:{name}"].tip
+                if ui.check_box(self.titles[name], key=name, value=name in view.layers, tip=tip) is not None:
+                    self._run_command(f"layer:{name}")
+            ui.space(5)
+            ui.row(0, 0, 0)
+            self.show_button(ui, "Fading", "fade", chosen=view.fades_trajectories)
+            self.show_button(ui, "Dark" if view.theme == "light" else "Light", "theme")
+            self.show_button(ui, "Whole map", "fit")
+
+    def _show_robot(self, ui: Ui) -> None:
+        viewer = self.viewer
+        number = viewer.selected_robot
+        reason = "" if number is not None else _NO_ROBOT_REASON
+        has_failed = number in viewer.session.displayed.get_setup(viewer.pane).failed
+        ui.row(0, 0, 0, 0, below=8)
+        self.show_button(ui, "◀", "robot:previous")
+        self.show_button(ui, "▶", "robot:next")
+        self.show_button(ui, "Revive" if has_failed else "Fail", "robot:fail", disabled_reason=reason)
+        self.show_button(ui, "Remove", "robot:remove", disabled_reason=reason)
+        with ui.scroll(f"robot:{number}"):
+            if self.report is None:
+                ui.paragraph(_NO_ROBOT_TEXT, color=ui.theme.faint)
+            else:
+                show_report(ui, self.report)
+
+    def _show_files(self, ui: Ui) -> None:
+        ui.row(0, 0, height=28, below=5)
+        for label, command in _FILE_BUTTONS:
+            is_recording = command == "video" and self.viewer.view.is_recording
+            text = "Stop video" if is_recording else label
+            self.show_button(ui, text, command, chosen=is_recording)
+
+
+def show_report(ui: Ui, report: RobotReport) -> None:
+    """Show the explanation of a robot, with an arrow for each force."""
+    ui.paragraph(report.title, size=14, bold=True)
+    ui.space(3)
+    ui.paragraph(report.verdict, size=12.5, bold=True, color=ui.theme.final)
+    ui.space(4)
+    sizes = [float(np.hypot(*line.vector)) for line in report.lines if line.vector is not None]
+    largest = max(sizes, default=1.0)
+    for line in report.lines:
+        _draw_force(ui, line, largest)
+        ui.paragraph(line.text, size=11.5, indent=_REPORT_INDENT_PX if line.vector is not None else 0.0)
+        ui.space(3)
+
+
+def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
+    """Draw the arrow of a force left of its text, longer for larger forces."""
+    if ui.surface is None or line.vector is None:
+        return
+    size = float(np.hypot(*line.vector))
+    if size < MIN_FORCE_N:
+        return
+    fraction = _MIN_ARROW_FRACTION + (1 - _MIN_ARROW_FRACTION) * size / max(largest, MIN_FORCE_N)
+    length = _ARROW_PX * ui.scale * fraction
+    half = np.array(line.vector) / size * (length, -length)
+    center = np.array(ui.rest.topleft) + np.array(_ARROW_CENTER_PX) * ui.scale
+    canvas = create_flat_canvas(ui.surface, ui.theme, ui.scale)
+    color = ui.theme.forces.get(line.kind, ui.theme.ink)
+    canvas.draw_arrow((center - half).tolist(), (center + half).tolist(), color, 2 * ui.scale)
+
+
+def shorten_names(files: list[str]) -> dict[str, str]:
+    """Return the labels of maps in the menu: files without their folders, if that is unique.
+
+    >>> shorten_names(["rooms", "/tmp/a/rooms-1.json", "a/x.json", "b/x.json"])
+    {'rooms': 'rooms', '/tmp/a/rooms-1.json': 'rooms-1.json', 'a/x.json': 'a/x.json', 'b/x.json': 'b/x.json'}
+    """
+    names = [Path(file).name for file in files]
+    labels: dict[str, str] = {}
+    for file, name in zip(files, names, strict=True):
+        labels[file] = name if names.count(name) == 1 else file
+    return labels
+
+
+def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]:
+    """Return unique labels of controllers for the menu.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Names of the offered controllers. Those in files of users are loaded for their labels.
+    shown : mapping of str to str
+        Labels of the controllers in use, by name. These are not loaded: they may come from a saved run.
+
+    Returns
+    -------
+    dict of str to str
+        Labels by name.
+
+    Examples
+    --------
+    >>> label_controllers(["rapf", "lloyd"], {"theirs.py:Mine": "Mine"})
+    {'rapf': 'RAPF', 'lloyd': 'Lloyd', 'theirs.py:Mine': 'Mine'}
+    """
+    labels: dict[str, str] = {}
+    for name in dict.fromkeys([*names, *shown]):
+        label = shown[name] if name in shown else _load_label(name)
+        file = Path(name.rpartition(":")[0]).name
+        candidates = (label, f"{label} ({file})", f"{label} ({name})")
+        labels[name] = next(candidate for candidate in candidates if candidate not in labels.values())
+    return labels
+
+
+def _load_label(name: str) -> str:
+    try:
+        return str(load_controller_class(name).label)
+    except ParameterError:  # its file has changed since
+        return get_controller_label(name)

@@ -1,0 +1,40 @@
+"""Keeps the explanation of the selected robot up to date while it is visible."""
+
+from robocov_app.viewer.explanation.explain import explain_robot
+from robocov_app.viewer.panel.panel import ViewerPanel
+from robocov_app.viewer.presenter import Presenter
+
+REPORT_INTERVAL_S = 0.2  # between two explanations
+
+
+class RobotInspector:
+    """Explains the selected robot in the panel.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    panel : ViewerPanel
+        The panel.
+    """
+
+    def __init__(self, viewer: Presenter, panel: ViewerPanel) -> None:
+        self._viewer = viewer
+        self._panel = panel
+        self._explained: object = None  # robot, time and session of the latest explanation
+        self._explained_at = 0.0
+
+    def update(self, now: float) -> None:
+        """Explain the robot again at a time, s, if it has changed and the explanation is old enough."""
+        viewer = self._viewer
+        number = viewer.selected_robot
+        if number is None or self._panel.tab != "robot" or self._panel.hidden:
+            self._panel.report = None
+            return
+        session = viewer.session
+        state = (number, session.displayed.time, session.timeline.past_version, viewer.revision)
+        is_old = state != self._explained and now - self._explained_at >= REPORT_INTERVAL_S
+        if self._panel.report is None or is_old:
+            self._explained = state
+            self._explained_at = now
+            self._panel.report = explain_robot(viewer, number)

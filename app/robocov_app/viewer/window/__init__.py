@@ -1,0 +1,1 @@
+"""The viewer's window: its loop, mouse, dialogs, status line and video."""

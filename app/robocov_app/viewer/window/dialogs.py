@@ -1,0 +1,112 @@
+"""Dialogs of the window: files, branches, and the offers when it is opened."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from robocov_app.storage.autosave import Draft, remove_draft
+from robocov_app.toolkit.dialogs import (
+    Answer,
+    Choice,
+    Option,
+    Question,
+    create_file_choice,
+    create_list_choice,
+    create_recovery_question,
+)
+from robocov_app.viewer.actions.files import FileActions
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.files.session_file import SUFFIX
+from robocov_app.viewer.session.files.workspace import describe_draft
+
+
+def build_file_dialog(files: FileActions) -> Choice:
+    """Return the dialog that opens a session or a map."""
+    recent = [Path(name) for name in files.recent if Path(name).exists()]
+    endings = (SUFFIX, ".json")
+    title = "Open a session or a map"
+    return create_file_choice(title, files.folder, files.open_file, suffixes=endings, recent=recent)
+
+
+def build_branch_dialog(viewer: Presenter) -> Choice:
+    """Return the dialog that enters a branch."""
+    timeline = viewer.session.timeline
+    # The present curve is stored with those of the other branches.
+    timeline.cache_present()
+
+    def list_options() -> Iterator[Option]:
+        for number, branch in enumerate(timeline.document.list_branches(), 1):
+            text = f"{number}  {branch.description}"
+            if branch.node is timeline.head:
+                text += "  (here)"
+            yield Option(text, branch.describe_end(timeline.scenario.dt), value=branch.node.number)
+
+    def enter(option: Option) -> None:
+        viewer.playback.enter_node(int(str(option.value)))
+
+    return create_list_choice("Branches", list_options, enter)
+
+
+def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:
+    """Return the dialog that offers the lesson to a new user; the session pauses until there is an answer."""
+    play = _pause(viewer)
+
+    def play_lesson() -> None:
+        play()
+        start_lesson()
+
+    text = (
+        "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
+        "and what helps, in a few minutes. Reopen it any time with F2."
+    )
+    answers = [Answer("Lesson 1", play_lesson), Answer("Just let me play", play)]
+    return Question("Welcome to robocov", text, answers, play)
+
+
+def build_recovery_offer(
+    viewer: Presenter, drafts: Sequence[Draft], offer_others: Callable[[Sequence[Draft]], None]
+) -> Question:
+    """Return the dialog that offers to recover unsaved work; the session pauses until there is an answer.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    drafts : sequence of Draft
+        Unsaved work, the newest first.
+    offer_others : callable
+        Offers the other drafts once the newest is discarded.
+    """
+    newest = drafts[0]
+    others = drafts[1:]
+    play = _pause(viewer)
+
+    def recover() -> None:
+        play()
+        viewer.attempt(partial(viewer.files.recover, newest))
+
+    def discard() -> None:
+        remove_draft(newest.folder)
+        play()
+        if others:
+            offer_others(others)
+
+    return create_recovery_question(
+        f"A window ended without saving: {describe_draft(newest)}.",
+        others=len(others),
+        recover=recover,
+        discard=discard,
+        postpone=play,
+    )
+
+
+def _pause(viewer: Presenter) -> Callable[[], None]:
+    """Pause the session; return a function that resumes it if it was playing."""
+    session = viewer.session
+    was_playing = session.playback.is_playing
+    session.playback.is_playing = False
+
+    def resume() -> None:
+        session.playback.is_playing = was_playing
+
+    return resume

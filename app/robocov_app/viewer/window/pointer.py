@@ -1,0 +1,237 @@
+"""The mouse over the viewer's canvas and plot: tools, panning, the time line."""
+
+from collections.abc import Callable
+
+import pygame
+
+from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, RIGHT_BUTTON, Gesture, PanGesture, Pixel, Pointer
+from robocov_app.toolkit.tools.tool import CursorShape
+from robocov_app.toolkit.window.input import ZOOM_PER_NOTCH, get_wheel_notches
+from robocov_app.toolkit.window.layout import is_inside
+from robocov_app.toolkit.window.mouse_cursor import MouseCursor
+from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.chart.chart import Chart
+from robocov_app.viewer.chart.scrubbing import TimeGesture
+from robocov_app.viewer.panel.panel import ViewerPanel
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.tools.snapping import MapSnapper
+from robocov_app.viewer.tools.tool import ViewerPointerEvent
+
+_NO_ROBOT = (-1, -1)
+
+
+class ViewerPointer(Pointer):
+    """Turns mouse events into actions of canvas, plot and tools.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    canvas : ViewerCanvas
+        The panes.
+    chart : Chart
+        Plot and time line.
+    panel : ViewerPanel
+        The panel, which gets events first.
+    leave_lesson : callable
+        Lets the user take over from a lesson.
+    """
+
+    def __init__(
+        self,
+        viewer: Presenter,
+        canvas: ViewerCanvas,
+        chart: Chart,
+        panel: ViewerPanel,
+        leave_lesson: Callable[[], None],
+    ) -> None:
+        super().__init__(panel)
+        self._viewer = viewer
+        self._canvas = canvas
+        self._chart = chart
+        self._viewer_panel = panel
+        self._leave_lesson = leave_lesson
+        self._snapper = MapSnapper()
+
+    def get_scale(self) -> float:
+        """Return the scale of the window."""
+        return self._canvas.layout.scale
+
+    def show_action(self, cursor: MouseCursor) -> None:
+        """Show the effect of a press: by the cursor's shape, and a ring around the robot under it."""
+        viewer = self._viewer
+        inspection = viewer.inspection
+        canvas = self._canvas
+        pane = canvas.find_pane(self.at) if inspection.cursor is not None else None
+        number: int | None = None
+        if pane is not None:
+            # The camera may have moved although the mouse has not.
+            inspection.cursor = canvas.to_world(self.at, pane)
+            inspection.cursor_pane = pane
+            if viewer.tool.takes_robots:
+                number = canvas.find_robot(self.at, pane)
+        canvas.hovered = _NO_ROBOT
+        if pane is not None and number is not None:
+            canvas.hovered = (pane, number)
+        cursor.show(self._choose_cursor(pane, number))
+
+    def _choose_cursor(self, pane: int | None, number: int | None) -> CursorShape:
+        viewer = self._viewer
+        if number is not None:
+            return "hand"
+        if pane is not None:
+            return viewer.tool.choose_cursor(viewer.session)
+        if not self._is_over_time():
+            return "arrow"
+        return "hand" if self._chart.is_on_switch(self.at) else "sideways"
+
+    def _is_over_time(self) -> bool:
+        layout = self._canvas.layout
+        return is_inside(layout.track, self.at) or is_inside(layout.chart, self.at)
+
+    def leave(self) -> None:
+        """Handle that the mouse has left the panes."""
+        self._viewer.inspection.cursor = None
+        self._chart.hover = None
+
+    def turn_wheel(self, event: pygame.event.Event) -> None:
+        """Zoom, or change the size of the tool."""
+        if self._canvas.find_pane(self.at) is None:
+            return
+        factor = ZOOM_PER_NOTCH ** get_wheel_notches(event)
+        if self._viewer.tool.uses_wheel:
+            self._viewer.resize_tool(factor)
+        else:
+            self._canvas.zoom(factor, self.at)
+
+    def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
+        """Use the plot or the tool, or pan."""
+        if self._is_over_time():
+            return self._press_chart(event.pos) if event.button == LEFT_BUTTON else None
+        pane = self._canvas.find_pane(event.pos)
+        if pane is None:
+            return None
+        is_right = event.button == RIGHT_BUTTON
+        if event.button == LEFT_BUTTON or (is_right and self._viewer.tool.uses_right_button):
+            return self._press_tool(event, pane, now)
+        return PanGesture(self._canvas.pan, self._click_without_tool)
+
+    def _press_chart(self, pixel: Pixel) -> Gesture | None:
+        viewer = self._viewer
+        chart = self._chart
+        if chart.is_on_switch(pixel):
+            viewer.attempt(chart.switch_quantity)
+            return None
+        node = chart.find_ghost(pixel)
+        if node is not None:
+            viewer.attempt(lambda: viewer.playback.enter_node(node))
+            return None
+        self._leave_lesson()
+        viewer.attempt(lambda: viewer.playback.look_at(chart.to_time(pixel[0])))
+        return TimeGesture(viewer, chart)
+
+    def _press_tool(self, event: pygame.event.Event, pane: int, now: float) -> Gesture:
+        """Use the tool in a pane; the floor under the hand is dragged."""
+        viewer = self._viewer
+        canvas = self._canvas
+        hand = viewer.toolbox.hand
+        self._leave_lesson()
+        # The session from before a lesson may have fewer panes.
+        pane = min(pane, len(viewer.session.timeline.panes) - 1)
+        if viewer.active_pane != pane:
+            viewer.inspection.active_pane = pane
+            viewer.revision += 1
+        is_right = event.button == RIGHT_BUTTON
+        pointer = self.build_event(event.pos, pane, is_right=is_right)
+        is_double = self.count_clicks(event, now) > 1
+        handle = viewer.tool.double_click if is_double else viewer.tool.press
+        viewer.attempt(lambda: handle(viewer.session, pointer))
+        if viewer.tool is not hand:
+            return ViewerToolGesture(self, pane)
+        if pointer.robot is not None:
+            self._viewer_panel.show_tab("robot")
+        if hand.is_holding:
+            return ViewerToolGesture(self, pane)
+        return PanGesture(canvas.pan, self._click_without_tool)
+
+    def build_event(self, pixel: Pixel, pane: int, *, is_right: bool = False) -> ViewerPointerEvent:
+        """Return the pointer at a pixel of a pane, snapped to the map if the tool wants that.
+
+        Parameters
+        ----------
+        pixel : tuple of int
+            Position, px.
+        pane : int
+            Index of the pane; panes may have been removed since the button was pressed.
+        is_right : bool
+            Whether the right button is pressed.
+        """
+        canvas = self._canvas
+        viewer = self._viewer
+        pane = min(pane, len(canvas.layout.panes) - 1)
+        raw = canvas.to_world(pixel, pane)
+        reach = canvas.get_reach(pane)
+        point = raw
+        if viewer.tool.snaps:
+            point = self._snapper.snap(viewer.session.displayed.environment, raw, reach)
+        robot = canvas.find_robot(pixel, pane) if viewer.tool.takes_robots else None
+        return ViewerPointerEvent(point, raw, reach, robot=robot, is_right=is_right)
+
+    def move_tool(self, event: pygame.event.Event, pane: int) -> None:
+        """Drag the tool to the mouse, in a pane."""
+        viewer = self._viewer
+        pointer = self.build_event(event.pos, pane)
+        viewer.attempt(lambda: viewer.tool.move(viewer.session, pointer))
+
+    def release_tool(self, event: pygame.event.Event, pane: int, *, is_click: bool) -> None:
+        """Release the tool at the mouse, in a pane."""
+        viewer = self._viewer
+        pointer = self.build_event(event.pos, pane)
+        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
+
+    def _click_without_tool(self, event: pygame.event.Event) -> None:
+        """Handle a click that did not pan: complete a drawing (right), or clear the selection (left)."""
+        viewer = self._viewer
+        if event.button == RIGHT_BUTTON:
+            viewer.attempt(viewer.finish_drawing)
+        elif event.button == LEFT_BUTTON and viewer.tool is viewer.toolbox.hand:
+            viewer.inspection.selected = None
+            viewer.revision += 1
+
+    def hover(self, event: pygame.event.Event) -> None:
+        """Follow the mouse with the cursor, and with the tool while no button is held down."""
+        viewer = self._viewer
+        inspection = viewer.inspection
+        pane = self._canvas.find_pane(event.pos)
+        inspection.cursor = None
+        if pane is not None and not is_inside(self._canvas.layout.panel, event.pos):
+            inspection.cursor = self._canvas.to_world(event.pos, pane)
+            inspection.cursor_pane = pane
+        self._chart.hover = None if self.is_busy else event.pos
+        if inspection.cursor is not None and not self.is_busy:
+            pointer = self.build_event(event.pos, inspection.cursor_pane)
+            viewer.tool.move(viewer.session, pointer)
+
+
+class ViewerToolGesture(Gesture):
+    """Passes a drag on to the tool, in the pane in which the button was pressed.
+
+    Parameters
+    ----------
+    pointer : ViewerPointer
+        The mouse over the panes.
+    pane : int
+        Index of the pane.
+    """
+
+    def __init__(self, pointer: ViewerPointer, pane: int) -> None:
+        self._pointer = pointer
+        self._pane = pane
+
+    def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Move the tool."""
+        self._pointer.move_tool(event, self._pane)
+
+    def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
+        """Release the tool."""
+        self._pointer.release_tool(event, self._pane, is_click=is_click)

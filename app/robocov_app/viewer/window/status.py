@@ -1,0 +1,122 @@
+"""The status line: time, cost, speed, the point under the cursor; and suggestions what to try next."""
+
+import shapely
+
+from robocov.environment import Point
+from robocov_app.viewer.costs.costs import KnownCost
+from robocov_app.viewer.model import ViewerModel
+from robocov_app.viewer.session.clock import format_speed
+from robocov_app.viewer.session.pane import Pane
+
+HINT = "Space pause · F1 keys"
+LOW_FRAME_RATE = 30.0  # frames per second; a lower rate is listed before other facts
+MAX_SUGGESTIONS = 3
+_MAX_COST_LAG_S = 0.05  # an older cost is shown with its time
+_MIN_UNCOVERED_AREA_M2 = 1e-9
+_MAX_SITE_DISTANCE = 1.5  # spacings of the lattice: farther points are not free
+
+_SUGGESTIONS = {
+    "obstacle": "draw a wall in a doorway (W)",
+    "hand": "drag a robot",
+    "failure": "let one fail (D)",
+    "pane": "compare controllers (K)",
+    "law": "change the controller (O)",
+    "density": "paint where it matters (G)",
+    "robot": "let one more join (A)",
+}
+"""Suggestions to the user, by the kind of edit that follows them."""
+
+
+def list_facts(
+    viewer: ViewerModel, frame_rate: float, step_rate: float, video_duration: float | None
+) -> list[str]:
+    """Return the facts in the status line, the most important first.
+
+    Parameters
+    ----------
+    viewer : ViewerModel
+        The viewer.
+    frame_rate, step_rate : float
+        Frames and simulated steps per second.
+    video_duration : float or None
+        Duration of the video that is being recorded, s.
+    """
+    session = viewer.session
+    time = session.displayed.time
+    paused = "" if session.playback.is_playing else "paused · "
+    facts = [f"{paused}t = {time:.2f} s"]
+    known = viewer.costs.known.get(viewer.pane.number)
+    if known is not None:
+        facts += _list_cost_facts(known, time)
+    if video_duration is not None:
+        facts.append(f"● video {video_duration:.0f} s")
+    rate = f"{frame_rate:.0f} fps"
+    rest = [describe_cursor(viewer), _describe_speed(viewer, step_rate), f"{step_rate:.0f} steps/s"]
+    facts += [rate, *rest] if frame_rate < LOW_FRAME_RATE else [*rest, rate]
+    return [fact for fact in facts if fact]
+
+
+def _list_cost_facts(known: KnownCost, time: float) -> list[str]:
+    age = f" (at {known.time:.1f} s)" if abs(known.time - time) > _MAX_COST_LAG_S else ""
+    facts = [f"J = {known.result.value:.2f} m³{age}"]
+    if known.result.uncovered_area > _MIN_UNCOVERED_AREA_M2:
+        facts.append(f"cut off {known.result.uncovered_area:.1f} m²")
+    return facts
+
+
+def _describe_speed(viewer: ViewerModel, step_rate: float) -> str:
+    session = viewer.session
+    speed = format_speed(session.playback.clock.speed)
+    if session.playback.is_playing and session.playback.clock.is_behind:
+        actual = step_rate * session.timeline.scenario.dt
+        return f"{speed} (running at {actual:.1f}×)"
+    return speed
+
+
+def describe_cursor(viewer: ViewerModel) -> str:
+    """Return the point under the cursor, and its distance to the nearest robot; empty without a cursor."""
+    cursor = viewer.inspection.cursor
+    if cursor is None:
+        return ""
+    panes = viewer.session.timeline.panes
+    pane = panes[min(viewer.inspection.cursor_pane, len(panes) - 1)]
+    position = f"({cursor[0]:.2f}, {cursor[1]:.2f}) m"
+    known = viewer.costs.known.get(pane.number)
+    if known is None:
+        return position
+    return f"{position}: {_describe_point(viewer, pane, known, cursor)}"
+
+
+def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Point) -> str:
+    """Return the distance of a point to the robot that covers it, or why there is none."""
+    result = known.result
+    squares = (result.points[:, 0] - point[0]) ** 2 + (result.points[:, 1] - point[1]) ** 2
+    site = int(squares.argmin())
+    if squares[site] > (_MAX_SITE_DISTANCE * known.get_lattice().spacing) ** 2:
+        setup = viewer.session.displayed.get_setup(pane)
+        is_in_map = setup.environment.boundary_polygon.intersects(shapely.Point(point))
+        return "inside an obstacle" if is_in_map else "outside the map"
+    row = int(result.owner[site])
+    numbers = viewer.session.displayed.get_setup(pane).numbers
+    if not 0 <= row < len(numbers):
+        return "out of reach of all robots"
+    distance = float(result.distances[site])
+    ratio = distance / result.mean_distance if result.mean_distance > 0 else 0.0
+    return f"{distance:.2f} m to robot {numbers[row]}, {ratio:.1f} × the mean"
+
+
+def suggest_actions(viewer: ViewerModel) -> str:
+    """Suggest what to try once the team has settled; empty while it moves, or if everything was tried."""
+    timeline = viewer.session.timeline
+    has_settled = timeline.is_settled or viewer.settled_change is timeline.head
+    if not viewer.view.has_suggestions or not has_settled:
+        return ""
+    if not timeline.is_live or timeline.drag is not None:
+        return ""
+    tried = {node.kind for node in timeline.document.nodes}
+    if len(timeline.panes) > 1:
+        tried.add("pane")
+    suggestions = [text for kind, text in _SUGGESTIONS.items() if kind not in tried]
+    if not suggestions:
+        return ""
+    return f"The team has settled. Try:\n{' · '.join(suggestions[:MAX_SUGGESTIONS])}"

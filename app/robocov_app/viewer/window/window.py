@@ -1,0 +1,352 @@
+"""The viewer's window: handles events, advances time, draws frames."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pygame
+
+from robocov_app.look.theme import get_theme
+from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.storage.autosave import Draft
+from robocov_app.terminal.output import find_free_path
+from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.toolkit.overlay import draw_message, draw_status
+from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
+from robocov_app.toolkit.window.command_window import CommandWindow
+from robocov_app.toolkit.window.layout import build_layout
+from robocov_app.toolkit.window.window import FPS
+from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.chart.chart import Chart
+from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_commands, list_viewer_commands
+from robocov_app.viewer.commands.window_commands import ViewerWindowActions, list_window_commands
+from robocov_app.viewer.costs.cost_curves import CostCurves
+from robocov_app.viewer.lessons.guide import LessonGuide
+from robocov_app.viewer.panel.panel import ViewerPanel
+from robocov_app.viewer.panel.robot_inspector import RobotInspector
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.files.run_saver import RunSaver
+from robocov_app.viewer.window.dialogs import (
+    build_branch_dialog,
+    build_file_dialog,
+    build_recovery_offer,
+)
+from robocov_app.viewer.window.pointer import ViewerPointer
+from robocov_app.viewer.window.screen_video import ScreenVideo
+from robocov_app.viewer.window.session_runner import SessionRunner
+from robocov_app.viewer.window.status import HINT, list_facts, suggest_actions
+
+KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
+PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
+_LESSON_HINT = "F2 back to the lesson · Esc ends it"
+
+
+class ViewerWindow(CommandWindow):
+    """Shows a session, and lets the user change it.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        State and actions.
+    size : tuple of int
+        Width and height, px.
+    scale : float
+        Size of texts and widgets.
+    is_unattended : bool
+        Whether there is no user: videos wait for their encoder instead of leaving frames out, lessons answer
+        themselves.
+    screen : Surface, optional
+        Window that exists already.
+
+    Attributes
+    ----------
+    viewer : Presenter
+        State and actions.
+    canvas : ViewerCanvas
+        The panes.
+    chart : Chart
+        Plot and time line.
+    panel : ViewerPanel
+        The panel.
+    dialogs : Dialogs
+        Open dialogs.
+    commands : CommandTable
+        All commands.
+    lesson : LessonGuide
+        The lesson, if there is one.
+    video : ScreenVideo or None
+        The video that is being recorded.
+    run_saver : RunSaver
+        Saves runs in other processes.
+    is_help_open : bool
+        Whether the keys are shown.
+    """
+
+    groups = GROUPS
+    keys_hint = KEYS_HINT
+    palette_hint = PALETTE_HINT
+    hint = HINT
+
+    panel: ViewerPanel
+    pointer: ViewerPointer
+
+    def __init__(
+        self,
+        viewer: Presenter,
+        size: tuple[int, int],
+        scale: float,
+        *,
+        is_unattended: bool = False,
+        screen: pygame.Surface | None = None,
+    ) -> None:
+        super().__init__(viewer, Dialogs(), size, scale, screen)
+        pygame.display.set_caption("robocov")
+        self.viewer = viewer
+        self.is_unattended = is_unattended
+        self.video: ScreenVideo | None = None
+        self.run_saver = RunSaver(viewer.costs.lattice)
+        self.canvas = ViewerCanvas(viewer, get_theme(viewer.view.theme))
+        self.chart = Chart(viewer)
+        self.lesson = LessonGuide(viewer, self.canvas.fit, is_unattended=is_unattended)
+        titles = {layer.name: layer.title for layer in build_standard_layers()}
+        window_commands = list_window_commands(self.canvas, self.chart, self._build_actions())
+        listed = [*list_viewer_commands(viewer, titles), *window_commands]
+        self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
+        self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
+        self.pointer = ViewerPointer(viewer, self.canvas, self.chart, self.panel, self.lesson.leave)
+        self._cost_curves = CostCurves(viewer)
+        self._runner = SessionRunner(viewer)
+        self._inspector = RobotInspector(viewer, self.panel)
+        self._arranged: tuple[object, ...] | None = None  # key of the layout
+        self._unrecorded_s = 0.0  # time since the last frame of the video
+        self._arrange()
+        self.draw()
+
+    def _build_actions(self) -> ViewerWindowActions:
+        """Return the actions of the window that commands run."""
+        return ViewerWindowActions(
+            zoom=self.zoom,
+            show_next_tab=lambda: self.panel.show_next_tab(),
+            toggle_fullscreen=self.toggle_fullscreen,
+            save_screenshot=lambda: self.save_screenshot(self.viewer.files.folder),
+            toggle_recording=self.toggle_recording,
+            save_run=self.save_run,
+            open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer.files)),
+            list_branches=lambda: self.dialogs.ask(build_branch_dialog(self.viewer)),
+            toggle_help=self.toggle_help,
+            open_palette=self.open_palette,
+            toggle_lesson=self.lesson.toggle,
+            quit=self.quit,
+        )
+
+    def show_result(self, message: str) -> None:
+        """Show the message of a command of the palette, which may change the explanation of the robot."""
+        super().show_result(message)
+        self.panel.report = None
+
+    def offer_recovery(self, drafts: Sequence[Draft]) -> None:
+        """Offer to recover unsaved work, the newest first."""
+        self.dialogs.ask(build_recovery_offer(self.viewer, drafts, self.offer_recovery))
+
+    def create_save_point(self) -> Callable[[], None]:
+        """Return a function that reverts all later changes."""
+        viewer = self.viewer
+        session = viewer.session
+        point = session.build_save_point()
+
+        def roll_back() -> None:
+            if viewer.session is session:
+                session.restore(point, in_step=True)
+            viewer.tool.cancel(viewer.session)
+            viewer.revision += 1
+
+        return roll_back
+
+    def restore_view(self) -> None:
+        """Close everything that may be the cause of an exception in drawing."""
+        super().restore_view()
+        self.lesson.end()
+        self.canvas.fit()
+
+    def close(self) -> None:
+        """Keep a draft of unsaved work, and end lesson, video and the computation of costs."""
+        files = self.viewer.files
+        files.workspace.save_draft(files.view, at_once=True)
+        # This restores the session and the layers from before the lesson, which are the ones to keep.
+        self.lesson.end()
+        if self.video is not None:
+            self.viewer.attempt(self.toggle_recording)
+        self.viewer.costs.close()
+
+    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
+        """Adopt the scale and theme of the page that shows the window; None leaves the panel as it is."""
+        self.scale = scale
+        view = self.viewer.view
+        view.theme = theme
+        if panel is not None:
+            view.has_panel = panel
+        self.viewer.revision += 1
+
+    def update(self, seconds: float) -> None:
+        """Let time pass."""
+        self._unrecorded_s += seconds
+        self._pass_time(seconds)
+        self._cost_curves.update()
+        self._arrange()
+        self._inspector.update(self.viewer.now)
+        self.panel.is_covered = self.lesson.shown is not None
+        self.panel.update(seconds)
+        self.pointer.show_action(self.cursor)
+
+    def get_visible_state(self) -> object:
+        """Return a key of the picture; None while something moves."""
+        viewer = self.viewer
+        session = viewer.session
+        is_at_rest = (
+            session.timeline.is_settled
+            and session.timeline.is_live
+            and not session.displayed.environment.has_moving_obstacles
+        )
+        if self.video is not None or (session.playback.is_playing and not is_at_rest):
+            return None
+        return (
+            viewer.revision,
+            viewer.message,
+            viewer.has_error_message,
+            session.displayed.time,
+            session.timeline.past_version,
+            session.playback.is_playing,
+            self._cost_curves.answer_count,
+            viewer.costs.state,
+            self._arranged,
+            self.panel.ui.needs_redraw,
+            self.lesson.visible_state,
+        )
+
+    def _pass_time(self, seconds: float) -> None:
+        viewer = self.viewer
+        viewer.pass_time(seconds)
+        viewer.files.workspace.save_draft(viewer.files.view)
+        for message, is_error in self.run_saver.poll():
+            viewer.show_message(message, is_error=is_error)
+        self.lesson.advance(seconds)
+        # A window that has waited for events makes up for many frames at once.
+        slices = max(round(seconds * FPS), 1) if self.is_resting else 1
+        self._runner.advance(seconds, slices)
+
+    def _arrange(self) -> None:
+        """Lay the window out if its size, or the number or shape of the panes, has changed."""
+        view = self.viewer.view
+        session = self.viewer.session
+        size = self.screen.get_size()
+        panes = len(session.timeline.panes)
+        legend_rows = 1
+        if panes > 1 and self._arranged is not None:
+            legend_rows = max(self.canvas.count_legend_rows(), 1)
+        low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
+        aspect = (high_x - low_x) / (high_y - low_y)
+        frame = (size, self.scale, view.has_panel, view.theme)
+        arranged = (frame, panes, round(aspect, 3), legend_rows)
+        before = self._arranged
+        if arranged == before:
+            return
+        self._arranged = arranged
+        self.theme = get_theme(view.theme)
+        self.layout = build_layout(
+            size, self.scale, panes, aspect, panel=view.has_panel, legend_rows=legend_rows
+        )
+        self.canvas.arrange(self.layout, self.theme)
+        self.chart.arrange(self.layout, self.theme)
+        if before is None or frame != before[0]:
+            self.panel.arrange(self.layout, self.theme)
+
+    def draw(self) -> None:
+        """Draw everything, and show it."""
+        layout = self.layout
+        if len(layout.panes) > 1:
+            self.screen.fill(self.theme.background, pygame.Rect(layout.arena))
+        self.canvas.draw(self.screen)
+        self.chart.draw(self.screen)
+        self._draw_status()
+        has_lesson = self.lesson.draw(self.screen, layout, self.theme)
+        if not has_lesson and layout.panel[2]:
+            self.panel.draw(self.screen)
+        self._draw_message(can_suggest=not has_lesson)
+        self.draw_above_map()
+        if self.video is not None:
+            self.video.add(self.screen, self._unrecorded_s)
+        self._unrecorded_s = 0.0
+
+    def _draw_status(self) -> None:
+        duration = None if self.video is None else self.video.duration
+        facts = list_facts(self.viewer, self.frame_rate, self._runner.step_rate, duration)
+        hint = self.hint
+        if self.lesson.is_waiting:
+            hint = _LESSON_HINT
+        elif not self.viewer.session.playback.is_playing:
+            hint = hint.replace("Space pause", "Space play")
+        draw_status(self.screen, self.layout.status, self.theme, self.layout.scale, facts=facts, hint=hint)
+
+    def _draw_message(self, *, can_suggest: bool) -> None:
+        viewer = self.viewer
+        message = viewer.message
+        is_error = bool(message) and viewer.has_error_message
+        if not message and can_suggest and not self.is_unattended:
+            message = suggest_actions(viewer)
+        arena = self.layout.arena
+        draw_message(self.screen, message, arena, self.theme, self.layout.scale, is_error=is_error)
+
+    def do(self, name: str) -> None:
+        """Run a command by its name; lesson and help take some of them."""
+        if self.lesson.handle_command(name):
+            return
+        super().do(name)
+        self.panel.report = None
+        if name in ("robot:next", "robot:previous"):
+            self.panel.show_tab("robot")
+
+    def zoom(self, factor: float) -> None:
+        """Zoom at the mouse if it is over a pane, otherwise at the center of the first pane."""
+        left, top, width, height = self.layout.panes[0]
+        center: tuple[float, float] = (left + width / 2, top + height / 2)
+        if self.canvas.find_pane(self.pointer.at) is not None:
+            center = self.pointer.at
+        self.canvas.zoom(factor, center)
+
+    def quit(self) -> None:
+        """Close the window."""
+        self.closed = True
+
+    def save_run(self) -> str:
+        """Save the run up to the present in a new folder; return a message."""
+        files = self.viewer.files
+        return self.run_saver.save(self.viewer.session, files.folder, files.map_name)
+
+    def toggle_recording(self) -> str:
+        """Start or stop a video of the window; return a message."""
+        view = self.viewer.view
+        if self.video is None:
+            target = find_free_path(self.viewer.files.folder, "robocov", ".mp4")
+            self.video = ScreenVideo(target, self.screen.get_size(), waits=self.is_unattended)
+            view.is_recording = True
+            return f"recording {target}; F9 stops it"
+        video = self.video
+        self.video = None
+        view.is_recording = False
+        video.close()
+        skipped = f", {video.skipped_count} frames left out" if video.skipped_count else ""
+        return f"video saved: {video.path} ({video.duration:.1f} s{skipped})"
+
+    def open_file(self, path: Path) -> None:
+        """Open a session or a map that was dropped on the window."""
+        self.viewer.files.open_file(path)
+
+    def use_key(self, event: pygame.event.Event) -> bool:
+        """Use a key as the answer to the lesson's question, or in a text field of the panel."""
+        return self.lesson.handle_key(event.unicode) or super().use_key(event)
+
+    def handle_mouse(self, event: pygame.event.Event) -> None:
+        """Handle an event of the mouse: by the page of the lesson, else by panel, plot or panes."""
+        is_left_press = event.type == pygame.MOUSEBUTTONDOWN and event.button == LEFT_BUTTON
+        if not (is_left_press and self.lesson.click(event.pos)):
+            super().handle_mouse(event)
