@@ -10,6 +10,8 @@ from time import monotonic
 from robocov_app.web.frames import BaseFrames, Frame, encode_frame
 from robocov_app.web.pages import Page, Pages
 
+SERVED_FPS = 60
+"""Frames per second of a served window while something moves."""
 MAX_INDIVIDUAL_PAGES = 3
 """Number of pages besides the controlling one up to which each gets every frame that it can show."""
 SHARED_FRAME_INTERVAL_S = 1 / 15

@@ -36,7 +36,7 @@ from robocov_app.web.connections import (
 )
 from robocov_app.web.conversation import Conversation, SharedWindow
 from robocov_app.web.files import TransferError, list_saved, read_saved
-from robocov_app.web.frame_delivery import FrameDelivery
+from robocov_app.web.frame_delivery import SERVED_FPS, FrameDelivery
 from robocov_app.web.frames import Frame
 from robocov_app.web.pages import NoPlaceError, Page, Pages
 from robocov_app.web.window_input import WindowInput
@@ -87,6 +87,8 @@ class WebDisplay:
     ----------
     link, watch_link : str
         Addresses of the page, while the server runs.
+    fps : int
+        Frames per second of the window while something moves.
     shared : SharedWindow
         What all pages have in common.
     clipboard : Clipboard
@@ -97,6 +99,7 @@ class WebDisplay:
 
     link: str
     watch_link: str
+    fps = SERVED_FPS
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path()) -> None:
         self.host = host

@@ -20,7 +20,7 @@ from robocov_app.toolkit.window.mouse_cursor import MouseCursor
 from robocov_app.toolkit.window.termination import is_ending
 
 FPS = 60
-"""Frames per second while something moves."""
+"""Frames per second on a screen while something moves."""
 CALM_S = 0.8
 """Time without changes after which the loop waits for events. Tool tips appear earlier."""
 MAX_WAIT_S = 0.1
@@ -40,7 +40,15 @@ RollBack = Callable[[], None]
 
 
 class Remote(Protocol):
-    """A place other than the screen where a window is displayed and used."""
+    """A place other than the screen where a window is displayed and used.
+
+    Attributes
+    ----------
+    fps : int
+        Frames per second while something moves.
+    """
+
+    fps: int
 
     def wait(self, seconds: float) -> None:
         """Wait until a message arrives, at most for some seconds."""
@@ -157,7 +165,9 @@ class BaseWindow:
     def _wait(self, clock: pygame.time.Clock, frame_start_s: float) -> None:
         """Wait for the next frame; while the window rests, until something happens."""
         if self.remote is not None:
-            wait_s = MAX_WAIT_S if self.is_resting else 1.0 / FPS
+            wait_s = 1.0 / self.remote.fps
+            if self.is_resting:
+                wait_s = MAX_WAIT_S
             self.remote.wait(frame_start_s + wait_s - perf_counter())
             return
         clock.tick(FPS)
