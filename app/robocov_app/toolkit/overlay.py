@@ -64,12 +64,16 @@ def draw_rounded_box(
 
 def get_accent_ink(theme: Theme) -> Color:
     """Return the color of texts on the accent color."""
-    return (255, 255, 255) if theme is LIGHT else theme.background
+    if theme is LIGHT:
+        return (255, 255, 255)
+    return theme.background
 
 
 def get_field_color(theme: Theme) -> Color:
     """Return the color of buttons and text fields."""
-    return theme.background if theme is LIGHT else mix(theme.panel, theme.background, 0.8)
+    if theme is LIGHT:
+        return theme.background
+    return mix(theme.panel, theme.background, 0.8)
 
 
 def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[str]:
@@ -198,8 +202,11 @@ def draw_message(
     box_width = max(measure_text(line, size) for line in lines) + 28 * scale
     box = Rect(0, 0, round(box_width), round((len(lines) * _MESSAGE_LINE_PX + 14) * scale))
     box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
-    fill = mix(theme.panel, theme.trajectory, 0.14) if is_error else theme.panel
-    edge = theme.trajectory if is_error else mix(theme.panel, theme.ink, 0.3)
+    fill = theme.panel
+    edge = mix(theme.panel, theme.ink, 0.3)
+    if is_error:
+        fill = mix(theme.panel, theme.trajectory, 0.14)
+        edge = theme.trajectory
     radius = round(_CARD_RADIUS_PX * scale)
     draw_rounded_box(screen, box, fill, edge=edge, radius=radius, width=max(1, round(scale)))
     for number, line in enumerate(lines):

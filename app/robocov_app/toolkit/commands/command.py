@@ -83,7 +83,9 @@ class Command:
     def tip(self) -> str:
         """Title and keys, for a tool tip."""
         keys = " or ".join(format_key(key) for key in self.keys)
-        return f"{self.title} ({keys})" if keys else self.title
+        if not keys:
+            return self.title
+        return f"{self.title} ({keys})"
 
     def run_now(self, *texts: str) -> object:
         """Run the command.

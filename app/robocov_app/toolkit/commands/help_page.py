@@ -105,7 +105,9 @@ def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str 
 def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
     """Choose the number of columns, and the height of rows so that all of them fit."""
     width, height = screen.get_size()
-    count = 4 if width >= _WIDE_WINDOW_PX * scale else 3
+    count = 3
+    if width >= _WIDE_WINDOW_PX * scale:
+        count = 4
     rows_per_column = math.ceil(rows / count) + 1
     row_height = min(_MAX_ROW_PX * scale, (height - 90 * scale) / rows_per_column)
     box_width = round(min(width - 24 * scale, _MAX_WIDTH_PX * scale))
@@ -133,7 +135,11 @@ def _place_lines(
     y = columns.top
     for line in lines:
         is_heading = isinstance(line, str)
-        if y + row_height * (_HEADING_ROWS if is_heading else 1.0) > columns.bottom:
+        # A heading is not separated from its first command.
+        height = row_height
+        if is_heading:
+            height = row_height * _HEADING_ROWS
+        if y + height > columns.bottom:
             x += columns.width
             y = columns.top
         if is_heading and y > columns.top + columns.scale:

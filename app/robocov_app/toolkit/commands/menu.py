@@ -54,10 +54,11 @@ class Menu(Dialog):
     def show_content(self, ui: Ui) -> None:
         """Show the commands."""
         for number, command in enumerate(self.rows):
-            ui.row(height=_SEPARATOR_PX if command is None else _ROW_PX, below=0)
             if command is None:
+                ui.row(height=_SEPARATOR_PX, below=0)
                 ui.cell()
                 continue
+            ui.row(height=_ROW_PX, below=0)
             is_clicked = ui.option(
                 command.title,
                 command.key_text,
@@ -86,8 +87,10 @@ class Menu(Dialog):
         """Choose the next row of those that can be chosen, or the first or last one."""
         if self.chosen in numbers:
             index = numbers.index(self.chosen) + step
+        elif step > 0:
+            index = 0
         else:
-            index = 0 if step > 0 else -1
+            index = -1
         self.chosen = numbers[index % len(numbers)]
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:

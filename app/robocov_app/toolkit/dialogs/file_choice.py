@@ -58,13 +58,16 @@ def create_file_choice(
             accept(path)
         return None
 
+    empty_text = Choice.empty_text
+    if saves:
+        empty_text = "Enter saves it there"
     return Choice(
         title,
         browser.list_options,
         accept_text,
         placeholder=f"a path from {folder.absolute()}",
         hint=_HINT,
-        empty_text="Enter saves it there" if saves else Choice.empty_text,
+        empty_text=empty_text,
         text=text,
     )
 

@@ -351,7 +351,9 @@ class _SnapSearch:
 
 
 def _snap_to_mark(kind: SnapKind, mark: Point) -> Snap:
-    label = "middle of an edge" if kind == "middle" else kind
+    label: str = kind
+    if kind == "middle":
+        label = "middle of an edge"
     return Snap(mark, (Guide(kind, (mark,), label),))
 
 

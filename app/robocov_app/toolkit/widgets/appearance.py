@@ -21,6 +21,13 @@ def shade(page: Page, fraction: float) -> Color:
     return mix(page.theme.panel, page.theme.ink, fraction)
 
 
+def get_text_size(*, small: bool) -> float:
+    """Return the size of a text at scale 1, px."""
+    if small:
+        return SMALL_TEXT_PX
+    return TEXT_PX
+
+
 def is_drawn(page: Page, rect: Rect) -> bool:
     """Return whether something at this place is drawn in this run."""
     return page.surface is not None and bool(rect.colliderect(page.clip))
@@ -49,10 +56,11 @@ def draw_box(
     width : int
         Width of the edge, px.
     """
-    if page.surface is not None:
-        draw_rounded_box(
-            page.surface, rect, fill, edge=fill if edge is None else edge, radius=page.px(radius), width=width
-        )
+    if page.surface is None:
+        return
+    if edge is None:
+        edge = fill
+    draw_rounded_box(page.surface, rect, fill, edge=edge, radius=page.px(radius), width=width)
 
 
 def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled: bool = True) -> Color:
@@ -71,7 +79,9 @@ def draw_face(page: Page, rect: Rect, key: str, *, chosen: bool = False, enabled
     else:
         strength = _choose_strength(0.14, 0.28, is_hovered, is_held)
         fill = mix(get_field_color(theme), theme.final, strength)
-        edge = theme.final if is_held or is_hovered else shade(page, 0.24)
+        edge = shade(page, 0.24)
+        if is_held or is_hovered:
+            edge = theme.final
         ink = theme.ink
     draw_box(page, rect, fill, edge=edge, width=max(1, page.px(0.75)))
     draw_focus_ring(page, rect, key)
@@ -82,7 +92,9 @@ def _choose_strength(hovered: float, held: float, is_hovered: bool, is_held: boo
     """Return how strongly a face is tinted."""
     if is_held:
         return held
-    return hovered if is_hovered else 0.0
+    if is_hovered:
+        return hovered
+    return 0.0
 
 
 def draw_focus_ring(page: Page, rect: Rect, key: str) -> None:

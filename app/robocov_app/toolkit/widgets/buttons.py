@@ -17,6 +17,7 @@ from robocov_app.toolkit.widgets.appearance import (
     draw_face,
     draw_focus_ring,
     draw_text,
+    get_text_size,
     is_drawn,
     shade,
 )
@@ -72,7 +73,7 @@ def show_button(
     is_clicked = page.add_clickable(Widget("button", key, rect, text, chosen, tip), disabled_reason)
     if is_drawn(page, rect):
         ink = draw_face(page, rect, key, chosen=chosen, enabled=not disabled_reason)
-        size = SMALL_TEXT_PX if small else TEXT_PX
+        size = get_text_size(small=small)
         inner = rect.inflate(-page.px(6), 0)
         draw_text(page, text, inner, ink, size, bold=chosen and not small, align="center")
     return is_clicked
@@ -105,14 +106,18 @@ def show_option(
     is_clicked = page.add_clickable(Widget("option", key, rect, text, chosen), disabled_reason)
     if not is_drawn(page, rect):
         return is_clicked
-    if chosen or page.is_hovered(rect):
-        draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.2 if chosen else 0.08))
+    if chosen:
+        draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.2))
+    elif page.is_hovered(rect):
+        draw_box(page, rect, mix(page.theme.panel, page.theme.final, 0.08))
     inner = rect.inflate(-page.px(16), 0)
     draw_text(page, note, inner, page.theme.faint, SMALL_TEXT_PX, align="right")
     if note:
         inner.width -= measure_text(note, page.px(SMALL_TEXT_PX)) + page.px(12)
     lines = text.split("\n")
-    ink = shade(page, 0.45) if disabled_reason else page.theme.ink
+    ink = page.theme.ink
+    if disabled_reason:
+        ink = shade(page, 0.45)
     inner.top -= page.px(_LINE_PX * (len(lines) - 1) / 2)
     for number, line in enumerate(lines):
         draw_text(page, line, inner.move(0, page.px(_LINE_PX * number)), ink, TEXT_PX)
@@ -202,13 +207,21 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
         text_rect.width -= page.px(_CHECK_TEXT_LEFT_PX)
         draw_text(page, text, text_rect, page.theme.ink, TEXT_PX)
         draw_focus_ring(page, rect, key)
-    return (not value) if is_clicked else None
+    if is_clicked:
+        return not value
+    return None
 
 
 def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> None:
     theme = page.theme
-    fill = theme.final if value else mix(get_field_color(theme), theme.final, 0.14 if is_hovered else 0.0)
-    edge = theme.final if value or is_hovered else shade(page, 0.35)
+    if value:
+        fill = edge = theme.final
+    elif is_hovered:
+        fill = mix(get_field_color(theme), theme.final, 0.14)
+        edge = theme.final
+    else:
+        fill = get_field_color(theme)
+        edge = shade(page, 0.35)
     draw_box(page, box, fill, edge=edge, radius=3, width=max(1, page.px(0.75)))
     if not value or page.surface is None:
         return

@@ -39,7 +39,9 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
         page.consume_event()
     if is_drawn(page, rect):
         _draw_menu(page, key, value, rect)
-    return picked if picked != value else None
+    if picked == value:
+        return None
+    return picked
 
 
 def _read_list(page: Page, key: str, options: Sequence[str]) -> str | None:
@@ -67,7 +69,10 @@ def _build_list(page: Page, key: str, options: Sequence[str], value: str, menu: 
     rect.width = min(max(longest + page.px(34), menu.width), page.box.width - page.px(16))
     rect.right = min(rect.right, page.box.right - page.px(8))
     open_list = OpenList(key, list(options), rect, row_height)
-    open_list.choose(open_list.options.index(value) if value in options else 0)
+    if value in options:
+        open_list.choose(open_list.options.index(value))
+    else:
+        open_list.choose(0)
     return open_list
 
 

@@ -2,7 +2,7 @@
 
 from robocov_app.look.colors import Color
 from robocov_app.toolkit.overlay import wrap_text
-from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX, draw_text
+from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_text, get_text_size
 from robocov_app.toolkit.widgets.page import Page, Widget
 
 
@@ -34,8 +34,10 @@ def show_label(
     rect = page.cell()
     page.add_widget(Widget("label", key or text, rect, text, tip=tip))
     is_small = style in ("header", "unit")
-    color = page.theme.faint if is_small else page.theme.ink
-    size = SMALL_TEXT_PX if is_small else TEXT_PX
+    color = page.theme.ink
+    if is_small:
+        color = page.theme.faint
+    size = get_text_size(small=is_small)
     draw_text(page, text, rect, color, size, bold=style in ("header", "bold"), align=align)
 
 

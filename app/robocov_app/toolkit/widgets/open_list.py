@@ -96,7 +96,9 @@ class OpenList:
         """Handle an event. While the list is open, it gets all events."""
         if event.type == pygame.MOUSEBUTTONDOWN:
             number = self.find_item(event.pos)
-            return ListResponse.CLOSED if number is None else self._pick(number)
+            if number is None:
+                return ListResponse.CLOSED
+            return self._pick(number)
         if event.type == pygame.MOUSEWHEEL:
             top = self.top - get_wheel_notches(event) * self.row_height
             self.top = min(max(top, 0.0), self.max_top)
@@ -115,7 +117,9 @@ class OpenList:
             return self._pick(self.chosen)
         if len(name) == 1 and self._choose_by_letter(name):
             return ListResponse.HANDLED
-        return ListResponse.IGNORED if is_function_key(name) else ListResponse.CLOSED
+        if is_function_key(name):
+            return ListResponse.IGNORED
+        return ListResponse.CLOSED
 
     def _pick(self, number: int) -> ListResponse:
         self.picked = self.options[number]

@@ -166,8 +166,16 @@ class Page(RowLayout):
         self.focus = key
         self.open_list = None
         self.needs_redraw = True
+        self.edit = None
         entry = self.find("entry", key)
-        self.edit = None if entry is None else TextEdit.select_all(entry.text)
+        if entry is not None:
+            self.edit = TextEdit.select_all(entry.text)
+
+    def get_edit(self, key: str) -> TextEdit | None:
+        """Return the text that is edited in a field; None while the field is not edited."""
+        if self.focus != key:
+            return None
+        return self.edit
 
     # Drawing
 

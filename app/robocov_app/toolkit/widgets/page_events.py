@@ -47,8 +47,10 @@ class PageEvents:
         if page.open_list is not None:
             page.open_list.highlight(event.pos)
         if page.active is None:
+            hovered = ""
             widget = next(page.find_hovered_widgets(), None)
-            hovered = "" if widget is None else f"{widget.kind}:{widget.key}"
+            if widget is not None:
+                hovered = f"{widget.kind}:{widget.key}"
             if page.tool_tip.note_hovered(hovered):
                 page.needs_redraw = True
             return page.is_pointer_inside()
@@ -93,8 +95,10 @@ class PageEvents:
         name = get_key_name(event)
         if page.focus is None or (page.edit is not None and is_function_key(name)):
             return False
-        if name in ("tab", "shift+tab"):
-            self._move_focus(-1 if name == "shift+tab" else 1)
+        if name == "tab":
+            self._move_focus(1)
+        elif name == "shift+tab":
+            self._move_focus(-1)
         elif name == "escape":
             page.stop_typing()
         elif page.edit is None and name not in _WIDGET_KEYS:
@@ -145,7 +149,9 @@ class PageEvents:
         keys = page.list_focusable_keys()
         if not keys or page.focus is None:
             return
-        number = keys.index(page.focus) + step if page.focus in keys else 0
+        number = 0
+        if page.focus in keys:
+            number = keys.index(page.focus) + step
         page.set_focus(keys[number % len(keys)])
 
     def _is_focused_widget_at(self, pixel: tuple[int, int]) -> bool:

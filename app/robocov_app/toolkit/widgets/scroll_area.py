@@ -109,7 +109,9 @@ def _show_bar(page: Page, key: str, area: Rect, content_height: float, offset: f
         if is_pressed:
             page.active = bar_key
             page.consume_event()
-            page.grab_offset = page.pointer[1] - knob.top if is_on_knob else knob.height / 2
+            page.grab_offset = knob.height / 2
+            if is_on_knob:
+                page.grab_offset = page.pointer[1] - knob.top
         if not is_on_knob:
             offset = (page.pointer[1] - page.grab_offset - track.top) / free_height * max_offset
     offset = min(max(offset, 0.0), max_offset)

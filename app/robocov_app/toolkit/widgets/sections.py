@@ -30,8 +30,10 @@ def show_section(page: Page, title: str, *, key: str = "") -> bool:
     widget.value = is_open
     if page.is_hovered(rect):
         draw_box(page, rect, shade(page, 0.06))
-    text = f"{'▾' if is_open else '▸'} {title}"
-    draw_text(page, text, rect, page.theme.faint, SMALL_TEXT_PX, bold=True)
+    symbol = "▸"
+    if is_open:
+        symbol = "▾"
+    draw_text(page, f"{symbol} {title}", rect, page.theme.faint, SMALL_TEXT_PX, bold=True)
     draw_focus_ring(page, rect, key)
     page.row()
     return is_open

@@ -92,7 +92,9 @@ def show_slider(
     page.add_widget(Widget("slider", key, track, value=new_value), disabled_reason)
     if is_drawn(page, rect):
         _draw_slider(page, key, values, values.compute_fraction(new_value), enabled=not disabled_reason)
-    return new_value if new_value != value else None
+    if new_value == value:
+        return None
+    return new_value
 
 
 def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
@@ -104,7 +106,9 @@ def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
     if is_pressed:
         page.active = key
         page.consume_event()
-        page.grab_offset = page.pointer[0] - knob_left if is_on_knob else values.knob_width / 2
+        page.grab_offset = values.knob_width / 2
+        if is_on_knob:
+            page.grab_offset = page.pointer[0] - knob_left
     is_dragged = page.active == key and page.is_event(pygame.MOUSEMOTION)
     if is_dragged or (is_pressed and not is_on_knob):
         return (
@@ -122,7 +126,9 @@ def _draw_slider(page: Page, key: str, values: _Range, fraction: float, *, enabl
     radius = groove.height // 2 / page.scale
     draw_box(page, groove, shade(page, 0.18), radius=radius)
     groove.width = max(knob_offset + page.px(6), groove.height)
-    accent = theme.final if enabled else shade(page, 0.35)
+    accent = shade(page, 0.35)
+    if enabled:
+        accent = theme.final
     draw_box(page, groove, mix(theme.panel, accent, 0.6), radius=radius)
     strength = 0.0
     if page.active == key:

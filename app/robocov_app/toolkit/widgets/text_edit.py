@@ -115,11 +115,15 @@ class TextEdit:
 
     def _find_word_start(self) -> int:
         match = re.search(r"\S+\s*$", self.text[: self.caret])
-        return match.start() if match else 0
+        if match is None:
+            return 0
+        return match.start()
 
     def _find_word_end(self) -> int:
         match = re.match(r"\s*\S+", self.text[self.caret :])
-        return self.caret + match.end() if match else len(self.text)
+        if match is None:
+            return len(self.text)
+        return self.caret + match.end()
 
     def _move(self, key: str, target: int, *, extend: bool) -> None:
         start, end = self.selection

@@ -5,7 +5,7 @@ from bisect import bisect_left
 import pygame
 from pygame import Rect, Surface
 
-from robocov_app.look.colors import mix
+from robocov_app.look.colors import Color, mix
 from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.overlay import get_field_color
 from robocov_app.toolkit.widgets.appearance import TEXT_PX, draw_box, draw_text, is_drawn, shade
@@ -45,7 +45,7 @@ def show_text_field(
     if page.is_pressed(rect):
         _press(page, key, text, rect)
     entered_text = _read_input(page, key, rect)
-    edit = page.edit if page.focus == key else None
+    edit = page.get_edit(key)
     if live and edit is not None and edit.text != text:
         entered_text = edit.text
     shown_text = text if edit is None else edit.text
@@ -53,8 +53,7 @@ def show_text_field(
     if page.surface is not None and is_drawn(page, rect):
         _draw_field(page, rect, is_edited=edit is not None)
         if edit is None:
-            color = page.theme.ink if text else page.theme.faint
-            draw_text(page, text or placeholder, _get_inner(page, rect), color, TEXT_PX)
+            draw_text(page, text or placeholder, _get_inner(page, rect), _get_text_color(page, text), TEXT_PX)
         else:
             _draw_edit(page, page.surface, rect, edit, placeholder)
     return entered_text
@@ -76,7 +75,7 @@ def _press(page: Page, key: str, text: str, rect: Rect) -> None:
 
 def _read_input(page: Page, key: str, rect: Rect) -> str | None:
     """Pass a key or a drag to the text that is edited; return the text after Enter."""
-    edit = page.edit if page.focus == key else None
+    edit = page.get_edit(key)
     if edit is None:
         return None
     if page.is_event(pygame.MOUSEMOTION) and page.active == key:
@@ -93,6 +92,13 @@ def _read_input(page: Page, key: str, rect: Rect) -> str | None:
         return edit.text
     edit.press_key(name, page.clipboard)
     return None
+
+
+def _get_text_color(page: Page, text: str) -> Color:
+    """Return the color of the text, or of the placeholder in its place."""
+    if text:
+        return page.theme.ink
+    return page.theme.faint
 
 
 def _get_inner(page: Page, rect: Rect) -> Rect:
@@ -118,8 +124,12 @@ def _compute_shift(page: Page, edit: TextEdit, rect: Rect) -> int:
 
 
 def _draw_field(page: Page, rect: Rect, *, is_edited: bool) -> None:
-    edge = page.theme.final if is_edited or page.is_hovered(rect) else shade(page, 0.24)
-    width = max(2, page.px(1.25)) if is_edited else max(1, page.px(0.75))
+    edge = shade(page, 0.24)
+    if is_edited or page.is_hovered(rect):
+        edge = page.theme.final
+    width = max(1, page.px(0.75))
+    if is_edited:
+        width = max(2, page.px(1.25))
     draw_box(page, rect, get_field_color(page.theme), edge=edge, width=width)
 
 
@@ -137,7 +147,7 @@ def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placehol
     if start != end:
         screen.fill(mix(get_field_color(theme), theme.final, 0.35), selection)
     text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
-    image = render_text(text or placeholder, size, theme.ink if text else theme.faint)
+    image = render_text(text or placeholder, size, _get_text_color(page, text))
     screen.blit(image, image.get_rect(midleft=(left, rect.centery)))
     x = left + measure_text(edit.text[: edit.caret], size)
     line_width = max(1, page.px(1))

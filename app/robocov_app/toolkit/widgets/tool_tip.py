@@ -75,7 +75,11 @@ def draw_tool_tip(screen: Surface, text: str, theme: Theme, scale: float, *, x: 
     if box.bottom > screen.get_height():
         box.bottom = widget.top - round(_DISTANCE_PX * scale)
     box.clamp_ip(screen.get_rect())
-    fill = mix(theme.panel, theme.ink, 0.92 if theme is LIGHT else 0.2)
+    # The text is light in both themes.
+    strength = 0.2
+    if theme is LIGHT:
+        strength = 0.92
+    fill = mix(theme.panel, theme.ink, strength)
     draw_rounded_box(screen, box, fill, edge=mix(theme.panel, theme.ink, 0.24), radius=round(4 * scale))
     for number, line in enumerate(lines):
         top = box.top + round(_DISTANCE_PX * scale) + number * line_height

@@ -95,8 +95,9 @@ class FaultLog:
 def describe_os_error(error: OSError) -> str:
     """Return the file and the reason of an error of the system, on one line."""
     reason = error.strerror or str(error) or type(error).__name__
-    text = reason if error.filename is None else f"{os.fsdecode(error.filename)}: {reason}"
-    return remove_controls(text, single_line=True)
+    if error.filename is not None:
+        reason = f"{os.fsdecode(error.filename)}: {reason}"
+    return remove_controls(reason, single_line=True)
 
 
 def _find_place(error: BaseException) -> tuple[str, str, int]:

@@ -88,13 +88,17 @@ def build_layout(
     """
     width, height = size
     scale = min(scale, find_max_scale(size))
-    panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1) if panel else 0
+    panel_width = timeline_height = chart_height = legend_height = 0
+    if panel:
+        panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
+    if plot:
+        timeline_height = round(TIMELINE_HEIGHT_PX * scale)
+        chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3)
+    if panes > 1:
+        legend_height = round((6 + LEGEND_ROW_PX * legend_rows) * scale)
     left_width = width - panel_width
     status_height = round(STATUS_HEIGHT_PX * scale)
-    timeline_height = round(TIMELINE_HEIGHT_PX * scale) if plot else 0
-    chart_height = min(round(CHART_HEIGHT_PX * scale), height // 3) if plot else 0
     arena_height = max(height - status_height - timeline_height - chart_height, 1)
-    legend_height = round((6 + LEGEND_ROW_PX * legend_rows) * scale) if panes > 1 else 0
     return Layout(
         size=size,
         scale=scale,
@@ -129,7 +133,9 @@ def _arrange_panes(
 def find_max_scale(size: tuple[int, int]) -> float:
     """Return the largest scale at which everything fits into a window."""
     width, height = size
-    min_width, min_height = MIN_SIZE_PX if width >= height else MIN_PORTRAIT_SIZE_PX
+    min_width, min_height = MIN_SIZE_PX
+    if width < height:
+        min_width, min_height = MIN_PORTRAIT_SIZE_PX
     scale = floor(_SCALE_STEPS * min(width / min_width, height / min_height)) / _SCALE_STEPS
     return max(scale, _MIN_SCALE)
 

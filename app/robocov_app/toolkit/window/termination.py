@@ -95,7 +95,9 @@ class _Watcher:
         if self.number:
             with suppress(OSError, ValueError):
                 sys.stdout.flush()
-            self._status = 128 + self.number if failed else 0
+            self._status = 0
+            if failed:
+                self._status = 128 + self.number
             self._closed_at = time.monotonic()
 
     def stop(self) -> None:
@@ -133,4 +135,6 @@ class _Watcher:
     def _compute_deadline(self, start_s: float) -> float:
         if self._closed_at is not None:
             return self._closed_at + _CLOSED_GRACE_S
-        return start_s + (_CLOSING_GRACE_S if self.is_closing else _LOOP_GRACE_S)
+        if self.is_closing:
+            return start_s + _CLOSING_GRACE_S
+        return start_s + _LOOP_GRACE_S

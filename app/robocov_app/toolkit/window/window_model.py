@@ -49,7 +49,9 @@ class WindowModel:
     def pass_time(self, seconds: float) -> None:
         """Advance the clock, and remove the status message once it has been shown long enough."""
         self.now += seconds
-        duration = self.error_message_s if self.has_error_message else MESSAGE_S
+        duration = MESSAGE_S
+        if self.has_error_message:
+            duration = self.error_message_s
         if self.now - self._message_time > duration:
             self.clear_message()
 
