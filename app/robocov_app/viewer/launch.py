@@ -206,7 +206,9 @@ class ViewerLauncher:
             min_width, min_height = MIN_SIZE_PX
             width = max(width, round(min_width * scale))
             height = max(height, round(min_height * scale))
-        return (width, height) if self._needs_no_display else fit_to_screen((width, height))
+        if self._needs_no_display:
+            return (width, height)
+        return fit_to_screen((width, height))
 
     def _read_settings(self, window: ViewerWindow, before: ViewerSettings) -> ViewerSettings:
         """Return the settings of a window, without the layers chosen on the command line."""

@@ -82,7 +82,9 @@ class ViewerModel(WindowModel):
     def selected_robot(self) -> int | None:
         """Number of the selected robot, if it is still in the team."""
         selected = self.inspection.selected
-        return selected if selected in self.robot_numbers else None
+        if selected in self.robot_numbers:
+            return selected
+        return None
 
     def attempt(self, action: Callable[[], object]) -> None:
         """Carry an action out; show the message that it returns, or its error."""

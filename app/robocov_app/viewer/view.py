@@ -50,7 +50,9 @@ class ViewState:
     def toggle_suggestions(self) -> str:
         """Switch suggestions on or off; return a message."""
         self.has_suggestions = not self.has_suggestions
-        return "suggestions on" if self.has_suggestions else "suggestions off"
+        if self.has_suggestions:
+            return "suggestions on"
+        return "suggestions off"
 
     def toggle_panel(self) -> None:
         """Show or hide the panel."""

@@ -161,7 +161,9 @@ class ViewerCanvas:
             distance = float(np.hypot(*(np.array(position) - point))) * canvas.camera.zoom
             if distance <= FAILED_RADIUS_PX * self.layout.scale:
                 hits.append((distance, number))
-        return min(hits, key=lambda hit: hit[0])[1] if hits else None
+        if hits:
+            return min(hits, key=lambda hit: hit[0])[1]
+        return None
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw all panes."""
@@ -260,7 +262,9 @@ class ViewerCanvas:
             return ""
         name = get_cost_name(displayed.get_setup(pane).environment)
         text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
-        return f"{text} at {time:.1f} s" if displayed.time - time > MAX_COST_LAG_S else text
+        if displayed.time - time > MAX_COST_LAG_S:
+            return f"{text} at {time:.1f} s"
+        return text
 
     def _build_canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
         hues = choose_robot_hues(len(scene.team))

@@ -65,7 +65,9 @@ class Chart:
     @property
     def plotted(self) -> PlottedQuantity:
         """The quantity that the chart shows."""
-        return self._quantity if self._has_times else DISTANCE
+        if self._has_times:
+            return self._quantity
+        return DISTANCE
 
     @property
     def times(self) -> TimeScale:

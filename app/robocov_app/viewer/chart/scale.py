@@ -134,7 +134,9 @@ def build_chart_scale(times: TimeScale, layout: Layout, curves: Sequence[Array])
     top = TOP_PX * layout.scale
     bottom = layout.chart[3] - BOTTOM_PX * layout.scale
     values = np.concatenate([*curves, np.empty(0)])
-    low = float(values.min()) if len(values) else np.nan
-    high = float(values.max()) if len(values) else np.nan
+    low = high = np.nan
+    if len(values):
+        low = float(values.min())
+        high = float(values.max())
     max_intervals = (bottom - top) / (MIN_TICK_GAP_PX * layout.scale)
     return ChartScale(times, choose_growing_value_axis(low, high, max_intervals), top, bottom)

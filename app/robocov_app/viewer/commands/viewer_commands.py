@@ -256,7 +256,9 @@ def _build_whole_number_argument(name: str, options: Callable[[], Iterable[str]]
 
 def _read_path(text: str) -> Path | None:
     """Return a path; None for an empty text, for the session's own file."""
-    return Path(text) if text else None
+    if text:
+        return Path(text)
+    return None
 
 
 def _read_speed(text: str) -> float:

@@ -384,4 +384,6 @@ def _compute_travel_time(cost: TimeVaryingCost, question: CostQuestion, position
     if question.speeds is None:
         return None
     result = cost(question.time, positions, speeds=question.speeds)
-    return None if result is None else result.mean_time
+    if result is None:
+        return None
+    return result.mean_time

@@ -30,7 +30,9 @@ def describe_motion(situation: RobotSituation, motion: Motion) -> str:
 
 def _describe_trembling(situation: RobotSituation) -> str:
     text = "trembling in place"
-    return f"{text}, stuck: {_describe_goal(situation)}" if situation.is_stuck else text
+    if situation.is_stuck:
+        return f"{text}, stuck: {_describe_goal(situation)}"
+    return text
 
 
 def _describe_moving(situation: RobotSituation) -> str:
@@ -79,14 +81,18 @@ def _describe_arrival(goal: NearbyObject) -> str:
     distance = abs(goal.offset)
     place = "on" if distance <= SETTLED_DISTANCE_M else f"{format_length(distance)} from"
     text = f"arrived: at rest {place} {goal.name}"
-    return f"{text}, which is {goal.obstruction}" if goal.obstruction else text
+    if goal.obstruction:
+        return f"{text}, which is {goal.obstruction}"
+    return text
 
 
 def _explain_rest(situation: RobotSituation) -> str:
     if situation.holding_names:
         return f"held by {situation.holding_names}"
     has_force = any(abs(force) >= MIN_FORCE_N for force in situation.forces.values())
-    return "the forces balance" if has_force else "no force acts on it"
+    if has_force:
+        return "the forces balance"
+    return "no force acts on it"
 
 
 _DESCRIPTIONS = {
@@ -103,13 +109,19 @@ def _is_ahead(goal: NearbyObject | None, direction: complex) -> bool:
 
 
 def _name(goal: NearbyObject | None) -> str:
-    return "" if goal is None else goal.name
+    if goal is None:
+        return ""
+    return goal.name
 
 
 def _describe_goal(situation: RobotSituation) -> str:
     goal = situation.goal
-    return "" if goal is None else f"{goal.name} is {goal.distance_text}"
+    if goal is None:
+        return ""
+    return f"{goal.name} is {goal.distance_text}"
 
 
 def _append_goal(text: str, situation: RobotSituation) -> str:
-    return text if situation.goal is None else f"{text}, {_describe_goal(situation)}"
+    if situation.goal is None:
+        return text
+    return f"{text}, {_describe_goal(situation)}"

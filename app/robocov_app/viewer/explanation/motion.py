@@ -62,7 +62,9 @@ def classify_motion(situation: RobotSituation, recent: Array | None) -> Motion:
 def _classify_rest(situation: RobotSituation, path_length: float) -> Motion:
     """Return whether a robot at rest is about to move."""
     is_pushed = not situation.is_balanced and not situation.holding_names
-    return Motion.STARTING if is_pushed and path_length < _MIN_SWAY_M else Motion.AT_REST
+    if is_pushed and path_length < _MIN_SWAY_M:
+        return Motion.STARTING
+    return Motion.AT_REST
 
 
 def _has_set_off(situation: RobotSituation, covered: complex, path_length: float) -> bool:

@@ -31,7 +31,9 @@ def format_number(value: float) -> str:
         return f"{value:.0f}"
     if value >= 0.995:
         return f"{value:.1f}"
-    return f"{value:.2f}" if value >= 0.005 else "0"
+    if value >= 0.005:
+        return f"{value:.2f}"
+    return "0"
 
 
 def format_length(meters: float) -> str:
@@ -60,4 +62,6 @@ def format_force(newtons: float) -> str:
 
 def format_robot_count(count: int) -> str:
     """Return a number of robots."""
-    return f"{count} robot" if count == 1 else f"{count} robots"
+    if count == 1:
+        return f"{count} robot"
+    return f"{count} robots"

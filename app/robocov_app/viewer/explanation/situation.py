@@ -54,7 +54,9 @@ class NearbyObject:
     def distance_text(self) -> str:
         """Its distance, such as ``3.0 m away, behind an obstacle``."""
         text = f"{format_length(abs(self.offset))} away"
-        return f"{text}, {self.obstruction}" if self.obstruction else text
+        if self.obstruction:
+            return f"{text}, {self.obstruction}"
+        return text
 
     @property
     def position_text(self) -> str:
@@ -65,7 +67,9 @@ class NearbyObject:
     @property
     def side_text(self) -> str:
         """Its name and direction, such as ``the wall south of it``."""
-        return f"{self.name} {format_direction(self.offset)} of it" if self.offset else self.name
+        if self.offset:
+            return f"{self.name} {format_direction(self.offset)} of it"
+        return self.name
 
 
 class RobotSituation:
@@ -180,7 +184,9 @@ class RobotSituation:
 def compute_alignment(first: complex, second: complex) -> float:
     """Return the cosine of the angle between two vectors; 0 if one of them is zero."""
     size = abs(first) * abs(second)
-    return (first * second.conjugate()).real / size if size > 0.0 else 0.0
+    if size > 0.0:
+        return (first * second.conjugate()).real / size
+    return 0.0
 
 
 def _get_vector(values: object, row: int) -> complex | None:
@@ -193,7 +199,9 @@ def _get_vector(values: object, row: int) -> complex | None:
         is_usable = abs(x) < _MAX_VALUE and abs(y) < _MAX_VALUE
     except (TypeError, ValueError, IndexError):
         return None
-    return complex(x, y) if is_usable else None
+    if is_usable:
+        return complex(x, y)
+    return None
 
 
 def _split_force(decision: Decision, robot: int) -> dict[str, complex]:

@@ -34,6 +34,9 @@ COMMANDS_WITHIN_LESSON = frozenset(
 
 _ANSWER_KEYS = ("1", "2", "3", "4")
 
+_CHAPTER_STEPS = {"forward": 1, "back": -1}
+"""Commands that turn chapters while a lesson is shown."""
+
 
 class LessonGuide:
     """Runs a lesson in a window.
@@ -125,8 +128,8 @@ class LessonGuide:
 
     def handle_command(self, name: str) -> bool:
         """Let the lesson handle a command of the window; return whether it did."""
-        if self.shown is not None and name in ("back", "forward"):
-            self.shown.skip(1 if name == "forward" else -1)
+        if self.shown is not None and name in _CHAPTER_STEPS:
+            self.shown.skip(_CHAPTER_STEPS[name])
             return True
         if name == "pause" and self.player is not None:
             return self._handle_pause(self.player)

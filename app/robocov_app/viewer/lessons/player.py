@@ -190,11 +190,9 @@ class LessonPlayer:
             return [question.text, *answers]
         if self.state is LessonState.ENDED and self.answer is not None:
             correct = question.answers[question.right - 1]
-            is_correct = self.answer == question.right
-            return [
-                f"✓ Correct: {correct}" if is_correct else f"✗ Not quite. Correct: {correct}",
-                question.why,
-            ]
+            if self.answer == question.right:
+                return [f"✓ Correct: {correct}", question.why]
+            return [f"✗ Not quite. Correct: {correct}", question.why]
         return []
 
     def _list_task_lines(self, task: TaskModel) -> list[str]:
@@ -209,9 +207,10 @@ class LessonPlayer:
         """Duration of the lesson in an unattended window, s of real time."""
         duration = 0.0
         for chapter in self.lesson.chapters:
-            pauses = 2 if chapter.question else 1
             duration += (chapter.until.step or 0) / STEPS_PER_SECOND / chapter.speed
-            duration += READING_S * pauses + 0.5
+            duration += READING_S + 0.5
+            if chapter.question is not None:
+                duration += READING_S
         return duration
 
     @property
@@ -246,8 +245,11 @@ class LessonPlayer:
         if not is_fulfilled(self.chapter.until, self.session):
             return
         has_task = self.chapter.task is not None and not self.is_unattended
-        self._enter_state(LessonState.TASK if has_task else LessonState.ENDED)
-        self.session.playback.is_playing = self.session.playback.is_playing and has_task
+        if has_task:
+            self._enter_state(LessonState.TASK)
+        else:
+            self._enter_state(LessonState.ENDED)
+            self.session.playback.is_playing = False
 
     def _advance_task(self) -> None:
         assert self.chapter.task is not None
@@ -304,7 +306,9 @@ class LessonPlayer:
         """Keep a chapter that has ended, or let the next one start; return a message."""
         self.is_held = not self.is_held
         self.session.playback.is_playing = False
-        return "this chapter stays until Space or →" if self.is_held else "on to the next chapter"
+        if self.is_held:
+            return "this chapter stays until Space or →"
+        return "on to the next chapter"
 
     def _enter_state(self, state: LessonState) -> None:
         self.state = state
@@ -331,7 +335,10 @@ class LessonPlayer:
         viewer.view.layers = set(BASE_LAYERS) | set(chapter.show)
         viewer.clear_message()
         self._fit_view()
-        self._enter_state(LessonState.PLAYING if chapter.question is None else LessonState.ASKING)
+        if chapter.question is None:
+            self._enter_state(LessonState.PLAYING)
+        else:
+            self._enter_state(LessonState.ASKING)
 
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:

@@ -103,7 +103,9 @@ class NumberParameter:
 
     def format(self) -> str:
         """Return the value as text."""
-        return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
+        if self.value is None or math.isinf(self.value):
+            return "none"
+        return f"{self.value:.4g}"
 
     def parse(self, text: str) -> float | None:
         """Return the value of a typed text; None for no limit.
@@ -227,7 +229,9 @@ def list_limit_parameters(limits: RobotProperties) -> Iterator[Parameter]:
 
 
 def _drop_infinity(value: float) -> float | None:
-    return None if math.isinf(value) else value
+    if math.isinf(value):
+        return None
+    return value
 
 
 def replace_limit(limits: RobotProperties, name: str, value: float | str | None) -> RobotProperties:

@@ -19,7 +19,9 @@ _STEP_TOLERANCE = 1e-9
 
 def format_speed(speed: float) -> str:
     """Return the label of a speed."""
-    return "max" if math.isinf(speed) else f"{speed:g}×"
+    if math.isinf(speed):
+        return "max"
+    return f"{speed:g}×"
 
 
 def find_speed_index(speed: float) -> int:

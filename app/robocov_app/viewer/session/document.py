@@ -76,7 +76,9 @@ class Node:
     def scenario(self) -> SessionScenario | None:
         """The scenario that starts here; None if the run of the parent continues."""
         edit = self.edits[0]
-        return edit.scenario if isinstance(edit, Restart) else None
+        if isinstance(edit, Restart):
+            return edit.scenario
+        return None
 
     def require_scenario(self) -> SessionScenario:
         """Return the scenario that starts here, at the root of a run."""
@@ -86,7 +88,9 @@ class Node:
     @property
     def first_step(self) -> int:
         """The first step in the time span of the node."""
-        return self.branch_step if self.scenario is None else 0
+        if self.scenario is None:
+            return self.branch_step
+        return 0
 
     def apply_edits(self, run: Lockstep) -> None:
         """Apply the edits that were made at the present step of a run.

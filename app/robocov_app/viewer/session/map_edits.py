@@ -116,7 +116,9 @@ def find_obstacle(environment: Environment, point: Point, reach: float = 0.0) ->
 def describe_obstacle(obstacle: Obstacle) -> str:
     """Return the kind of an obstacle, with its name if it has one."""
     kind = type(obstacle).__name__.removesuffix("Obstacle").lower()
-    return f"{kind} “{obstacle.name}”" if obstacle.name else kind
+    if obstacle.name:
+        return f"{kind} “{obstacle.name}”"
+    return kind
 
 
 def build_polygon(points: list[Point]) -> PolygonObstacle:

@@ -96,7 +96,9 @@ class Pane:
 
     def get_row(self, number: int) -> int | None:
         """Return the row of a robot in arrays; None if it does not work."""
-        return self.numbers.index(number) if number in self.numbers else None
+        if number in self.numbers:
+            return self.numbers.index(number)
+        return None
 
     def step(self, pushes: Array | None = None) -> None:
         """Simulate one step.

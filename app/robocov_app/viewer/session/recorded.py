@@ -87,7 +87,9 @@ def get_control_period(record: Record) -> float:
     dt = float(record.session.get("control_dt_s", record.dt))
     steps = record.dt / dt
     is_multiple = abs(steps - round(steps)) < _PERIOD_TOLERANCE
-    return dt if is_multiple else record.dt
+    if is_multiple:
+        return dt
+    return record.dt
 
 
 def _detect_period(record: Record) -> Record:

@@ -98,7 +98,9 @@ turning_rate : float
         for name, values in self.different.items():
             common_value = getattr(self, name)
             changed[name] = np.array([values.get(number, common_value) for number in numbers])
-        return replace(team, **changed) if changed else team
+        if changed:
+            return replace(team, **changed)
+        return team
 
     def get_radius(self, number: int) -> float:
         """Return the radius of a robot, m."""

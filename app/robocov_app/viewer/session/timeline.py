@@ -111,7 +111,9 @@ class Timeline:
     @property
     def displayed_index(self) -> int:
         """Index of the displayed state in the history."""
-        return len(self.history) - 1 if self.shown_index is None else self.shown_index
+        if self.shown_index is None:
+            return len(self.history) - 1
+        return self.shown_index
 
     @property
     def is_reproducible(self) -> bool:

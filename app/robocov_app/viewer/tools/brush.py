@@ -110,7 +110,9 @@ class BrushTool(ViewerTool):
         self.is_painting = False
         if self._dabs:
             self._apply(session)
-        return "density lowered" if self.lowers else "density raised"
+        if self.lowers:
+            return "density lowered"
+        return "density raised"
 
     def cancel(self, session: Session) -> bool:
         """Undo the stroke that is being painted."""

@@ -55,4 +55,6 @@ class FailureTool(ViewerTool):
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Let the robot under the cursor fail, or revive it."""
-        return None if event.robot is None else toggle_failure(session, event.robot)
+        if event.robot is None:
+            return None
+        return toggle_failure(session, event.robot)

@@ -1,5 +1,6 @@
 """Tools that draw obstacles point by point: polygons and walls."""
 
+from abc import ABC, abstractmethod
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import dist
@@ -20,7 +21,7 @@ WALL_END_FRACTION = 0.3  # of a finger's width: a press this close to the last p
 
 
 @dataclass
-class OutlineTool(ViewerTool):
+class OutlineTool(ViewerTool, ABC):
     """Base class of tools that draw an obstacle point by point.
 
     Attributes
@@ -36,15 +37,17 @@ class OutlineTool(ViewerTool):
 
     outline: DrawnOutline = field(repr=False)
 
+    @abstractmethod
     def build_obstacle(self, points: list[Point]) -> Obstacle:
         """Build the obstacle with these points, m; raise RobocovError if they do not form one."""
-        raise NotImplementedError
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a point, or complete the obstacle."""
         same_point = max(SAME_POINT_M, self.end_fraction * event.reach)
         is_complete = self.outline.press(event.point, event.raw, event.reach, same_point)
-        return self.finish(session) if is_complete else None
+        if is_complete:
+            return self.finish(session)
+        return None
 
     def double_click(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Complete the obstacle; the first of the two clicks has added its point already."""

@@ -47,4 +47,6 @@ class ViewerToolbox(Toolbox[ViewerTool]):
     @property
     def resizable(self) -> ViewerTool:
         """The tool whose size the keys [ and ] change: the one in use, or the wall if that has no size."""
-        return self.current if self.current.is_resizable else self.wall
+        if self.current.is_resizable:
+            return self.current
+        return self.wall

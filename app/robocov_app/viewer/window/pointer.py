@@ -83,7 +83,9 @@ class ViewerPointer(Pointer):
             return viewer.tool.choose_cursor(viewer.session)
         if not self._is_over_time():
             return "arrow"
-        return "hand" if self._chart.is_on_switch(self.at) else "sideways"
+        if self._chart.is_on_switch(self.at):
+            return "hand"
+        return "sideways"
 
     def _is_over_time(self) -> bool:
         layout = self._canvas.layout
@@ -107,7 +109,9 @@ class ViewerPointer(Pointer):
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
         """Use the plot or the tool, or pan."""
         if self._is_over_time():
-            return self._press_chart(event.pos) if event.button == LEFT_BUTTON else None
+            if event.button == LEFT_BUTTON:
+                return self._press_chart(event.pos)
+            return None
         pane = self._canvas.find_pane(event.pos)
         if pane is None:
             return None

@@ -95,7 +95,9 @@ def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Po
     if squares[site] > (_MAX_SITE_DISTANCE * known.get_lattice().spacing) ** 2:
         setup = viewer.session.displayed.get_setup(pane)
         is_in_map = setup.environment.boundary_polygon.intersects(shapely.Point(point))
-        return "inside an obstacle" if is_in_map else "outside the map"
+        if is_in_map:
+            return "inside an obstacle"
+        return "outside the map"
     row = int(result.owner[site])
     numbers = viewer.session.displayed.get_setup(pane).numbers
     if not 0 <= row < len(numbers):

@@ -105,7 +105,9 @@ def _build_map_content(environment: Environment) -> dict[str, Any]:
     content = to_json(environment)
     digest = _compute_digest(content)
     name = _list_bundled_digests().get(digest)
-    return content if name is None else {"bundled": name, "digest": digest}
+    if name is None:
+        return content
+    return {"bundled": name, "digest": digest}
 
 
 @cache

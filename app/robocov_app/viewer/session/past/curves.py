@@ -58,7 +58,9 @@ class Curve:
     @property
     def last_time(self) -> float:
         """Time of the newest sample, s; -inf if there is none."""
-        return self._times[-1] if self._times else -np.inf
+        if self._times:
+            return self._times[-1]
+        return -np.inf
 
     def add(self, time: float, value: float) -> None:
         """Add a sample, or replace the one at the same time. Samples that are not finite are ignored."""
