@@ -28,8 +28,8 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.text import escape_controls
 from robocov_app.figures.files import render_png
+from robocov_app.look.hues import ColorScheme
 from robocov_app.look.lengths import format_scale_length, round_down
-from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.density_text import get_cost_name
 from robocov_app.render.distance_field import DistanceField

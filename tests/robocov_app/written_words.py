@@ -3,7 +3,7 @@
 import numpy as np
 import pygame
 
-from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import render_text
 from robocov_app.render.painter import Painter

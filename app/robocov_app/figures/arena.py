@@ -21,7 +21,7 @@ from robocov_app.figures.page import POINTS_PER_INCH, get_figure, to_plot_color
 from robocov_app.look import legend
 from robocov_app.look.axes import TICK_FACTORS
 from robocov_app.look.colors import Color, choose_text_color, mix
-from robocov_app.look.robot_colors import ColorScheme, choose_robot_hues, choose_trail_colors
+from robocov_app.look.hues import ColorScheme, choose_robot_hues, choose_trail_colors
 from robocov_app.look.theme import Theme
 from robocov_app.render.crowding import choose_width_factor, fit_mark_size, fit_radii
 from robocov_app.render.density_shading import shade_density

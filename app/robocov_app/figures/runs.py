@@ -18,8 +18,8 @@ from robocov_app.figures import arena
 from robocov_app.figures.curves import Curve, CurveMargins, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import HEADING, TEXT, TITLE, FigurePage, PageBox, check_not_empty, get_figure
+from robocov_app.look.hues import ColorScheme
 from robocov_app.look.legend import merge_legends
-from robocov_app.look.robot_colors import ColorScheme
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.panel_grid import choose_column_count

@@ -5,7 +5,7 @@
 Nothing in this package draws.
 
 - `colors`, `theme`: colors, their contrast, and the light and the dark theme.
-- `robot_colors`: hues of robots and of their cells; colors of trajectories.
+- `hues`: hues of robots and of their cells; colors of trajectories.
 - `curve_styles`: color, dashes and marker of the curve of each controller.
 - `axes`: limits and ticks of axes.
 - `lengths`: round lengths of scale bars and grids, and their labels.

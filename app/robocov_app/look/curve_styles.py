@@ -62,6 +62,13 @@ class CurveStyle(NamedTuple):
             return theme.others[int(number)]
         return theme.get_controller_color(self.name)
 
+    def list_dash_lengths(self) -> list[float]:
+        """Return the lengths of dashes and gaps in turn; empty for a solid curve."""
+        if self.dashes == "-":
+            return []
+        _, lengths = self.dashes
+        return list(lengths)
+
 
 def choose_controller_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
     """Choose a style for each controller.
@@ -98,7 +105,9 @@ def choose_curve_styles(controllers: Sequence[str]) -> list[CurveStyle]:
     styles = []
     for controller in controllers:
         first = first_styles[controller]
-        style = first if controller not in seen else _choose_variant(first, used)
+        style = first
+        if controller in seen:
+            style = _choose_variant(first, used)
         seen.add(controller)
         used.add(style)
         styles.append(style)
@@ -124,8 +133,9 @@ def _iterate_other_styles() -> Iterator[CurveStyle]:
     """
     count = len(OTHER_SHAPES)
     styles = []
-    for turn, color in itertools.product(range(count), repeat=2):
-        styles.append(CurveStyle(f"other-{color}", *OTHER_SHAPES[(color + turn) % count]))
+    for offset, color in itertools.product(range(count), repeat=2):
+        dashes, mark = OTHER_SHAPES[(color + offset) % count]
+        styles.append(CurveStyle(f"other-{color}", dashes, mark))
     return itertools.cycle(styles)
 
 
@@ -134,4 +144,6 @@ def _choose_variant(first: CurveStyle, used: set[CurveStyle]) -> CurveStyle:
     other_colors = [CurveStyle(f"other-{k}", *shape) for k, shape in enumerate(OTHER_SHAPES)]
     other_shapes = [CurveStyle(first.name, *shape) for shape in _SHAPES]
     free = [style for style in (*other_colors, *other_shapes) if style not in used]
-    return free[0] if free else first
+    if not free:
+        return first
+    return free[0]

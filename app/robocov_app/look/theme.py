@@ -41,7 +41,7 @@ class Theme:
     forces : dict of str to Color
         Arrows of the terms of a controller.
     robots : tuple of Color
-        Hues of robots, see `robot_colors`.
+        Hues of robots, see `hues`.
     heat : tuple of Color
         Scale of distances, from near to far.
     density, density_strength : Color, float

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from robocov.errors import ParameterError, describe_unknown_name
-from robocov_app.look.robot_colors import ColorScheme
+from robocov_app.look.hues import ColorScheme
 from robocov_app.render import annotations
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.color_bar import draw_color_bar

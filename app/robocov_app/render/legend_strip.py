@@ -7,7 +7,7 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry

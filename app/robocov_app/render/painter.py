@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, describe_unknown_name
-from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
+from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.annotations import STRIP_HEIGHT_PX, is_low_pane
 from robocov_app.render.camera import Camera

@@ -1,1 +1,1 @@
-"""Reports: results as one HTML page that needs nothing else, and the replay in it."""
+"""Reports: results as one self-contained HTML page, with an interactive replay."""

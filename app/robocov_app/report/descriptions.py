@@ -1,4 +1,4 @@
-"""Descriptions of pictures in words, for readers who cannot see them, and the lives of robots."""
+"""Descriptions of pictures in words, for readers who cannot see them, and the lifetimes of robots."""
 
 import numpy as np
 
@@ -26,10 +26,14 @@ def list_lifetimes(record: Record) -> list[tuple[float, float | None]]:
     times = record.time - record.time[0]
     lifetimes: list[tuple[float, float | None]] = []
     for present, working in zip(record.present.T, record.working.T, strict=True):
+        joins = float(times[-1]) + 1.0
         present_rows = np.flatnonzero(present)
+        if len(present_rows):
+            joins = float(times[present_rows[0]])
+        fails = None
         failed_rows = np.flatnonzero(present & ~working)
-        joins = float(times[present_rows[0]]) if len(present_rows) else float(times[-1]) + 1.0
-        fails = float(times[failed_rows[0]]) if len(failed_rows) else None
+        if len(failed_rows):
+            fails = float(times[failed_rows[0]])
         lifetimes.append((joins, fails))
     return lifetimes
 
@@ -38,13 +42,15 @@ def describe_map(environment: Environment) -> str:
     """Describe a map in one sentence."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
-    density = describe_density(environment)
-    return (
+    text = (
         f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m "
         f"{_describe_obstacles(environment)}, "
         f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked"
-        f"{', ' if density else ''}{density}."
     )
+    density = describe_density(environment)
+    if density:
+        text += f", {density}"
+    return f"{text}."
 
 
 def _describe_obstacles(environment: Environment) -> str:
@@ -52,19 +58,20 @@ def _describe_obstacles(environment: Environment) -> str:
     count = len(environment.obstacles)
     moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
     text = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
-    return f"{text} ({moving} moving)" if moving else text
+    if moving:
+        text += f" ({moving} moving)"
+    return text
 
 
 def describe_run(record: Record, history: CostHistory | None) -> str:
     """Describe a run in a few sentences: robots, duration, failures, and how the cost changes."""
     robots = format_count(len(record.team), "robot")
     duration = record.time[-1] - record.time[0]
-    start = f" from start {record.start}" if record.start else ""
-    sentences = [
-        f"{record.label} on map {record.environment.name}: trajectories of {robots}{start} "
-        f"over {duration:.4g} s."
-    ]
-    events = _list_events(record) if record.conditions is not None else []
+    setup = f"{record.label} on map {record.environment.name}: trajectories of {robots}"
+    if record.start:
+        setup += f" from start {record.start}"
+    sentences = [f"{setup} over {duration:.4g} s."]
+    events = _list_events(record)
     if events:
         text = ", ".join(event for _, event in sorted(events))
         sentences.append(f"{text[0].upper()}{text[1:]}.")
@@ -75,6 +82,8 @@ def describe_run(record: Record, history: CostHistory | None) -> str:
 
 def _list_events(record: Record) -> list[tuple[float, str]]:
     """Return when robots join and fail, with a text for each."""
+    if record.conditions is None:
+        return []
     duration = record.time[-1] - record.time[0]
     events = []
     for number, (joins, fails) in zip(build_roster(record).numbers, list_lifetimes(record), strict=True):
@@ -90,12 +99,14 @@ def _describe_costs(environment: Environment, history: CostHistory) -> list[str]
     first, final = history.mean_distance[[0, -1]]
     if not np.isfinite([first, final]).all():
         return []
+    subject = "The mean distance to the nearest robot"
+    if describe_density(environment):
+        subject += ", weighted by φ,"
     verb = "falls" if final < first else "goes"
-    weighted = ", weighted by φ," if describe_density(environment) else ""
-    sentences = [
-        f"The mean distance to the nearest robot{weighted} {verb} from {first:.3f} m to {final:.3f} m."
-    ]
+    sentences = [f"{subject} {verb} from {first:.3f} m to {final:.3f} m."]
     if history.mean_time is not None and np.isfinite(history.mean_time[[0, -1]]).all():
         first, final = history.mean_time[[0, -1]]
-        sentences.append(f"The mean time until the first is there goes from {first:.3f} s to {final:.3f} s.")
+        sentences.append(
+            f"The mean travel time of the first to arrive goes from {first:.3f} s to {final:.3f} s."
+        )
     return sentences

@@ -1,4 +1,4 @@
-"""A report: results as one HTML page that needs neither a network nor other files."""
+"""A report: results as one HTML page that uses neither a network nor other files."""
 
 import base64
 import hashlib
@@ -48,12 +48,14 @@ MAX_WORD_CHARS = 40
 
 
 class Report(NamedTuple):
-    """A page, and for each result the number of its runs that can be replayed.
+    """A report that is ready to be written.
 
     Attributes
     ----------
     html : str
+        The page.
     shown : tuple of int
+        Number of runs of each result that can be replayed in the page.
     """
 
     html: str
@@ -69,7 +71,7 @@ def build_report(
     ----------
     results : sequence of ReportedResult
     title : str, optional
-        By default, what was run.
+        By default that of the only result, or the number of results.
     theme : str
         Name of a theme, or "auto" to follow the reader's browser.
 
@@ -81,7 +83,9 @@ def build_report(
     sections = [
         _build_section(result, f"r{number}", max_bytes) for number, result in enumerate(results, start=1)
     ]
-    default_title = sections[0]["title"] if len(results) == 1 else f"{len(results)} results"
+    default_title = f"{len(results)} results"
+    if len(results) == 1:
+        default_title = sections[0]["title"]
     definitions = replay.read_replay_js() + replay.read_asset("report.js")
     code = replay.wrap_script(f"{definitions}startReport(startReplays());")
     style = build_theme_rules(":root", theme) + replay.read_replay_css() + replay.read_asset("report.css")
@@ -131,7 +135,7 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
         "has_moving_obstacles": any(run.record.environment.has_moving_obstacles for run in runs),
         "has_failed_robots": any(_has_failures(run) for run in runs),
         "thumbnails": thumbnails,
-        "replay": replay.build_replay_part(runs, selection.panes, max_bytes) if runs else "",
+        "replay": replay.build_replay_element(runs, selection.panes, max_bytes) if runs else "",
         "shown": len(runs),
     }
 
@@ -146,7 +150,7 @@ def _build_comparison_variables(result: ReportedResult, styles: GroupStyles, key
         "are_findings_in_pairs": result.kind == "sweep" and has_pairs,
         "comparisons": comparisons,
         "tuning_note": tuning_note,
-        "pairs": build_pairs_table(comparisons) if comparisons else None,
+        "pairs": build_pairs_table(comparisons),
         "pair_plots": build_pair_plots(comparisons, styles, f"{key}p"),
         "map_pairs": build_map_pairs_tables(comparisons),
     }
@@ -180,11 +184,14 @@ def _has_failures(run: ReplayRun) -> bool:
 
 def _build_thumbnail(replay_run: ReplayRun, run: ReportedRun) -> dict[str, Any]:
     """Build the variables of a small picture of a run in the template."""
+    final_distance = ""
+    if not math.isnan(run.final_distance):
+        final_distance = f"{run.final_distance:.3f} m"
     return {
         "run": replay_run,
         "subtitle": replay_run.title.removeprefix(replay_run.label).removeprefix(" · "),
         "picture": draw_run(replay_run.record, replay_run.history, is_hidden=True),
-        "final": "" if math.isnan(run.final_distance) else f"{run.final_distance:.3f} m",
+        "final": final_distance,
     }
 
 

@@ -22,15 +22,15 @@ from robocov.record import Record
 from robocov.text import escape_controls
 from robocov_app.look import axes
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle
-from robocov_app.report.cell_hues import embed_hues
 from robocov_app.report.descriptions import list_lifetimes
+from robocov_app.report.embedded_hues import embed_hues
 from robocov_app.report.pictures import build_density_image, extract_rings, has_path
 from robocov_app.runs.saved_runs import build_roster
 
 MAX_RATE_HZ = 5.0
-"""Moments of a run per simulated second, if there is space."""
+"""Frames of a run per simulated second, if there is space."""
 MAX_BYTES = 1_500_000
-"""Bytes of all runs of a page. Beyond, they are embedded at a lower rate."""
+"""Maximum size of all runs of a page. Larger runs are embedded at a lower rate."""
 NO_NUMBER = 65535
 """Stands for a number that is missing."""
 MAX_OBSTACLE_VERTICES = 4000
@@ -72,7 +72,7 @@ def embed_replay(
     panes: Sequence[int],
     max_bytes: int = MAX_BYTES,
 ) -> dict[str, Any]:
-    """Build all that a replay needs as JSON content.
+    """Build the data of a replay as JSON content.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def embed_replay(
 
 
 def embed_axis_rules() -> dict[str, Any]:
-    """Build the rules for axes, which depend on the runs that the reader chooses, as JSON content."""
+    """Build the rules for axes as JSON content; the axes themselves depend on the runs the reader chooses."""
     return {
         "maxLowFraction": axes.MAX_LOW_FRACTION,
         "margin": axes.VALUE_MARGIN,
@@ -125,9 +125,9 @@ def embed_map(environment: Environment) -> dict[str, Any]:
     -------
     dict
         ``region``: a ring. ``blocked``: polygons, each a list of rings. ``density``, if it is not uniform:
-        the address of an image. ``movers``, if obstacles move: for each its rings, the line of one round and
-        its speed, m/s. Rings and lines are flat lists x, y, x, y, ... in multiples of ``unit`` meters: a
-        millimeter or, for tiny maps, less.
+        the data URL of an image. ``movers``, if obstacles move: for each its rings, the line of one round
+        trip and its speed, m/s. Rings and lines are flat lists x, y, x, y, ... in multiples of ``unit``
+        meters: a millimeter or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
     extent = max(high_x - low_x, high_y - low_y)
@@ -152,16 +152,19 @@ def embed_map(environment: Environment) -> dict[str, Any]:
 
 
 def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[str, Any]]:
-    """Build the obstacles that move as JSON content."""
+    """Build the moving obstacles as JSON content."""
     movers = []
     for obstacle in environment.obstacles:
         path = obstacle.path
         if path is None:
             continue
-        way_back = path.points[:1] if path.repeat == "loop" else path.points[-2::-1]
+        if path.repeat == "loop":
+            return_points = path.points[:1]
+        else:
+            return_points = path.points[-2::-1]
         mover = {
             "rings": _round_rings(extract_rings(obstacle.polygon), unit),
-            "line": _round_points([*path.points, *way_back], unit),
+            "line": _round_points([*path.points, *return_points], unit),
             "speed": path.speed,
         }
         movers.append(mover)
@@ -191,7 +194,7 @@ def embed_run(
     style : CurveStyle
         Of its curve.
     rate : float
-        Moments per simulated second.
+        Frames per simulated second.
     has_goals : bool
         Whether goals are included.
 
@@ -203,19 +206,24 @@ def embed_run(
     start = float(record.time[0])
     duration = float(record.time[-1]) - start
     is_path_known = has_path(record)
-    times = list_even_times(duration, rate) if is_path_known else np.unique([0.0, duration])
+    if is_path_known:
+        times = list_even_times(duration, rate)
+        step = 1.0 / rate
+    else:
+        times = np.unique([0.0, duration])
+        step = max(duration, 1e-9)
     positions = _interpolate_points(record, record.positions, times + start)
     content: dict[str, Any] = {
         "title": run.title,
         "facts": run.facts,
         "label": run.label or record.label,
         "style": style.name,
-        "dashes": [] if isinstance(style.dashes, str) else list(style.dashes[1]),
+        "dashes": style.list_dash_lengths(),
         "mark": MARKER_PATHS[style.mark],
         "map": map_number,
         **_embed_team(record),
         "path": is_path_known,
-        "step": 1.0 / rate if is_path_known else max(duration, 1e-9),
+        "step": step,
         "end": duration,
         "count": len(times),
         "hues": embed_hues(record, positions, _find_working(record, times)),
@@ -243,9 +251,10 @@ def _embed_team(record: Record) -> dict[str, Any]:
         content["speeds"] = record.team.max_speed.tolist()
     if start and record.environment.has_moving_obstacles:
         content["begin"] = start
-    lifetimes = list_lifetimes(record) if record.conditions is not None else []
-    if any(lifetime != (0.0, None) for lifetime in lifetimes):
-        content["lives"] = lifetimes
+    if record.conditions is not None:
+        lifetimes = list_lifetimes(record)
+        if any(lifetime != (0.0, None) for lifetime in lifetimes):
+            content["lives"] = lifetimes
     return content
 
 
@@ -334,14 +343,14 @@ def _interpolate_points(record: Record, points: Array, times: Array) -> Array:
 
 
 def _interpolate_rows(time: Array, rows: Array, times: Array) -> Array:
-    """Return (k, m) rows at other times, (T, m), linear in between; nan if either neighbor is."""
+    """Return (k, m) rows interpolated linearly at other times, (T, m); nan if either neighbor is nan."""
     if len(time) == 1:
         return np.asarray(np.repeat(rows, len(times), axis=0))
     after = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
     before = after - 1
     fraction = ((times - time[before]) / (time[after] - time[before]))[:, None]
     mixed = (1.0 - fraction) * rows[before] + fraction * rows[after]
-    # At a moment of the record only that moment counts: its neighbor may be nan.
+    # At a time of the record only its own row counts: the other one may be nan.
     mixed = np.where(fraction >= 1.0 - 1e-9, rows[after], mixed)
     return np.where(fraction <= 1e-9, rows[before], mixed)
 
@@ -356,28 +365,31 @@ def _choose_detail(runs: Sequence[ReplayRun], max_bytes: int) -> tuple[float, bo
 
 
 def _estimate_bytes(runs: Sequence[ReplayRun], rate: float, *, has_goals: bool) -> float:
-    """Return how many bytes runs take at a rate, Hz."""
+    """Estimate the size of runs in the page at a rate, Hz."""
     total = 0.0
     for run in runs:
         record = run.record
-        moments = 2.0
+        frames = 2.0
         if has_path(record):
-            moments += float(record.time[-1] - record.time[0]) * rate
-        points_per_robot = 2 if has_goals and np.isfinite(record.goals).any() else 1
-        bytes_per_moment = 4 * len(record.team) * points_per_robot + 2
-        total += moments * bytes_per_moment * 4 / 3
+            frames += float(record.time[-1] - record.time[0]) * rate
+        points_per_robot = 1
+        if has_goals and np.isfinite(record.goals).any():
+            points_per_robot = 2
+        bytes_per_frame = 4 * len(record.team) * points_per_robot + 2
+        # Base64 writes 3 bytes as 4 characters.
+        total += frames * bytes_per_frame * 4 / 3
     return total
 
 
 def format_script_json(content: Any) -> str:
-    """Return JSON that may stand in a script element, whatever names are in it."""
+    """Return JSON that is safe in a script element, even if names contain markup."""
     # JSON of ASCII characters has no U+2028, which ends a line in older scripts.
     text = json.dumps(_escape_texts(content), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _escape_texts(content: Any) -> Any:
-    """Return JSON content whose texts a page can display as they are, see `escape_controls`."""
+    """Return JSON content with control characters in texts escaped, see `escape_controls`."""
     if isinstance(content, str):
         return escape_controls(content)
     if isinstance(content, dict):

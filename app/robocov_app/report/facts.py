@@ -19,7 +19,9 @@ def format_title(result: ReportedResult) -> str:
         return f"Sweep {replace_unprintable(result.folder.resolve().name)}"
     controllers = list(dict.fromkeys(run.label for run in result.runs))
     title = f"{_list_names(controllers)} on {_list_names(list(result.maps))}"
-    return f"{title} · {result.description}" if result.description else title
+    if result.description:
+        title += f" · {result.description}"
+    return title
 
 
 def _list_names(names: Sequence[str]) -> str:
@@ -48,7 +50,7 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
     facts = [
         ("Runs", _format_run_counts(result)),
         ("Maps", ", ".join(result.maps)),
-        ("Weighed by", format_densities(result)),
+        ("Weighted by", format_densities(result)),
         ("Robots", ", ".join(map(str, sizes))),
         ("Team", _format_team(result)),
         ("Starts", ", ".join(start_names)),
@@ -72,7 +74,9 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
 def _format_run_counts(result: ReportedResult) -> str:
     """Return how many runs are done, failed, unreadable and missing."""
     done = len(result.completed_runs)
-    counts = [str(done) if done == result.expected_count else f"{done} done"]
+    if done == result.expected_count:
+        return str(done)
+    counts = [f"{done} done"]
     if result.failed_runs:
         counts.append(f"{len(result.failed_runs)} failed")
     if result.damaged_runs:
@@ -99,10 +103,10 @@ def _format_team(result: ReportedResult) -> str:
     team = result.facts.get("team")
     if isinstance(team, dict):
         texts += [_format_team_parameter(str(key), value) for key, value in team.items()]
-    varying_parameters = result.runs[0].team if result.runs else ()
-    for name, _ in varying_parameters:
-        values = dict.fromkeys(format_parameter(name, dict(run.team)[name]) for run in result.runs)
-        texts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
+    if result.runs:
+        for name, _ in result.runs[0].team:
+            values = dict.fromkeys(format_parameter(name, dict(run.team)[name]) for run in result.runs)
+            texts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
     return ", ".join(text for text in texts if text)
 
 
@@ -186,11 +190,14 @@ def format_run_facts(result: ReportedResult, run: ReportedRun) -> str:
     if run.has_figure("mean_time_s"):
         texts.append(f"mean time {run.figures['mean_time_s']:.3f} s")
     settled_at = run.figures.get("settled_at_s")
-    texts.append("not settled" if settled_at is None else f"settled at {settled_at:.1f} s")
+    if settled_at is None:
+        texts.append("not settled")
+    else:
+        texts.append(f"settled at {settled_at:.1f} s")
     contacts = run.figures.get("contacts")
     if contacts is not None:
         texts.append(format_count(int(contacts), "contact"))
     path_length = run.figures.get("path_length_m")
     if path_length is not None:
-        texts.append(f"{path_length:.2f} m of path per robot")
+        texts.append(f"mean path length {path_length:.2f} m")
     return f"{'; '.join(texts)}."

@@ -52,12 +52,14 @@ def _summarize_sweep(runs: Sequence[ReportedRun], comparisons: Sequence[GroupCom
 
 def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
     """Return the final mean distance of the only run, its gap, and whether it settled."""
+    text = f"At the end the nearest robot is {run.final_distance:.3f} m away on average"
     gap = result.compute_gap(run)
-    gap_text = f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
+    if np.isfinite(gap):
+        text += f", {100 * gap:.1f} % above the best placement known"
     settled_at = run.figures.get("settled_at_s")
-    settling = "not settled by the end" if settled_at is None else f"settled after {settled_at:.1f} s"
-    distance = f"{run.final_distance:.3f} m"
-    return f"At the end the nearest robot is {distance} away on average{gap_text}; {settling}."
+    if settled_at is None:
+        return f"{text}; not settled by the end."
+    return f"{text}; settled after {settled_at:.1f} s."
 
 
 def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -> str:
@@ -70,8 +72,10 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
         if run.final_distance > lowest > 0:
             text += f" (+{100 * (run.final_distance / lowest - 1):.0f} %)"
         texts.append(text)
-    weighted = ", weighted by φ" if format_densities(result) else ""
-    return f"Final mean distance to the nearest robot{weighted}: {', '.join(texts)}."
+    subject = "Final mean distance to the nearest robot"
+    if format_densities(result):
+        subject += ", weighted by φ"
+    return f"{subject}: {', '.join(texts)}."
 
 
 def list_missing_runs(result: ReportedResult) -> list[str]:
@@ -81,18 +85,23 @@ def list_missing_runs(result: ReportedResult) -> list[str]:
         sentences.append(_describe_failed_runs(result))
     if result.damaged_runs:
         reasons = [f"{run.folder} ({run.reason})" for run in result.damaged_runs]
-        verb = "is" if len(reasons) == 1 else "are"
         runs = format_count(len(reasons), "run")
+        verb = _choose_verb(len(reasons))
         sentences.append(f"{runs} cannot be read and {verb} left out: {_list_reasons(reasons)}")
     if result.missing_count:
-        verb = "is" if result.missing_count == 1 else "are"
         runs = format_count(result.expected_count, "run")
+        verb = _choose_verb(result.missing_count)
         sentences.append(f"Not finished: {result.missing_count} of {runs} {verb} missing.")
     return sentences
 
 
+def _choose_verb(count: int) -> str:
+    """Return "is" for one item, "are" for several."""
+    return "is" if count == 1 else "are"
+
+
 def _describe_failed_runs(result: ReportedResult) -> str:
-    """Return how many runs of each controller failed, and why."""
+    """Return the number of failed runs of each controller, and the reasons."""
     run_counts = Counter(run.label for run in result.runs)
     failure_counts = Counter(run.label for run in result.failed_runs)
     controllers = ", ".join(
@@ -104,7 +113,7 @@ def _describe_failed_runs(result: ReportedResult) -> str:
 
 
 def _list_reasons(reasons: Sequence[str]) -> str:
-    """Return the first different reasons, and how many more there are."""
+    """Return the first different reasons, and the number of others."""
     different_reasons = list(dict.fromkeys(reasons))
     text = "; ".join(different_reasons[:_MAX_LISTED_REASONS])
     if len(different_reasons) > _MAX_LISTED_REASONS:

@@ -19,7 +19,7 @@ from robocov.environment import Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.look.colors import mix
-from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
+from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.crowding import fit_mark_size, fit_radii
 from robocov_app.render.density_shading import list_sample_coordinates, shade_density
@@ -29,12 +29,12 @@ from robocov_app.runs.saved_runs import build_roster
 
 MAX_ROBOTS = 400
 """Robots up to which cells and trajectories are drawn. Those of more would make the page too large."""
-MAX_TWO_MOMENT_SPAN_S = 1.5
-"""Two moments that are farther apart than this do not show where the robots went."""
+MAX_TWO_FRAME_SPAN_S = 1.5
+"""Two recorded frames that are farther apart than this do not show where the robots went."""
 _SIZE_PX = (300.0, 220.0)
 _MARGIN_PX = 3.0
 _TOLERANCE_PX = 0.2
-"""Lines may be simplified by this."""
+"""Maximum error of simplified lines."""
 _DENSITY_DOTS = 80
 """Dots of the image of a density along its longer side."""
 _NUMBER_SIZES = (1.35, 1.15, 0.9, 0.7)
@@ -85,7 +85,7 @@ def build_density_image(environment: Environment) -> str:
     Returns
     -------
     str
-        Address ``data:image/png;...``, transparent outside the region; empty if the density is uniform.
+        Data URL, transparent outside the region; empty if the density is uniform.
     """
     if environment.density is None or environment.density.is_uniform:
         return ""
@@ -108,7 +108,7 @@ def extract_rings(area: shapely.Geometry) -> list[Array]:
 def has_path(record: Record) -> bool:
     """Return whether a record shows where the robots went, not only its start and its end."""
     if len(record) == 2:
-        return float(record.time[1] - record.time[0]) <= MAX_TWO_MOMENT_SPAN_S
+        return float(record.time[1] - record.time[0]) <= MAX_TWO_FRAME_SPAN_S
     return len(record) > 2
 
 
@@ -165,7 +165,9 @@ def _draw_cells(record: Record, frame: PictureFrame) -> str:
         return ""
     cells = record.cells()
     working = np.flatnonzero(record.working[-1])
-    adjacency = working[cells.adjacency] if robots > MAX_OWN_HUES else None
+    adjacency = None
+    if robots > MAX_OWN_HUES:
+        adjacency = working[cells.adjacency]
     hues = choose_robot_hues(robots, adjacency).tolist()
     paths = []
     for outline, owner in zip(*cells.outlines, strict=True):
@@ -197,8 +199,7 @@ def _draw_starts(record: Record, frame: PictureFrame) -> str:
     joined = np.flatnonzero(record.present.any(axis=0))
     starts = frame.to_pixels(record.positions[first_rows[joined], joined])
     radius = fit_mark_size(starts, 2.4, 5.0) / 2
-    rings = [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>' for x, y in starts]
-    return "".join(rings)
+    return "".join(_draw_circle("start", x, y, radius) for x, y in starts)
 
 
 def _draw_robots(record: Record, frame: PictureFrame, *, has_numbers: bool) -> str:
@@ -211,14 +212,19 @@ def _draw_robots(record: Record, frame: PictureFrame, *, has_numbers: bool) -> s
     for robot in np.flatnonzero(record.present[-1]).tolist():
         x, y = centers[robot].tolist()
         radius = float(radii[robot])
-        is_working = bool(record.working[-1, robot])
-        kind = "robot" if is_working else "failed"
-        shapes.append(f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>')
-        if not is_working:
+        if not record.working[-1, robot]:
+            shapes.append(_draw_circle("failed", x, y, radius))
             shapes.append(_draw_cross(x, y, radius))
-        elif has_numbers:
+            continue
+        shapes.append(_draw_circle("robot", x, y, radius))
+        if has_numbers:
             shapes.append(_draw_number(numbers[robot], x, y, radius))
     return "".join(shapes)
+
+
+def _draw_circle(css_class: str, x: float, y: float, radius: float) -> str:
+    """Draw a circle in the style of a CSS class."""
+    return f'<circle class="{css_class}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>'
 
 
 def _draw_cross(x: float, y: float, radius: float) -> str:
@@ -302,10 +308,13 @@ def _format_path(lines: Iterable[Array], *, is_closed: bool = False) -> str:
         steps = np.diff(tenths, axis=0)
         steps = steps[(steps != 0).any(axis=1)]
         x, y = (tenths[0] / 10).tolist()
-        moves = " ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps.tolist())
         piece = f"M{x:g} {y:g}"
-        # A line without length is drawn as a dot.
-        piece += f"l{moves}" if moves else "h0"
+        if len(steps):
+            moves = " ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps.tolist())
+            piece += f"l{moves}"
+        else:
+            # A line without length is drawn as a dot.
+            piece += "h0"
         if is_closed:
             piece += "z"
         pieces.append(piece)

@@ -1,4 +1,4 @@
-"""The interactive replay of runs as HTML that needs nothing else: in reports and in notebooks."""
+"""The interactive replay of runs as self-contained HTML, for reports and notebooks."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -20,7 +20,7 @@ def build_replay_html(runs: Sequence[ReplayRun]) -> str:
     """Build a replay as a fragment of HTML with its own style and script.
 
     It uses no network, defines no global name and has no ids of its own, so that a page can have several.
-    If scripts do not run, and on paper, it shows pictures of the final moments.
+    On paper, and where scripts are disabled, it shows pictures of the final positions.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ def build_replay_html(runs: Sequence[ReplayRun]) -> str:
     """
     style = build_theme_rules(".robocov-replay") + read_replay_css()
     code = wrap_script(f"{read_replay_js()}startReplays();")
-    return f"<style>{style}</style>{build_replay_part(runs)}<script>{code}</script>"
+    return f"<style>{style}</style>{build_replay_element(runs)}<script>{code}</script>"
 
 
-def build_replay_part(
+def build_replay_element(
     runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, max_bytes: int = MAX_BYTES
 ) -> str:
     """Build a replay without style and script, for a page that has `read_replay_css` and `_js` once.
@@ -73,7 +73,7 @@ def _choose_styles(runs: Sequence[ReplayRun]) -> list[CurveStyle]:
 
 
 def _build_still(run: ReplayRun) -> str:
-    """Return a picture of the final moment of a run with its title."""
+    """Return a picture of the final positions of a run with its title."""
     picture = draw_run(run.record, run.history, *_STILL_SIZE_PX, has_numbers=True)
     return f"<figure><figcaption><strong>{escape(run.title)}</strong></figcaption>{picture}</figure>"
 

@@ -94,7 +94,7 @@ class _SmallCopy:
     def copy_children(self, source: Element, target: Element) -> None:
         """Copy the shapes in one element into another, in the same order."""
         uses = [child for child in source if child.tag == f"{_NAMESPACE}use"]
-        dotted_line = self._build_dotted_line(uses) if len(uses) >= _MIN_DOTS else None
+        dotted_line = self._build_dotted_line(uses)
         if dotted_line is not None:
             target.append(dotted_line)
         for child in source:
@@ -155,7 +155,9 @@ class _SmallCopy:
         return element
 
     def _build_dotted_line(self, uses: Sequence[Element]) -> Element | None:
-        """Return many equal round marks as one path, the dots of a round pen; None if they are different."""
+        """Return equal round marks as one path, the dots of a round pen; None if they are few or differ."""
+        if len(uses) < _MIN_DOTS:
+            return None
         first = uses[0]
         link = first.get(_LINK, "")
         style = first.get("style", "")
@@ -184,8 +186,9 @@ def _shorten_path(path: str) -> str:
     """Return path data with rounded numbers, and without spaces next to commands."""
     words = []
     for word in path.split():
-        is_number = _NUMBER.fullmatch(word) is not None
-        words.append(_shorten_number(word, _PATH_DECIMALS) if is_number else word)
+        if _NUMBER.fullmatch(word) is not None:
+            word = _shorten_number(word, _PATH_DECIMALS)
+        words.append(word)
     return re.sub(r" ?([A-Za-z]) ?", r"\1", " ".join(words))
 
 

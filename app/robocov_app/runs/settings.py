@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from robocov.defaults import DEFAULT_LATTICE
 
 if TYPE_CHECKING:
-    from robocov_app.look.robot_colors import ColorScheme
+    from robocov_app.look.hues import ColorScheme
     from robocov_app.look.theme import Theme
 
 DEFAULT_VIDEO_SIZE_PX = (1280, 720)

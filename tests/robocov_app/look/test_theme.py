@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 
 from robocov.errors import ParameterError
 from robocov_app.look.colors import choose_text_color, compute_contrast, mix
-from robocov_app.look.robot_colors import MAX_OWN_HUES, N_SHARED_HUES, choose_robot_hues, choose_trail_color
+from robocov_app.look.hues import MAX_OWN_HUES, N_SHARED_HUES, choose_robot_hues, choose_trail_color
 from robocov_app.look.theme import THEMES, get_theme
 
 

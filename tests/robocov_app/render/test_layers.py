@@ -13,7 +13,7 @@ from robocov.observation import Snapshot
 from robocov.team import Team
 from robocov.voronoi import partition
 from robocov_app.look.colors import choose_text_color
-from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layer_catalog import build_standard_layers

@@ -8,7 +8,7 @@ import shapely
 from drawn_pixels import SIZE, distance, drawn, layer_named, nearest
 from drawn_run import SQUARE, explained, run_of, scene_of
 
-from robocov_app.look.robot_colors import choose_trail_color
+from robocov_app.look.hues import choose_trail_color
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.layers.fading_trails import FADE_STEPS
 from robocov_app.render.painter import Painter

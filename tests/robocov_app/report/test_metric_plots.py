@@ -39,7 +39,7 @@ def draw_plots(replay_runs: list[ReplayRun], result: ReportedResult = COMPARISON
 def test_every_metric_has_a_plot_that_is_described_with_its_final_values() -> None:
     replay_runs = [build_replay_run(seconds=2.0), build_replay_run("rpf", seconds=2.0)]
     plots = draw_plots(replay_runs)
-    assert list(plots) == ["Sensed", "Seen", "Energy", "Path", "Clearance", "Distance kept"]
+    assert list(plots) == ["Sensed", "Seen", "Energy", "Path", "Clearance", "Separation"]
     metrics = compute_run_metrics(replay_runs[0].record, 15.0)
     assert f"to {metrics.path_length[-1]:.4g} m; RPF" in plots["Path"]
     assert f"to {100.0 * metrics.visible_area[-1] / metrics.free_area:.4g} %" in plots["Seen"]
@@ -48,7 +48,7 @@ def test_every_metric_has_a_plot_that_is_described_with_its_final_values() -> No
 
 
 def test_a_single_robot_has_no_distance_to_others() -> None:
-    assert "Distance kept" not in draw_plots([build_replay_run(robots=1, seconds=1.0)])
+    assert "Separation" not in draw_plots([build_replay_run(robots=1, seconds=1.0)])
 
 
 def test_connectivity_is_plotted_if_it_changes() -> None:
@@ -63,8 +63,8 @@ def test_connectivity_is_plotted_if_it_changes() -> None:
 @pytest.mark.slow
 def test_mean_times_are_plotted_if_they_are_known_for_all_runs() -> None:
     timed_run = build_replay_run(has_mean_times=True)
-    assert "Time to come" in draw_plots([timed_run, build_replay_run("rpf", has_mean_times=True)])
-    assert "Time to come" not in draw_plots([timed_run, build_replay_run("rpf")])
+    assert "Travel time" in draw_plots([timed_run, build_replay_run("rpf", has_mean_times=True)])
+    assert "Travel time" not in draw_plots([timed_run, build_replay_run("rpf")])
 
 
 def test_a_sweep_has_no_plots_of_metrics() -> None:

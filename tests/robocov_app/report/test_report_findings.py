@@ -128,7 +128,7 @@ def test_titles_of_runs_have_what_distinguishes_them() -> None:
 def test_facts_of_a_run() -> None:
     result = build_result(RUNS)
     run = build_run(gains=(("k", 1.0),), settled_at_s=3.0, path_length_m=1.5)
-    expected = "Gains: k 1; settled at 3.0 s; 0 contacts; 1.50 m of path per robot."
+    expected = "Gains: k 1; settled at 3.0 s; 0 contacts; mean path length 1.50 m."
     assert format_run_facts(result, run) == expected
     assert format_count(1, "contact") in format_run_facts(result, build_run(contacts=1))
 

@@ -11,8 +11,8 @@ from robocov.text import escape_controls
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.replay import (
     MAX_PANES,
+    build_replay_element,
     build_replay_html,
-    build_replay_part,
     read_replay_css,
     read_replay_js,
 )
@@ -53,7 +53,7 @@ def test_runs_of_one_controller_with_other_gains_look_different() -> None:
 
 
 def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
-    page = Page(build_replay_part(runs_of(6)))
+    page = Page(build_replay_element(runs_of(6)))
     pictures = page.all("svg")
     assert len(pictures) == MAX_PANES
     assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in pictures)
@@ -76,7 +76,7 @@ def test_no_name_gets_out_of_its_place() -> None:
 
 def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:
     assert data_of(build_replay_html(runs_of(6)))["panes"] == [0, 1, 2, 3]
-    assert data_of(build_replay_part(runs_of(6), [5, 2]))["panes"] == [5, 2]
+    assert data_of(build_replay_element(runs_of(6), [5, 2]))["panes"] == [5, 2]
 
 
 def test_the_same_runs_give_the_same_bytes() -> None:

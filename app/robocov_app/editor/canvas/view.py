@@ -9,7 +9,7 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov_app.look.colors import Color, mix
-from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas

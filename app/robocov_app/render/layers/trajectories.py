@@ -12,7 +12,7 @@ import pygame
 from robocov.arrays import Array
 from robocov_app.look import legend
 from robocov_app.look.colors import Color
-from robocov_app.look.robot_colors import ColorScheme, choose_trail_colors
+from robocov_app.look.hues import ColorScheme, choose_trail_colors
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.clipping import limit_pixels
 from robocov_app.render.crowding import choose_width_factor

@@ -39,7 +39,7 @@ from robocov_app.replication.results.study_results import BeyondResults, FigureR
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import draw_run
 from robocov_app.report.replay import (
-    build_replay_part,
+    build_replay_element,
     read_asset,
     read_replay_css,
     read_replay_js,
@@ -143,7 +143,7 @@ def _build_replay(runs: Mapping[str, FigureRun]) -> Markup:
         figure = _FIGURES_OF_CASES[name.partition("/")[0]]
         replays.append(ReplayRun(run.record, run.history, f"{figure}: {run.record.label}"))
     panes = [list(runs).index(name) for name in _REPLAY_PANES]
-    return Markup(build_replay_part(replays, panes, _MAX_REPLAY_BYTES))
+    return Markup(build_replay_element(replays, panes, _MAX_REPLAY_BYTES))
 
 
 def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:

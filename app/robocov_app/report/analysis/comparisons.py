@@ -73,7 +73,7 @@ class GroupComparison:
     first, second : RunGroup
     maps : tuple of MapPairs
     ratio : Interval
-        Ratio of the first by the second: over maps, or over seeds if there is only one map.
+        Ratio of the first to the second: over maps, or over seeds if there is only one map.
     unpaired_count : int
         Number of cases of only one group.
     """
@@ -95,7 +95,7 @@ class GroupComparison:
         return sum(pairs.pair_count for pairs in self.maps)
 
     def format_verdicts(self) -> str:
-        """Return on how many maps the first group is better, worse or neither."""
+        """Return as text on how many maps the first group is better, worse or neither."""
         counts = Counter(pairs.verdict for pairs in self.maps)
         map_count = len(self.maps)
         if len(counts) == 1:
@@ -141,7 +141,9 @@ def compare_groups(groups: Sequence[RunGroup]) -> list[GroupComparison]:
     list of GroupComparison
         All pairs of groups; if there are many groups, only those with the first one.
     """
-    first_groups = groups if len(groups) <= MAX_COMPARED_GROUPS else groups[:1]
+    first_groups = groups
+    if len(groups) > MAX_COMPARED_GROUPS:
+        first_groups = groups[:1]
     comparisons = []
     for number, first in enumerate(first_groups):
         for second in groups[number + 1 :]:

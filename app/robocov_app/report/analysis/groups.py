@@ -75,8 +75,10 @@ def _choose_suffixes(gain_sets: Sequence[Gains]) -> list[str]:
     letter_suffixes = []
     for number in range(len(gain_sets)):
         round_number, letter_number = divmod(number, len(_LETTERS))
-        digits = str(round_number + 1) if round_number else ""
-        letter_suffixes.append(f" {_LETTERS[letter_number]}{digits}")
+        suffix = f" {_LETTERS[letter_number]}"
+        if round_number > 0:
+            suffix += str(round_number + 1)
+        letter_suffixes.append(suffix)
     return letter_suffixes
 
 
@@ -89,8 +91,8 @@ def group_by_controller(result: ReportedResult) -> list[RunGroup]:
     """List the groups of all completed runs of a controller, with any gains."""
     groups = []
     for controller, runs in group_by(result.completed_runs, lambda run: run.controller).items():
-        gain_sets = {run.gains for run in runs}
-        gains = gain_sets.pop() if len(gain_sets) == 1 else None
+        has_same_gains = len({run.gains for run in runs}) == 1
+        gains = runs[0].gains if has_same_gains else None
         groups.append(RunGroup(runs[0].label, controller, gains, tuple(runs)))
     return groups
 
@@ -98,7 +100,9 @@ def group_by_controller(result: ReportedResult) -> list[RunGroup]:
 def list_displayed_groups(result: ReportedResult) -> list[RunGroup]:
     """List the groups of tables and plots: variants, or controllers if there are many variants."""
     variants = list_variants(result)
-    return variants if len(variants) <= MAX_VARIANTS else group_by_controller(result)
+    if len(variants) > MAX_VARIANTS:
+        return group_by_controller(result)
+    return variants
 
 
 def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:

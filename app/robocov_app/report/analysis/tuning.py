@@ -15,8 +15,8 @@ from robocov_app.report.results.result import Gains, ReportedResult, ReportedRun
 _MAX_LISTED_GAINS = 3
 """Maximum number of sets of gains that are listed for a tuned controller."""
 
-_Part: TypeAlias = object
-"""A map, or a start and seed: gains for its runs are chosen on the runs of all other parts."""
+_Fold: TypeAlias = object
+"""A map, or a start and seed: gains for its runs are chosen on the runs of all other folds."""
 
 
 class ComparedGroups(NamedTuple):
@@ -39,16 +39,16 @@ class _Tuning(NamedTuple):
 
     Attributes
     ----------
-    parts : list
-    get_part : callable
-        Returns the part of a run.
+    folds : list
+    get_fold : callable
+        Returns the fold of a run.
     scales : Scales
     runs : dict of (controller, gains) to list of ReportedRun
         All runs, including failed ones.
     """
 
-    parts: list[_Part]
-    get_part: Callable[[ReportedRun], _Part]
+    folds: list[_Fold]
+    get_fold: Callable[[ReportedRun], _Fold]
     scales: Scales
     runs: dict[tuple[str, Gains], list[ReportedRun]]
 
@@ -58,7 +58,7 @@ def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
 
     If several controllers have been run, and some with several sets of gains, these are tuned: the gains for
     each map are those with the lowest median on all other maps (for each start and seed if there is only one
-    map). So no run is compared on which its gains were chosen.
+    map). So gains are never compared on the runs on which they were chosen.
 
     Parameters
     ----------
@@ -75,15 +75,15 @@ def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
     if len(variants_by_controller) < 2:
         return ComparedGroups(variants, "Every set of gains is compared by itself; none was chosen.")
     has_several_maps = len({run.map for run in result.completed_runs}) > 1
-    get_part = _get_map if has_several_maps else _get_start_and_seed
-    parts = list(dict.fromkeys(get_part(run) for run in result.completed_runs))
-    if len(parts) < 2:
+    get_fold = _get_map if has_several_maps else _get_start_and_seed
+    folds = list(dict.fromkeys(get_fold(run) for run in result.completed_runs))
+    if len(folds) < 2:
         first_variants = [group_variants[0] for group_variants in variants_by_controller.values()]
-        note = "There is one case only, too few to choose gains fairly: the first of each take part."
+        note = "There is only one case, too few to choose gains fairly: the first gains of each are compared."
         return ComparedGroups(first_variants, note)
     tuning = _Tuning(
-        parts=parts,
-        get_part=get_part,
+        folds=folds,
+        get_fold=get_fold,
         scales=compute_medians(result),
         runs=group_by(result.runs, lambda run: (run.controller, run.gains)),
     )
@@ -99,13 +99,13 @@ def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
     return ComparedGroups(groups, _describe_tuning(choices, has_several_maps=has_several_maps))
 
 
-def _get_map(run: ReportedRun) -> _Part:
-    """Return the part of a run if there are several maps."""
+def _get_map(run: ReportedRun) -> _Fold:
+    """Return the fold of a run if there are several maps."""
     return run.map
 
 
-def _get_start_and_seed(run: ReportedRun) -> _Part:
-    """Return the part of a run if there is only one map."""
+def _get_start_and_seed(run: ReportedRun) -> _Fold:
+    """Return the fold of a run if there is only one map."""
     return run.start, run.seed
 
 
@@ -113,24 +113,24 @@ def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]
     """Return the runs of a controller with tuned gains, and which gains were chosen how often."""
     runs: list[ReportedRun] = []
     labels = []
-    for part in tuning.parts:
-        best = min(variants, key=partial(_rate_elsewhere, part=part, tuning=tuning))
-        runs += [run for run in best.runs if tuning.get_part(run) == part]
+    for fold in tuning.folds:
+        best = min(variants, key=partial(_rate_elsewhere, fold=fold, tuning=tuning))
+        runs += [run for run in best.runs if tuning.get_fold(run) == fold]
         labels.append(best.label)
     first_label = variants[0].runs[0].label
     group = RunGroup(first_label + TUNED_SUFFIX, variants[0].controller, None, tuple(runs))
     counts = Counter(labels).most_common(_MAX_LISTED_GAINS)
-    choice = ", ".join(f"{label} in {count} of {len(tuning.parts)}" for label, count in counts)
+    choice = ", ".join(f"{label} in {count} of {len(tuning.folds)}" for label, count in counts)
     return group, choice
 
 
-def _rate_elsewhere(variant: RunGroup, part: _Part, tuning: _Tuning) -> tuple[float, ...]:
-    """Return the median and the mean of a variant's distances on all other parts; the lower the better."""
+def _rate_elsewhere(variant: RunGroup, fold: _Fold, tuning: _Tuning) -> tuple[float, ...]:
+    """Return the median and the mean of a variant's distances on all other folds; the lower the better."""
     assert variant.gains is not None
     distances = [
         scale_distance(run, tuning.scales)
         for run in tuning.runs[variant.controller, variant.gains]
-        if tuning.get_part(run) != part
+        if tuning.get_fold(run) != fold
     ]
     if not distances:
         return (np.inf,)
@@ -140,13 +140,13 @@ def _rate_elsewhere(variant: RunGroup, part: _Part, tuning: _Tuning) -> tuple[fl
 def _describe_tuning(choices: Sequence[str], *, has_several_maps: bool) -> str:
     """Return how gains were chosen."""
     if has_several_maps:
-        part = "map"
-        other_parts = "on the other maps"
+        fold = "map"
+        other_folds = "on the other maps"
     else:
-        part = "start and seed"
-        other_parts = "from the others"
+        fold = "start and seed"
+        other_folds = "from the others"
     return (
-        f"Tuned: of a controller with several sets of gains, those for a {part} are those with the lowest "
-        f"median {other_parts}, so that no run is compared on which its gains were chosen; a failed run "
-        f"counts as the worst. Chosen: {'; '.join(choices)}."
+        f"Tuned: if a controller has several sets of gains, the one for each {fold} is that with the lowest "
+        f"median {other_folds}, so that gains are never compared on the runs on which they were chosen; a "
+        f"failed run counts as the worst. Chosen: {'; '.join(choices)}."
     )

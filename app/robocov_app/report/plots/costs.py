@@ -23,7 +23,7 @@ from robocov_app.report.plots.plot import (
 from robocov_app.report.results.result import ReportedResult, ReportedRun
 
 _CURVE_SAMPLES = 121
-"""Number of samples of a curve over time, about one every three pixels."""
+"""Number of samples of a curve over time, about one for every three pixels."""
 
 
 def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> list[PagePlot]:
@@ -79,8 +79,12 @@ def _sample_histories(result: ReportedResult) -> tuple[Array, dict[ReportedRun, 
 
 def _build_cost_plot(panel: Panel, bands: list[Band]) -> PagePlot:
     """Build the plot of the bands in a panel."""
-    label = "mean distance / that of the start" if panel.is_together else DISTANCE
-    unit = "" if panel.is_together else " m"
+    if panel.is_together:
+        label = "mean distance / that of the start"
+        unit = ""
+    else:
+        label = DISTANCE
+        unit = " m"
     texts = "; ".join(_describe_band(band, unit) for band in bands)
     description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
     # The label of the axis has the unit, since the names of the curves have little space.
@@ -131,8 +135,12 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
 
 def _build_final_cost_plot(panel: Panel, samples: list[Sample]) -> PagePlot:
     """Build the plot of the samples in a panel."""
-    label = SCALED_DISTANCE_LABEL if panel.is_together else FINAL_DISTANCE_LABEL
-    unit = "" if panel.is_together else " m"
+    if panel.is_together:
+        label = SCALED_DISTANCE_LABEL
+        unit = ""
+    else:
+        label = FINAL_DISTANCE_LABEL
+        unit = " m"
     texts = "; ".join(_describe_sample(sample, unit) for sample in samples)
 
     def draw(size: tuple[int, int]) -> Figure:

@@ -58,7 +58,9 @@ class _Parameter(NamedTuple):
         """Return the value at a coordinate, see `to_coordinate`."""
         if np.isnan(coordinate):
             return None
-        return self.choices[int(coordinate)] if self.choices else coordinate
+        if self.choices:
+            return self.choices[int(coordinate)]
+        return coordinate
 
     def format_coordinate(self, coordinate: float) -> str:
         """Return the value at a coordinate as text."""
@@ -101,7 +103,7 @@ def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     for number, (name, controllers) in enumerate(varying_gains.items()):
         gain_groups = [group for group in groups if group.controller in controllers]
         plots.append(_build_plot(gains[name], gain_groups, styles, axis, key=f"{key}-{number}"))
-    # The team is a part of the setting, so that distances for it are divided by medians of maps.
+    # The setting includes the team, so that distances over its parameters are divided by medians of maps.
     map_axis = _choose_axis(result, "final distance / median of map", attrgetter("map"))
     for number, parameter in enumerate(_list_team_parameters(result)):
         if len({parameter.get_value(run) for run in result.completed_runs}) > 1:
@@ -118,21 +120,24 @@ def build_dependence_plots(result: ReportedResult, key: str) -> list[PagePlot]:
 
 
 def _choose_axis(
-    result: ReportedResult, label: str, get_part: Callable[[ReportedRun], object]
+    result: ReportedResult, label: str, get_key: Callable[[ReportedRun], object]
 ) -> _DistanceAxis:
-    """Return an axis of distances divided by medians of parts of a result; in m if there is one part."""
-    if len({get_part(run) for run in result.completed_runs}) == 1:
+    """Return an axis of distances divided by the median of runs with the same key; in m if all have it."""
+    if len({get_key(run) for run in result.completed_runs}) == 1:
         return _DistanceAxis(FINAL_DISTANCE_LABEL, dict.fromkeys(result.completed_runs, 1.0))
-    return _DistanceAxis(label, compute_medians(result, get_part))
+    return _DistanceAxis(label, compute_medians(result, get_key))
 
 
 def _describe_gain(result: ReportedResult, name: str) -> _Parameter:
     """Return a gain as a parameter."""
+    title = name
     unit = result.gain_units.get(name, "")
+    if unit:
+        title += f" ({unit})"
     values = dict.fromkeys(dict(run.gains).get(name) for run in result.completed_runs)
     return _Parameter(
         name=name,
-        title=f"{name} ({unit})" if unit else name,
+        title=title,
         get_value=lambda run: dict(run.gains)[name],
         choices=tuple(value for value in values if isinstance(value, str)),
     )
@@ -200,8 +205,9 @@ def _describe_dependence(dependence: Dependence, parameter: _Parameter) -> str:
         return f"{runs} from {low:.3g} to {high:.3g}, the lowest value at {best}"
     medians = []
     for coordinate in coordinates.tolist():
-        is_unlimited = np.isnan(coordinate)
-        has_value = np.isnan(dependence.gains) if is_unlimited else dependence.gains == coordinate
+        has_value = dependence.gains == coordinate
+        if np.isnan(coordinate):
+            has_value = np.isnan(dependence.gains)
         median = np.median(dependence.values[has_value])
         medians.append(f"{parameter.format_coordinate(coordinate)}: {median:.3f}")
     return f"{dependence.label}, medians at {', '.join(medians)}"
@@ -234,7 +240,9 @@ def _build_grid_plot(
     )
     figure = plot_gain_grid(grid, PANEL_SIZE_PX)
     title = f"{group.label} over {first.name} and {second.name}"
-    distance = "final distance in m" if axis.label == FINAL_DISTANCE_LABEL else SCALED_DISTANCE_LABEL
+    distance = SCALED_DISTANCE_LABEL
+    if axis.label == FINAL_DISTANCE_LABEL:
+        distance = "final distance in m"
     span = _describe_grid(medians, first, second, columns, rows)
     return PagePlot(title, inline_svg(figure, key, f"{title}: medians of the {distance}, {span}."))
 

@@ -66,7 +66,7 @@ def _round_to_millimeters(gaps: Array) -> Array:
 
 _CONNECTIVITY = _Metric(
     title="Connectivity",
-    label="parts of the team that hear each other",
+    label="groups of robots that can communicate",
     unit="",
     get_values=lambda metrics: np.asarray(metrics.components, float),
 )
@@ -91,7 +91,7 @@ _METRICS = (
     ),
     _Metric(
         title="Path",
-        label="path of a robot so far, mean (m)",
+        label="mean path length so far (m)",
         unit="m",
         get_values=lambda metrics: metrics.path_length,
     ),
@@ -102,7 +102,7 @@ _METRICS = (
         get_values=lambda metrics: _round_to_millimeters(metrics.wall_clearance),
     ),
     _Metric(
-        title="Distance kept",
+        title="Separation",
         label="smallest gap between robots (m)",
         unit="m",
         get_values=lambda metrics: _round_to_millimeters(metrics.robot_clearance),
@@ -126,7 +126,7 @@ def build_metric_plots(
     Returns
     -------
     list of PagePlot
-        None for a sweep, or if there are too many runs or robots, or trajectories are not known. Mean times
+        Empty for a sweep, or if there are too many runs or robots, or trajectories are not known. Mean times
         are plotted if they are known, and connectivity if it changes.
     """
     if result.kind == "sweep" or not _are_measurable(runs):
@@ -156,9 +156,10 @@ def _list_metric_curves(runs: Sequence[ReplayRun]) -> list[_MetricCurves]:
         if run.history is not None and run.history.mean_time is not None
     ]
     if len(mean_times) == len(runs):
-        metric_curves.append(_MetricCurves("Time to come", TIME, "s", mean_times))
-    has_connectivity = any((metrics.components != metrics.components[0]).any() for metrics in all_metrics)
-    metrics_to_plot = [*_METRICS, _CONNECTIVITY] if has_connectivity else _METRICS
+        metric_curves.append(_MetricCurves("Travel time", TIME, "s", mean_times))
+    metrics_to_plot = list(_METRICS)
+    if any((metrics.components != metrics.components[0]).any() for metrics in all_metrics):
+        metrics_to_plot.append(_CONNECTIVITY)
     for metric in metrics_to_plot:
         curves = [(metrics.time, metric.get_values(metrics)) for metrics in all_metrics]
         metric_curves.append(_MetricCurves(metric.title, metric.label, metric.unit, curves))
@@ -185,7 +186,9 @@ def _build_bands(metric_curves: _MetricCurves, runs: Sequence[ReplayRun], styles
 
 def _build_metric_plot(metric_curves: _MetricCurves, bands: Sequence[Band], key: str) -> PagePlot:
     """Build the plot of a metric."""
-    title, label, unit, _ = metric_curves
+    title = metric_curves.title
+    label = metric_curves.label
+    unit = metric_curves.unit
     texts = []
     for band in bands:
         finite_values = band.values[0][np.isfinite(band.values[0])]

@@ -76,7 +76,9 @@ def list_panels(result: ReportedResult, key: str) -> list[Panel]:
         panels.append(Panel(TOGETHER_TITLE, f"{key}-all", groups, is_together=True))
     if len(settings) <= MAX_PANELS:
         for number, setting in enumerate(settings):
-            title = format_setting(result, setting) if len(settings) > 1 else ""
+            title = ""
+            if len(settings) > 1:
+                title = format_setting(result, setting)
             setting_groups = [group.select(setting) for group in groups]
             panels.append(Panel(title, f"{key}-{number}", setting_groups, is_together=False))
     return panels

@@ -237,6 +237,12 @@ def _build_run_of_row(row: Mapping[str, Any], study: _SweepStudy, folder: Path) 
     """Build a run from its row in the table of a sweep."""
     controller = str(row["controller"])
     error = row["error"]
+    if error is None:
+        figures = {name: row.get(name) for name in FIGURE_NAMES}
+        error_text = None
+    else:
+        figures = {}
+        error_text = replace_unprintable(str(error))
     gain_names = study.gain_names.get(controller, ())
     team = [(name, row.get(name_parameter_column(name))) for name in study.varying_parameters]
     return ReportedRun(
@@ -248,8 +254,8 @@ def _build_run_of_row(row: Mapping[str, Any], study: _SweepStudy, folder: Path) 
         start=replace_unprintable(str(row["start"])),
         seed=row["seed"],
         gains=_list_gains({name: row.get(get_gain_column(name)) for name in gain_names}),
-        figures={name: row.get(name) for name in FIGURE_NAMES} if error is None else {},
-        error=None if error is None else replace_unprintable(str(error)),
+        figures=figures,
+        error=error_text,
         folder=folder / RUNS_FOLDER / Path(str(row["run"])).name,
     )
 
@@ -284,9 +290,11 @@ def _number_labels(runs: Sequence[ReportedRun]) -> tuple[ReportedRun, ...]:
     for run in runs:
         if run.controller in labels:
             continue
-        same_labels = [label for label in labels.values() if label.partition(" #")[0] == run.label]
-        number = len(same_labels) + 1
-        labels[run.controller] = run.label if number == 1 else f"{run.label} #{number}"
+        label = run.label
+        same_labels = [other for other in labels.values() if other.partition(" #")[0] == run.label]
+        if same_labels:
+            label += f" #{len(same_labels) + 1}"
+        labels[run.controller] = label
     return tuple(replace(run, label=labels[run.controller]) for run in runs)
 
 
@@ -294,8 +302,9 @@ def _list_gains(gains: Mapping[str, Value]) -> Gains:
     """Return gains with names and texts that can be displayed."""
     pairs: list[tuple[str, Value]] = []
     for name, value in gains.items():
-        text_or_number = replace_unprintable(value) if isinstance(value, str) else value
-        pairs.append((replace_unprintable(name), text_or_number))
+        if isinstance(value, str):
+            value = replace_unprintable(value)
+        pairs.append((replace_unprintable(name), value))
     return tuple(pairs)
 
 

@@ -83,7 +83,9 @@ class ReportedRun:
     def final_distance(self) -> float:
         """Mean distance to the nearest robot at the end, m; nan if it is not known."""
         value = self.figures.get("mean_distance_m")
-        return float("nan") if value is None else float(value)
+        if value is None:
+            return float("nan")
+        return float(value)
 
     def has_figure(self, name: str) -> bool:
         """Return whether a figure of the run is known and finite."""
@@ -144,15 +146,15 @@ class ReportedResult:
         Number of runs that the result has when it is complete.
     gain_units, gain_meanings : mapping of str to str
     facts : mapping
-        What all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team`` and
-        ``versions``, if known.
+        Values that all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``
+        and ``versions``, if known.
     loaded : mapping of Path to SavedRun
         Runs that were read already, by folder.
     damaged_runs : tuple of DamagedRun
         Runs that cannot be read. They are not in `runs`.
     references : mapping of Setting to Reference
     description : str
-        Which part of a story it is; empty if it is not a part.
+        Text that distinguishes the result from others of the same session; empty if there are none.
     """
 
     kind: ResultKind
@@ -242,7 +244,9 @@ class ReportedResult:
         if run.folder in self.loaded:
             return self.loaded[run.folder].history
         path = run.folder / COST_FILE
-        return read_history(path) if path.exists() else None
+        if not path.exists():
+            return None
+        return read_history(path)
 
 
 def replace_unprintable(text: str) -> str:

@@ -62,7 +62,9 @@ def _format_range(values: Sequence[Value], unit: str) -> str:
     if not numbers:
         return "none"
     low, high = min(numbers), max(numbers)
-    text = f"{low:.6g}" if low == high else f"{low:.4g} to {high:.4g}"
+    text = f"{low:.4g} to {high:.4g}"
+    if low == high:
+        text = f"{low:.6g}"
     text += f" {unit}".rstrip()
     if len(numbers) < len(values):
         text += " or none"

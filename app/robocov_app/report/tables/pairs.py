@@ -8,8 +8,10 @@ from robocov_app.report.analysis.comparisons import GroupComparison, MapPairs, f
 from robocov_app.report.tables.table import PageTable
 
 
-def build_pairs_table(comparisons: Sequence[GroupComparison]) -> PageTable:
-    """Build the table of comparisons over all maps."""
+def build_pairs_table(comparisons: Sequence[GroupComparison]) -> PageTable | None:
+    """Build the table of comparisons over all maps; None if there are none."""
+    if not comparisons:
+        return None
     rows = []
     for comparison in comparisons:
         pair_count = comparison.pair_count
@@ -23,7 +25,7 @@ def build_pairs_table(comparisons: Sequence[GroupComparison]) -> PageTable:
             f"{lower_count} of {pair_count}",
         )
         rows.append(row)
-    caption = "Final mean distance of the first by that of the second"
+    caption = "Final mean distance of the first divided by that of the second"
     head = ("First", "Second", "Ratio", "First is", "First is lower in")
     return PageTable(caption, head, rows, frozenset({1, 3}))
 

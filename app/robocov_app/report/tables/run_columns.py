@@ -70,7 +70,7 @@ def list_figures(runs: Sequence[ReportedRun], name: str) -> list[float]:
 
 
 def _format_contacts(runs: Sequence[ReportedRun]) -> str:
-    """Return the number of contacts of a run, or how many of several runs had any."""
+    """Return the number of contacts of a run, or the number of runs with contacts if there are several."""
     counts = list_figures(runs, "contacts")
     if not counts:
         return NO_VALUE
@@ -95,6 +95,8 @@ def _format_clearance(runs: Sequence[ReportedRun]) -> str:
     if not gaps:
         return NO_VALUE
     text = f"{min(gaps):.3f}"
-    # A minus sign is as wide as a digit. There is none before zero.
-    minus = "\u2212" if text.strip("-0.") else ""
-    return text.replace("-", minus)
+    is_zero = not text.strip("-0.")
+    if is_zero:
+        return text.removeprefix("-")
+    # A minus sign is as wide as a digit, unlike a hyphen.
+    return text.replace("-", "\u2212")

@@ -54,7 +54,9 @@ def build_summary_tables(result: ReportedResult) -> list[PageTable]:
     """
     groups = list_displayed_groups(result)
     settings = list_settings(result)
-    gap_columns = [_build_gap_column(result)] if result.references else []
+    gap_columns = []
+    if result.references:
+        gap_columns.append(_build_gap_column(result))
     settled_column = RunColumn("Settled", _format_settled)
     other_columns = build_other_columns(result)
     tables = []
@@ -71,7 +73,9 @@ def build_summary_tables(result: ReportedResult) -> list[PageTable]:
             *other_columns,
         ]
         for setting in settings:
-            caption = format_setting(result, setting) if len(settings) > 1 else "Final figures"
+            caption = "Final figures"
+            if len(settings) > 1:
+                caption = format_setting(result, setting)
             setting_groups = [group.select(setting) for group in groups]
             tables.append(_build_summary_table(caption, columns, setting_groups))
     if tables and any(len(group.runs) > 1 for group in groups):
@@ -112,7 +116,7 @@ def _build_scaled_column(result: ReportedResult) -> RunColumn:
 
 
 def _format_settled(runs: Sequence[ReportedRun]) -> str:
-    """Return whether the team settled, or in how many runs."""
+    """Return whether the team settled, or the number of runs in which it did if there are several."""
     count = len(list_figures(runs, "settled_at_s"))
     if len(runs) > 1:
         return f"{count} of {len(runs)}"

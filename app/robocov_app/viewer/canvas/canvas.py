@@ -8,8 +8,8 @@ import pygame
 from robocov.arrays import Array
 from robocov.environment import Environment, Point
 from robocov_app.look.colors import mix
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.legend import merge_legends
-from robocov_app.look.robot_colors import choose_robot_hues
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry

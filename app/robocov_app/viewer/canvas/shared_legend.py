@@ -2,7 +2,7 @@
 
 import pygame
 
-from robocov_app.look.robot_colors import choose_robot_hues
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.legend_strip import arrange_legend_rows, render_legend_strip

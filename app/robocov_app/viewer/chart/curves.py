@@ -7,7 +7,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.look.colors import Color, mix
-from robocov_app.look.robot_colors import choose_curve_colors
+from robocov_app.look.hues import choose_curve_colors
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas
 from robocov_app.viewer.chart.frame import ChartFrame

@@ -10,10 +10,10 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.record import Record
 from robocov.voronoi import partition, partition_by_travel_time
-from robocov_app.look.robot_colors import MAX_OWN_HUES, choose_robot_hues
+from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 
 MAX_CELLS = 400
-"""Robots up to which replays draw cells. More would take too long in each frame."""
+"""Maximum number of robots whose cells are drawn in replays. More would take too long in each frame."""
 
 
 def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str, Any]:
@@ -23,34 +23,34 @@ def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str
     ----------
     record : Record
     positions : (T, n, 2) array, m
-        Positions of the robots at the moments that are embedded.
+        Positions of the robots in the embedded frames.
     working : (T, n) bool array
-        Which robots work at these moments; only they have cells.
+        Which robots work in these frames; only they have cells.
 
     Returns
     -------
     dict
-        ``first``: hue of each robot at the first moment. ``changes``: list of ``[moment, robot, hue]`` in the
-        order of time. Between two moments, cells that share an edge at either of them differ.
+        ``first``: hue of each robot in the first frame. ``changes``: list of ``[frame, robot, hue]`` in the
+        order of time. Between two frames, cells that share an edge in either of them differ.
     """
     robots = positions.shape[1]
-    hues = choose_robot_hues(robots)
     if not MAX_OWN_HUES < robots <= MAX_CELLS:
-        return {"first": hues.tolist(), "changes": []}
-    adjacencies = [_find_adjacency(record, *moment) for moment in zip(positions, working, strict=True)]
-    first: list[int] = []
+        return {"first": choose_robot_hues(robots).tolist(), "changes": []}
+    adjacencies = [_find_adjacency(record, *frame) for frame in zip(positions, working, strict=True)]
+    first_hues: list[int] = []
     changes: list[list[int]] = []
-    for moment, adjacency in enumerate(adjacencies):
-        previous = hues
-        # Until the next moment robots move on: its pairs count as well.
-        pairs = np.concatenate([adjacency, *adjacencies[moment + 1 : moment + 2]])
-        hues = choose_robot_hues(robots, np.unique(pairs, axis=0), previous if moment else None)
-        if moment == 0:
-            first = hues.tolist()
-            continue
-        changed = np.flatnonzero(hues != previous).tolist()
-        changes += [[moment, robot, int(hues[robot])] for robot in changed]
-    return {"first": first, "changes": changes}
+    previous_hues: IntArray | None = None
+    for frame in range(len(adjacencies)):
+        # The hues remain until the next frame, so its pairs count as well.
+        pairs = np.concatenate(adjacencies[frame : frame + 2])
+        hues = choose_robot_hues(robots, np.unique(pairs, axis=0), previous_hues)
+        if previous_hues is None:
+            first_hues = hues.tolist()
+        else:
+            changed_robots = np.flatnonzero(hues != previous_hues).tolist()
+            changes += [[frame, robot, int(hues[robot])] for robot in changed_robots]
+        previous_hues = hues
+    return {"first": first_hues, "changes": changes}
 
 
 def _find_adjacency(record: Record, positions: Array, working: BoolArray) -> IntArray:

@@ -6,8 +6,8 @@ from moving_teams import build_moving_record, list_hues
 
 from robocov.voronoi import partition
 from robocov_app.look.curve_styles import choose_controller_styles
-from robocov_app.look.robot_colors import MAX_OWN_HUES, N_SHARED_HUES
-from robocov_app.report.cell_hues import embed_hues
+from robocov_app.look.hues import MAX_OWN_HUES, N_SHARED_HUES
+from robocov_app.report.embedded_hues import embed_hues
 from robocov_app.report.embedding import MAX_RATE_HZ, ReplayRun, embed_run
 
 RAPF = choose_controller_styles(["rapf"])["rapf"]
