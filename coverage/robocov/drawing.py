@@ -138,9 +138,18 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - The parameter has thi
     RobocovError
         If the window cannot start.
 
+    See Also
+    --------
+    Simulation.show : Show a simulation.
+
     Notes
     -----
     A live window needs ``robocov[web]``. Without it, a replay of one minute is returned.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.show("rooms", robots=4, controllers=["rapf", "lloyd"])  # doctest: +SKIP
     """
     return load_drawing_backend().show(map, **options)
 

@@ -36,11 +36,40 @@ _MIN_SIMILARITY = 0.5
 
 
 class RobocovError(Exception):
-    """Base class of all errors that robocov raises."""
+    """Base class of all errors that robocov raises.
+
+    See Also
+    --------
+    InputError : An input cannot be used.
+    OutputError : A result cannot be written.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> try:
+    ...     rc.Rapf(k_rep=-1.0)
+    ... except rc.RobocovError as error:
+    ...     print(error)
+    rapf.k_rep: expected a number from 0 to 1e+06 N m³, got -1.0
+    """
 
 
 class InputError(RobocovError):
-    """An input cannot be used."""
+    """An input cannot be used.
+
+    See Also
+    --------
+    MapError : A map cannot be used.
+    StartError : A start has no room for the team.
+    ParameterError : A parameter is out of range or unknown.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.read_results("no-such-folder")
+    Traceback (most recent call last):
+    robocov.errors.InputError: no-such-folder: not the folder of a sweep (there is no results.csv)
+    """
 
 
 class Mistake(NamedTuple):
@@ -113,6 +142,24 @@ class MapError(InputError):
         Name of the document.
     line, column : int or None
         Place of the first mistake.
+
+    See Also
+    --------
+    load_map : Raises it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import robocov as rc
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "hall.json"
+    ...     _ = file.write_text('{"format": "robocov-map", "version": 1, "name": 7}')
+    ...     try:
+    ...         rc.load_map(file)
+    ...     except rc.MapError as error:
+    ...         print(error.line, error.mistakes[0].path)
+    1 ('name',)
     """
 
     MAX_LISTED = 20  # Finding the line of a mistake takes as long as reading the file.
@@ -154,11 +201,38 @@ class MapError(InputError):
 
 
 class StartError(InputError):
-    """A start has no room for the team, or lies inside an obstacle."""
+    """A start has no room for the team, or lies inside an obstacle.
+
+    See Also
+    --------
+    Environment.start : Raises it if there is no such start.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> room = rc.Environment("room", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+    >>> try:
+    ...     room.start().sample(50)
+    ... except rc.StartError as error:
+    ...     print(str(error).split(",")[0])
+    start 'uniform': room for about 20 robots of radius 0.1 m
+    """
 
 
 class ParameterError(InputError):
-    """A gain, a limit of the team, or a name is out of range or unknown."""
+    """A gain, a limit of the team, or a name is out of range or unknown.
+
+    See Also
+    --------
+    InputError : Its base class, of all unusable inputs.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.Team.homogeneous(3, max_speed=-1.0)
+    Traceback (most recent call last):
+    robocov.errors.ParameterError: team.max_speed: expected a number from 1e-06 to 1000, got -1.0 m/s
+    """
 
 
 class ControllerEndedError(RobocovError):
@@ -166,7 +240,20 @@ class ControllerEndedError(RobocovError):
 
 
 class OutputError(RobocovError):
-    """A result cannot be written: no permission, no space, or the folder is in use."""
+    """A result cannot be written: no permission, no space, or the folder is in use.
+
+    See Also
+    --------
+    RobocovError : Base class of all errors.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> room = rc.Environment("room", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+    >>> rc.save_map(room, "no-such-folder/room.json")  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+    robocov.errors.OutputError: no-such-folder/room.json: cannot be written: No such file or directory
+    """
 
 
 def quote(value: object) -> str:

@@ -37,6 +37,11 @@ class RangeSensor:
     movers : tuple of Mover
         Moving obstacles, at their positions at time zero until `set_time` is called.
 
+    See Also
+    --------
+    World : The physics of the robots.
+    Simulation : Has a sensor of its map, the attribute ``sensor``.
+
     Examples
     --------
     >>> wall = np.array([[2.0, -1.0], [3.0, -1.0], [3.0, 1.0], [2.0, 1.0]])

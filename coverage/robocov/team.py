@@ -130,6 +130,11 @@ class Team:
     ParameterError
         If a value is out of range, or an array has another length than `radius`.
 
+    See Also
+    --------
+    read_team : Read a team from a file.
+    Conditions : Noise, message loss, and robots that fail or join.
+
     Examples
     --------
     >>> team = Team.homogeneous(3, max_speed=0.5)

@@ -59,6 +59,22 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
     ------
     InputError
         If the file cannot be read or used. The message names the file and the key.
+
+    See Also
+    --------
+    Team.homogeneous : A team of identical robots.
+    Team.concatenate : A team of several teams.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import robocov as rc
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "team.toml"
+    ...     _ = file.write_text("group = [{count = 2, max_speed = 1.5}, {count = 1}]")
+    ...     rc.read_team(file).max_speed
+    array([1.5, 1.5, 1. ])
     """
     path = Path(path)
     file_name = to_one_line(path)

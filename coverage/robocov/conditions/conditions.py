@@ -88,6 +88,11 @@ class Conditions:
     ParameterError
         If a value is out of range. The message names it.
 
+    See Also
+    --------
+    Failure : The failure of a robot.
+    Join : The arrival of a robot.
+
     Examples
     --------
     >>> conditions = Conditions(failures=((2, 10.0),))

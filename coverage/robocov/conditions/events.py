@@ -26,6 +26,18 @@ class Failure(NamedTuple):
     robot : int
         Number of the robot, from 1.
     time : float, s
+
+    See Also
+    --------
+    Join : The arrival of a robot.
+    Conditions : Contains the failures of a run.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> conditions = rc.Conditions(failures=(rc.Failure(robot=2, time=10.0),))
+    >>> conditions.find_working(12.0, 3)
+    array([ True, False,  True])
     """
 
     robot: int
@@ -46,6 +58,18 @@ class Join(NamedTuple):
     place : (x, y) or None, m
         Requested position; the robot joins at the nearest one where it fits. By default, the
         position at which it would have started.
+
+    See Also
+    --------
+    Failure : The failure of a robot.
+    Conditions : Contains the joins of a run.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> conditions = rc.Conditions(joins=(rc.Join(robot=3, time=5.0, place=(2.0, 1.0)),))
+    >>> conditions.find_working(4.0, 3)
+    array([ True,  True, False])
     """
 
     robot: int

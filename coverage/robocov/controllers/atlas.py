@@ -158,6 +158,33 @@ class Atlas(BaseController):
 
     The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
 
+    Parameters
+    ----------
+    period : float, s
+        Time between two plans of a robot.
+    threshold : float
+        Fraction of the cost that a relocation must save.
+    nearby : float
+        Fraction of the cost that a relocation within the robot's own cell must save.
+    rest : float
+        Fraction of the cost of its own cell that a robot's new goal must save.
+    stake : float
+        Fraction of that cost that must be at stake for a viewpoint.
+    patience : float
+        Path length to viewpoints that doubles `stake`, in diameters of the region.
+    settling : float
+        Path length that doubles the required savings, in diameters of the region.
+    clearance : float, m
+        Gap between robots and walls along routes.
+    k_prop : float, 1/s
+        Desired speed per meter of distance to the goal.
+    response_time : float, s
+        Time constant with which the desired velocity is reached.
+
+    See Also
+    --------
+    AtlasShared : The same controller with shared maps.
+
     Notes
     -----
     The coverage cost of positions P on the map is
@@ -693,10 +720,25 @@ class AtlasShared(Atlas):
     viewpoint. A robot that does not hear all others behaves as with `Atlas`. It assumes that robots out of
     range are where one of its neighbors last heard them.
 
+    Parameters
+    ----------
+    period, threshold, nearby, rest, stake, patience, settling, clearance, k_prop, response_time
+        See `Atlas`.
+
+    See Also
+    --------
+    Atlas : The same controller without shared maps.
+
     Notes
     -----
     A robot that is stuck away from its goal for several plans is in a jam. It moves away from the robots
     around it for a while, each robot for a different time.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.run("square", rc.AtlasShared(), robots=2, duration=1.0)
+    <Record atlas-shared on Square, 2 robots, 1.0 s>
     """
 
     name = "atlas-shared"

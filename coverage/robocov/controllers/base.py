@@ -35,6 +35,30 @@ class Controller(Protocol):
     - the attribute ``scanning``, a `robocov.observation.Scanning`, if the robots need range scans,
     - the method ``inform(environment) -> Controller``, only with the information "whole map": it returns the
       controller that knows that map, with the same gains.
+
+    See Also
+    --------
+    IndividualController : A controller of a single robot, which is easier to write.
+    Observations : What the robots know.
+    gain : Declare a gain.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import robocov as rc
+    >>> @dataclass(frozen=True)
+    ... class ToCenter:
+    ...     name = label = "to-center"
+    ...     summary = "every robot moves to the centroid of the region"
+    ...     stiffness: float = rc.gain(1.0, "N/m", "attraction to the centroid", high=10.0)
+    ...
+    ...     def begin(self, region, team):
+    ...         return None
+    ...
+    ...     def decide(self, seen, memory):
+    ...         return rc.Decision(self.stiffness * (seen.region.centroid - seen.positions))
+    >>> rc.run("square", ToCenter(stiffness=2.0), robots=3, duration=1.0)
+    <Record to-center on Square, 3 robots, 1.0 s>
     """
 
     @property

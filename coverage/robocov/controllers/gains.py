@@ -149,6 +149,15 @@ def gain(
     whole : bool
         Whether only whole numbers are allowed.
 
+    Returns
+    -------
+    field
+        Default value of the field of a dataclass.
+
+    See Also
+    --------
+    choice : Declare a gain that is one of several choices.
+
     Examples
     --------
     >>> @dataclass(frozen=True)
@@ -185,10 +194,19 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     meaning : str
         Description on one line.
 
+    Returns
+    -------
+    field
+        Default value of the field of a dataclass.
+
     Raises
     ------
     ValueError
         If the default is none of the choices.
+
+    See Also
+    --------
+    gain : Declare a gain that is a number.
 
     Examples
     --------

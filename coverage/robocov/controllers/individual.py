@@ -20,7 +20,22 @@ from robocov.voronoi.delaunay import Mesh
 
 @dataclass(eq=False)
 class OwnView:
-    """Everything that one robot knows."""
+    """Everything that one robot knows.
+
+    See Also
+    --------
+    IndividualController : A controller that gets this view of a robot.
+    Observations : The knowledge of all robots.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> class Homing:
+    ...     def force(self, own):
+    ...         return own.centroid - own.position
+    >>> rc.run("square", Homing(), robots=2, duration=0.5)
+    <Record Homing on Square, 2 robots, 0.5 s>
+    """
 
     number: int
     """Its own number, from 0."""
@@ -59,6 +74,29 @@ class IndividualController(Protocol):
 
     An optional method ``begin(number, team)`` returns the initial memory of a robot; numbers start from 0.
     The controller reads the memory from ``own.memory``, and may assign a new value to it in each step.
+
+    See Also
+    --------
+    OwnView : What the robot knows.
+    IndividualControllerAdapter : Calls the controller for each robot of a team.
+    Controller : A controller of a whole team, which is faster.
+
+    Examples
+    --------
+    A controller with a memory, which counts the steps of each robot:
+
+    >>> import robocov as rc
+    >>> class Slowing:
+    ...     def begin(self, number, team):
+    ...         return 0
+    ...
+    ...     def force(self, own):
+    ...         own.memory += 1
+    ...         return (own.centroid - own.position) / own.memory
+    >>> isinstance(Slowing(), rc.IndividualController)
+    True
+    >>> rc.run("square", Slowing(), robots=2, duration=0.5)
+    <Record Slowing on Square, 2 robots, 0.5 s>
     """
 
     def force(self, own: OwnView) -> Sequence[float] | Array:
@@ -89,6 +127,10 @@ class IndividualControllerAdapter:
         Those of the individual controller. By default, they are its class name and the first line of its
         docstring.
     information : Information
+
+    See Also
+    --------
+    IndividualController : A controller of a single robot.
 
     Examples
     --------

@@ -25,6 +25,24 @@ class Lloyd(BaseController):
     locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside
     the robot's own cell.
 
+    Parameters
+    ----------
+    k_prop : float, 1/s
+        Desired speed per meter of distance to the target.
+    response_time : float, s
+        Time constant with which the desired velocity is reached.
+    cells : {"distance", "time"}
+        Owner of a point: the nearest robot, or the one that reaches it first at its own maximum speed.
+    target : {"centroid", "sensing", "median"}
+        Goal of a robot in its cell: the optimum for f = r², for 1 / (r² + h²), or for r.
+    height : float, m
+        Height h of the sensor in (14), for the target "sensing".
+
+    See Also
+    --------
+    Rapf : The same goals, and repulsion from robots and obstacles.
+    partition : The cells.
+
     Examples
     --------
     >>> from robocov.environment import Environment

@@ -97,6 +97,16 @@ def list_controller_classes() -> dict[str, type[Any]]:
     -------
     dict of str to type
         A class of an installed package that cannot be loaded is left out, with a warning.
+
+    See Also
+    --------
+    make_controller : Make a controller by name.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.list_controller_classes()["rapf"] is rc.Rapf
+    True
     """
     classes: dict[str, type[Any]] = {}
     for entry in entry_points(group=_ENTRY_POINT_GROUP):
@@ -195,6 +205,10 @@ def make_controller(
     ------
     ParameterError
         If there is no such controller or gain, with the most similar name, or a value is out of range.
+
+    See Also
+    --------
+    list_controller_classes : The names of all controllers.
 
     Examples
     --------

@@ -76,6 +76,23 @@ class Rpf(BaseController):
     viscosity brings the team to rest. The team often oscillates there, because the closest obstacle point
     jumps: the stronger the repulsion, the larger the oscillation. To follow the paper's protocol, which gives
     RPF and RAPF the same parameters, set `k_rep` and `rho_0` of both.
+
+    Parameters
+    ----------
+    k_rep : float, N m³
+        Strength of the repulsion (24).
+    rho_0 : float, m
+        Range of the repulsion (24).
+
+    See Also
+    --------
+    Rapf : The same repulsion, and attraction to the centroid of the cell.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.run("rooms", rc.Rpf(k_rep=1.0), robots=4, duration=1.0)
+    <Record rpf on Rooms, 4 robots, 1.0 s>
     """
 
     name = "rpf"
@@ -113,6 +130,28 @@ class Rapf(BaseController):
     An `attraction_limit` of at most the viscosity times the maximum speed (2 N for default robots) never
     drives a robot faster than its maximum speed, and robots stay clear of walls. None is the paper's (27),
     without a limit.
+
+    Parameters
+    ----------
+    k_rep : float, N m³
+        Strength of the repulsion (24).
+    rho_0 : float, m
+        Range of the repulsion (24).
+    k_att : float, N/m³
+        Strength of the attraction (27).
+    attraction_limit : float or None, N
+        Limit of the attraction; None is the paper's formula.
+    cells : {"distance", "time"}
+        Owner of a point: the nearest robot, or the one that reaches it first at its own maximum speed.
+    target : {"centroid", "sensing", "median"}
+        Goal of a robot in its cell: the optimum for f = r², for 1 / (r² + h²), or for r.
+    height : float, m
+        Height h of the sensor in (14), for the target "sensing".
+
+    See Also
+    --------
+    Rpf : The repulsion alone.
+    Lloyd : The goals alone.
 
     Examples
     --------

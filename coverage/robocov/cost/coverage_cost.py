@@ -69,6 +69,13 @@ class CoverageCost:
     ParameterError
         If `lattice` is not a whole number from 1 to 4096, or so coarse that no site is free.
 
+    See Also
+    --------
+    CoverageResult : The result of an evaluation.
+    TimeVaryingCost : The cost of a map whose obstacles move.
+    find_optimum : Find positions of low cost.
+    compute_cost_history : The cost along a run.
+
     Examples
     --------
     >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))

@@ -51,6 +51,21 @@ class CoverageResult(Drawable):
         If given, each site belongs to the robot that arrives first instead of the nearest one.
     mean_time : float or None, s
         With `speeds`, the mean time until the first robot arrives at a site.
+
+    See Also
+    --------
+    CoverageCost : Evaluates positions.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> room = rc.Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (0.0, 2.0)))
+    >>> result = rc.CoverageCost(room, lattice=32)([[1.0, 1.0], [3.0, 1.0]])
+    >>> result
+    <CoverageResult 2 robots, mean distance 0.764 m>
+    >>> np.bincount(result.owner)
+    array([256, 256])
     """
 
     _drawing_name = "result"

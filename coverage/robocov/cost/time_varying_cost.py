@@ -29,6 +29,11 @@ class TimeVaryingCost:
     progress : callable, optional
         See `CoverageCost`; used for the maps at other times.
 
+    See Also
+    --------
+    CoverageCost : The cost of a map whose obstacles do not move.
+    ObstaclePath : Makes an obstacle move.
+
     Examples
     --------
     >>> from robocov.environment import Environment

@@ -18,7 +18,26 @@ _MIN_MEAN_DENSITY = 1e-9
 
 
 class Density(ABC):
-    """Importance of each point: φ of equation (4), dimensionless, never negative, and immutable."""
+    """Importance of each point: φ of equation (4), dimensionless, never negative, and immutable.
+
+    See Also
+    --------
+    Uniform : The same weight everywhere.
+    Gaussians : A sum of Gaussians.
+    WeightedPolygons : Polygons of constant weight.
+    Raster : An image.
+    Environment.with_density : Give a map a density.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> hall = rc.Environment("hall", ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)))
+    >>> peak = rc.Gaussian((8.0, 3.0), weight=4.0, sigma=1.0)
+    >>> weighted = hall.with_density(rc.Gaussians((peak,), floor=0.2))
+    >>> isinstance(weighted.density, rc.Density), weighted.density.max_value >= 4.0
+    (True, True)
+    """
 
     kind: ClassVar[str]
     """Name in map files."""
@@ -134,6 +153,17 @@ class Uniform(Density):
     ------
     ParameterError
         If the weight is out of range.
+
+    See Also
+    --------
+    Density : The interface of all densities.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> rc.Uniform(2.0).evaluate(np.array([[0.0, 0.0], [1.0, 1.0]]))
+    array([2., 2.])
     """
 
     kind: ClassVar[str] = "uniform"

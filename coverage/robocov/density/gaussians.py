@@ -69,6 +69,18 @@ class Gaussian:
     ------
     ParameterError
         If a value is out of range, or both or neither of `sigma` and `covariance` are given.
+
+    See Also
+    --------
+    Gaussians : The density that consists of Gaussians.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> round_peak = rc.Gaussian((2.0, 0.0), weight=3.0, sigma=1.0)
+    >>> long_peak = rc.Gaussian((2.0, 0.0), weight=3.0, covariance=((4.0, 0.0), (0.0, 0.25)))
+    >>> rc.Gaussians((round_peak, long_peak)).max_value
+    6.0
     """
 
     center: Point
@@ -180,6 +192,11 @@ class Gaussians(Density):
     ------
     ParameterError
         If all weights are 0, or the floor is out of range.
+
+    See Also
+    --------
+    Gaussian : One peak.
+    Density : The interface of all densities.
 
     Examples
     --------

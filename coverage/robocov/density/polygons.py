@@ -56,6 +56,17 @@ class WeightedArea:
     ------
     ParameterError
         If the weight is out of range.
+
+    See Also
+    --------
+    WeightedPolygons : The density that consists of such areas.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> ward = rc.WeightedArea(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)), weight=5.0, name="ward")
+    >>> ward.weight
+    5.0
     """
 
     vertices: Ring
@@ -87,6 +98,11 @@ class WeightedPolygons(Density):
     ------
     ParameterError
         If all weights are 0, or the background is out of range.
+
+    See Also
+    --------
+    WeightedArea : One polygon.
+    Density : The interface of all densities.
 
     Examples
     --------

@@ -52,6 +52,10 @@ class Raster(Density):
     ParameterError
         If a value is out of range.
 
+    See Also
+    --------
+    Density : The interface of all densities.
+
     Examples
     --------
     >>> raster = Raster(np.array([[1.0, 2.0]]), extent=(0.0, 0.0, 2.0, 1.0))

@@ -54,6 +54,13 @@ class Environment(Drawable):
         φ, how much each point counts. It is part of the task, and robots know it. None if all points count
         equally.
 
+    See Also
+    --------
+    load_map : Load a map by name or from a file.
+    generate_map : Generate a random map.
+    save_map : Write a map to a file.
+    check_map : Measure a map and look for likely mistakes.
+
     Examples
     --------
     >>> from robocov.environment import CircleObstacle

@@ -35,6 +35,11 @@ class ObstaclePath:
     speed : float, m/s
     repeat : {"loop", "back-and-forth"}
 
+    See Also
+    --------
+    Environment.at : The map at a time, with its moving obstacles where they are then.
+    TimeVaryingCost : The coverage cost of a map whose obstacles move.
+
     Examples
     --------
     >>> path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), speed=2.0, repeat="back-and-forth")

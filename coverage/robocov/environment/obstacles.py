@@ -33,6 +33,18 @@ class PolygonObstacle:
     name : str or None
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
+
+    See Also
+    --------
+    WallObstacle : A wall along a line.
+    ObstaclePath : Makes an obstacle move.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> desk = rc.PolygonObstacle(((1.0, 4.0), (2.5, 4.0), (2.5, 5.0), (1.0, 5.0)), name="desk")
+    >>> desk.polygon.area
+    1.5
     """
 
     vertices: Ring
@@ -58,9 +70,21 @@ class CircleObstacle:
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
 
+    See Also
+    --------
+    PolygonObstacle : An obstacle of any other shape.
+    ObstaclePath : Makes an obstacle move.
+
     Notes
     -----
     The polygon deviates from the circle by at most `MAX_SAGITTA_M`.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> pillar = rc.CircleObstacle((2.0, 3.0), radius=0.5)
+    >>> round(pillar.polygon.area, 2)
+    0.78
     """
 
     center: Point
@@ -91,6 +115,17 @@ class WallObstacle:
     name : str or None
     path : ObstaclePath or None
         Path along which it moves; None if it does not move.
+
+    See Also
+    --------
+    PolygonObstacle : An obstacle of any other shape.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> wall = rc.WallObstacle(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0)), width=0.1)
+    >>> round(wall.polygon.area, 3)
+    0.5
     """
 
     points: Ring

@@ -39,6 +39,20 @@ class DiscStart:
     ----------
     center : (2,) sequence, m
     radius : float, m
+
+    See Also
+    --------
+    UniformStart : Anywhere in the free space.
+    PointsStart : Given positions.
+    Environment.start : A named start, from which positions are sampled.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> square = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+    >>> hall = rc.Environment("hall", square, starts={"door": rc.DiscStart((1.0, 1.0), radius=0.8)})
+    >>> hall.start("door").sample(4, seed=0).shape
+    (4, 2)
     """
 
     center: Point
@@ -47,7 +61,21 @@ class DiscStart:
 
 @dataclass(frozen=True)
 class UniformStart:
-    """The robots start anywhere in the free space."""
+    """The robots start anywhere in the free space.
+
+    See Also
+    --------
+    DiscStart : Somewhere in a disc.
+    PointsStart : Given positions.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> square = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+    >>> hall = rc.Environment("hall", square, starts={"anywhere": rc.UniformStart()})
+    >>> hall.start().sample(4, seed=0).shape
+    (4, 2)
+    """
 
 
 @dataclass(frozen=True)
@@ -57,6 +85,20 @@ class PointsStart:
     Attributes
     ----------
     positions : (k, 2) sequence, m
+
+    See Also
+    --------
+    DiscStart : Somewhere in a disc.
+    UniformStart : Anywhere in the free space.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> square = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+    >>> hall = rc.Environment("hall", square, starts={"here": rc.PointsStart(((1, 1), (2, 1), (3, 1)))})
+    >>> hall.start("here").sample(2)
+    array([[1., 1.],
+           [2., 1.]])
     """
 
     positions: Ring

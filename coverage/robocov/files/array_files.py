@@ -130,6 +130,10 @@ class ArrayCache:
     folder : Path
     max_bytes : int
 
+    See Also
+    --------
+    find_optimum : Its results are worth caching.
+
     Examples
     --------
     >>> import tempfile

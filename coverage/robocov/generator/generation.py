@@ -174,6 +174,11 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     ParameterError
         If a parameter is out of range, or no layout is found that meets all requirements.
 
+    See Also
+    --------
+    GENERATORS : The kinds of random maps, with their descriptions.
+    save_map : Write a map to a file.
+
     Examples
     --------
     >>> generate_map(3, kind="polygons", obstacles=4)

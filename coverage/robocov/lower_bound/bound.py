@@ -97,6 +97,18 @@ class LowerBound:
         Mean distance of the given placement.
     prices : (m,) array, m
         Prices of the sites that prove the bound; nan in components of the free space without a robot.
+
+    See Also
+    --------
+    compute_lower_bound : Compute it for a placement.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> square = rc.Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> bound = rc.compute_lower_bound(square, [[0.9, 1.0]], lattice=16, precision=0.01)
+    >>> 0.0 < bound.gap < 0.02
+    True
     """
 
     mean_distance: float
@@ -154,6 +166,10 @@ def compute_lower_bound(
         positions.
     InputError
         If a position is outside the free space; the message names it.
+
+    See Also
+    --------
+    find_optimum : Find a placement of low cost.
 
     Notes
     -----

@@ -140,6 +140,10 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     -------
     MapReport
 
+    See Also
+    --------
+    load_map : Load a map; the maps that it returns are valid.
+
     Examples
     --------
     >>> from robocov.mapfile import load_map

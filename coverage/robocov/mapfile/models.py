@@ -373,6 +373,16 @@ def build_map_schema() -> dict[str, Any]:
     Returns
     -------
     dict
+
+    See Also
+    --------
+    load_map : Check a map file against the schema and further rules.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.build_map_schema()["required"]
+    ['format', 'version', 'name', 'boundary']
     """
     schema = MapModel.model_json_schema(by_alias=True)
     # pydantic's schema constrains only starts whose names match the pattern, and allows anything elsewhere.

@@ -48,6 +48,12 @@ def load_map(source: str | Path) -> Environment:
     MapError
         If the map cannot be read; the message has line, column and JSON path of the first mistake.
 
+    See Also
+    --------
+    list_bundled_maps : Names of the bundled maps.
+    save_map : Write a map to a file.
+    check_map : Look for likely mistakes in a valid map.
+
     Examples
     --------
     >>> load_map("rooms").name
@@ -95,6 +101,17 @@ def list_bundled_maps() -> dict[str, Path]:
     -------
     dict of str to Path
         Files by name, sorted: those in the installed package, otherwise those in the checkout.
+
+    See Also
+    --------
+    load_map : Load one of them.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> maps = rc.list_bundled_maps()
+    >>> maps["rooms"].name
+    'rooms.json'
     """
     here = Path(__file__).resolve()
     in_package = sorted((here.parents[1] / "maps").glob("*.json"))

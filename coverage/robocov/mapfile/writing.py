@@ -70,6 +70,20 @@ def save_map(environment: Environment, path: str | Path) -> None:
         If the map breaks a rule of map files.
     OutputError
         If the file cannot be written.
+
+    See Also
+    --------
+    load_map : Load a map by name or from a file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import robocov as rc
+    >>> hall = rc.Environment("hall", ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     rc.save_map(hall, f"{folder}/hall.json")
+    ...     rc.load_map(f"{folder}/hall.json") == hall
+    True
     """
     exact_document = to_json(environment)
     document = _shorten_numbers(exact_document)

@@ -78,6 +78,12 @@ def compute_cost_history(
     ParameterError
         If `record` or `cost` is of another type.
 
+    See Also
+    --------
+    CoverageCost : The coverage cost of one set of positions.
+    compute_run_metrics : Other metrics along a run.
+    summarize : The results of a run.
+
     Examples
     --------
     >>> import robocov as rc

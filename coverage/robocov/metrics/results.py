@@ -62,6 +62,11 @@ class Results:
         Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), results
         whose names end in their units, the name of the run's folder (``run``), and its ``error``.
 
+    See Also
+    --------
+    read_results : Read the results of a sweep.
+    Record : A run of the sweep, see `Results.record`.
+
     Examples
     --------
     >>> results = read_results("study")  # doctest: +SKIP
@@ -239,7 +244,7 @@ class Results:
 
 
 def read_results(folder: Path | str) -> Results:
-    """Read the results of a sweep.
+    r"""Read the results of a sweep.
 
     If the sweep is still running or was interrupted, the results contain only finished runs.
 
@@ -255,6 +260,22 @@ def read_results(folder: Path | str) -> Results:
     ------
     InputError
         If it is not the folder of a sweep, or its table cannot be read.
+
+    See Also
+    --------
+    Results : Rows, data frames, records and cost histories.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import robocov as rc
+    >>> table = "controller,mean_distance_m,run,error\nrapf,1.25,0001,\nlloyd,1.31,0002,\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "results.csv").write_text(table)
+    ...     results = rc.read_results(folder)
+    ...     print(len(results), list(results.rows(["controller", "mean_distance_m"])))
+    2 [{'controller': 'rapf', 'mean_distance_m': 1.25}, {'controller': 'lloyd', 'mean_distance_m': 1.31}]
     """
     folder = Path(folder)
     if not (folder / SWEEP_TABLE_FILE).is_file():

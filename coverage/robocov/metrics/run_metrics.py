@@ -39,7 +39,19 @@ COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """Metrics along a run, at K of its moments. Only working robots count. All arrays have shape (K,)."""
+    """Metrics along a run, at K of its moments. Only working robots count. All arrays have shape (K,).
+
+    See Also
+    --------
+    compute_run_metrics : Compute the metrics of a run.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> measured = rc.compute_run_metrics(rc.run("square", robots=2, duration=1.0), rate=1.0)
+    >>> measured.path_length.shape, measured.final()["components"]
+    ((2,), 1.0)
+    """
 
     time: Array
     """Simulation time, s."""
@@ -132,6 +144,11 @@ def compute_run_metrics(
     ------
     ParameterError
         If the rate is negative or not finite.
+
+    See Also
+    --------
+    compute_cost_history : The coverage cost along a run.
+    summarize : The results of a run.
 
     Examples
     --------

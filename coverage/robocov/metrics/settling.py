@@ -59,6 +59,10 @@ def find_settling_time(
         Earliest time, s, such that in every window that starts then or later, the net displacement of each
         robot is below `distance`; None if the team was still moving at the end.
 
+    See Also
+    --------
+    summarize : The results of a run, among them the time at which it settled.
+
     Notes
     -----
     Speed is not a suitable criterion, because a robot may tremble in one place forever.

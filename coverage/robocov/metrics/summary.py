@@ -29,6 +29,11 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     dict
         Results whose names end in their units, and ``notes``, a list of remarks, if there are any.
 
+    See Also
+    --------
+    compute_cost_history : The coverage cost along a run.
+    compute_run_metrics : Areas, energy, path lengths and clearances along a run.
+
     Examples
     --------
     >>> import robocov as rc

@@ -30,6 +30,20 @@ class Decision:
         The cells that the controller used.
     memory : object
         Memory of the robots, which the controller receives again at its next decision.
+
+    See Also
+    --------
+    Observations : What a controller decides by.
+    Controller : The interface of controllers.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> simulation = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0))
+    >>> decision = simulation.observe_and_decide().decision
+    >>> decision.forces.shape, sorted(decision.terms)
+    ((3, 2), ['attraction', 'repulsion_obstacle', 'repulsion_robots'])
     """
 
     forces: Array

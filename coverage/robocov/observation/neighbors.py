@@ -30,6 +30,21 @@ class Neighbors:
         complete.
     indices : (m,) int array or None
         See `indptr`.
+
+    See Also
+    --------
+    Observations : Contain the neighbors of all robots.
+    partition : Cells that only neighbors cut.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> rc.Neighbors(3).list_neighbors(1)
+    array([0, 2])
+    >>> positions = np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]])
+    >>> rc.Neighbors.from_ranges(positions, np.full(3, 2.0)).list_neighbors(1)
+    array([0])
     """
 
     count: int

@@ -58,10 +58,24 @@ class Observations:
         Heading of each unicycle, from +x, and its turning rate; a robot knows its own. None in a team of
         points.
 
+    See Also
+    --------
+    Decision : What a controller returns for them.
+    OwnView : The knowledge of a single robot.
+    Simulation.observe : The current observations of a simulation.
+
     Notes
     -----
     Treat observations as immutable. The class is not frozen because creating a frozen object takes three
     times as long; for six robots, that is a tenth of a step.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> seen = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0)).observe()
+    >>> seen.positions.shape, seen.neighbors.list_neighbors(0)
+    ((3, 2), array([1, 2]))
     """
 
     positions: Array

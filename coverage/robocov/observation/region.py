@@ -55,6 +55,11 @@ class Region:
     InputError
         If the region has no area.
 
+    See Also
+    --------
+    Environment.region : The region of a map.
+    partition : Divide the region into Voronoi cells.
+
     Examples
     --------
     >>> region = Region([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])

@@ -27,6 +27,24 @@ class Snapshot:
         Mask of the robots that have joined and have not failed. None: all.
     inbox : object
         The messages that the robots have received so far; None if communication is ideal.
+
+    See Also
+    --------
+    Simulation.observe_and_decide : The snapshot of the current step.
+    Simulation.snapshots : One snapshot after another.
+    Record : All steps of a run.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> simulation = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0))
+    >>> for snapshot in simulation.snapshots(0.05):
+    ...     print(snapshot)
+    <Snapshot at 0.00 s, 3 robots>
+    <Snapshot at 0.02 s, 3 robots>
+    <Snapshot at 0.03 s, 3 robots>
+    <Snapshot at 0.05 s, 3 robots>
     """
 
     seen: Observations

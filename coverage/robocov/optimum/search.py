@@ -73,6 +73,19 @@ class Optimum:
         Mean distance of each restart before the descent of the exact cost.
     restart : int
         The restart that found the positions, the first one if several did.
+
+    See Also
+    --------
+    find_optimum : Find the best positions for a team.
+    LowerBound : Proves how far a placement can be from the optimum.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> square = rc.Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> best = rc.find_optimum(square, robots=1, restarts=2)
+    >>> round(best.compute_gap(1.1 * best.mean_distance), 3)
+    0.1
     """
 
     positions: Array
@@ -147,6 +160,11 @@ def find_optimum(
     ------
     ParameterError
         If a parameter is out of range, or the robots do not fit.
+
+    See Also
+    --------
+    compute_lower_bound : Prove how far a placement can be from the optimum.
+    CoverageCost : Evaluate a placement.
 
     Notes
     -----

@@ -70,6 +70,25 @@ class Record(Drawable):
         None if they are ideal.
     joined : tuple of JoinedRobot
         The robots that joined during the run, and the positions at which they joined.
+
+    See Also
+    --------
+    run : Simulate a run and return its record.
+    compute_cost_history : The coverage cost along a run.
+    compute_run_metrics : Areas, energy, path lengths and clearances along a run.
+    summarize : The results of a run.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import robocov as rc
+    >>> record = rc.run("rooms", "rapf", robots=4, duration=1.0)
+    >>> record.time.shape, record.positions.shape
+    ((61,), (61, 4, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     record.save(f"{folder}/first-run")
+    ...     rc.Record.load(f"{folder}/first-run")
+    <Record rapf on Rooms, 4 robots, 1.0 s>
     """
 
     _drawing_name = "record"

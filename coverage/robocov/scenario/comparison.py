@@ -41,6 +41,19 @@ class Comparison(Drawable):
         The runs, by the labels of the controllers.
     histories : mapping of str to CostHistory
         The coverage cost along each run.
+
+    See Also
+    --------
+    compare : Run several controllers and return their comparison.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> comparison = rc.compare("rooms", ["rapf", "lloyd"], robots=4, duration=1.0, lattice=16)
+    >>> comparison.records["RAPF"]
+    <Record rapf on Rooms, 4 robots, 1.0 s>
+    >>> [row["controller"] for row in comparison.table()]
+    ['RAPF', 'Lloyd']
     """
 
     _drawing_name = "comparison"
@@ -139,6 +152,11 @@ def compare(
     ------
     RobocovError
         If an argument cannot be used, or a controller fails.
+
+    See Also
+    --------
+    run : Simulate one run.
+    Scenario : Describes a run completely.
 
     Examples
     --------

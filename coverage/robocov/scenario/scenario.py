@@ -96,6 +96,12 @@ class Scenario:
     MapError
         If the map cannot be read.
 
+    See Also
+    --------
+    run : Simulate one run.
+    compare : Run several controllers in the same scenario.
+    Simulation : A run that is advanced step by step.
+
     Examples
     --------
     >>> import robocov as rc
@@ -553,6 +559,12 @@ def run(
     ------
     RobocovError
         If an argument cannot be used, or the controller fails.
+
+    See Also
+    --------
+    Scenario : Describes a run completely.
+    compare : Run several controllers in the same scenario.
+    Simulation : A run that is advanced step by step.
 
     Examples
     --------

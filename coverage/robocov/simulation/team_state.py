@@ -20,6 +20,10 @@ class TeamState:
     StartError
         If there is no robot, or an array does not have two numbers for each robot, or is not finite.
 
+    See Also
+    --------
+    Simulation : Starts from positions or from a state.
+
     Examples
     --------
     A simulation that starts with moving robots:

@@ -32,7 +32,37 @@ _AnyCells = TypeVar("_AnyCells", bound=Cells)
 
 @dataclass(eq=False, kw_only=True)
 class VoronoiPartition(Cells):
-    """The cells V_i of equation (1) within a convex region."""
+    """The cells V_i of equation (1) within a convex region.
+
+    Attributes
+    ----------
+    generators : (n, 2) array, m
+        The points to which the cells belong.
+    mass : (n,) array, m²
+        M of equation (2): the area of each cell if the density is 1.
+    centroid : (n, 2) array, m
+        C of equation (2). The centroid of an empty cell is its generator.
+    density : Density or None
+        φ of mass, centroid and moments; None stands for 1 everywhere.
+    triangulation : (2, 8 n + 4) int32 array or None
+        Triangulation from which the partition of slightly moved generators can start.
+
+    See Also
+    --------
+    partition : Compute the cells.
+    WeightedCells : Cells of robots of different speeds.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> square = rc.Region([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    >>> cells = rc.partition([[0.5, 1.0], [1.5, 1.0]], square)
+    >>> cells.centroid
+    array([[0.5, 1. ],
+           [1.5, 1. ]])
+    >>> [len(polygon) for polygon in cells.polygons]
+    [4, 4]
+    """
 
     _compute_edges: Callable[[], CellEdges]
 
@@ -91,6 +121,11 @@ def partition(
     InputError
         If the generators are not finite numbers of shape (n, 2), or neighbors or reported positions do not
         match them.
+
+    See Also
+    --------
+    partition_by_travel_time : Cells of robots of different speeds.
+    VoronoiPartition : Masses, centroids, polygons and neighbors of the cells.
 
     Examples
     --------

@@ -48,6 +48,38 @@ class WeightedCells(Cells):
     """The cells of robots of different speeds within a convex region.
 
     The centroid of a cell that is not convex may lie outside it. There is no triangulation.
+
+    Attributes
+    ----------
+    generators : (n, 2) array, m
+        The points to which the cells belong.
+    mass : (n,) array, m²
+        M of equation (2): the area of each cell if the density is 1.
+    centroid : (n, 2) array, m
+        C of equation (2). The centroid of an empty cell is its generator.
+    density : Density or None
+        φ of mass, centroid and moments; None stands for 1 everywhere.
+    triangulation : None
+        There is none.
+    speeds : (n,) array, m/s
+    pieces : (p, 7) array
+        The pieces of the boundaries, by cell; for the columns see `robocov.voronoi.arcs`.
+    region : Region
+
+    See Also
+    --------
+    partition_by_travel_time : Compute the cells.
+    VoronoiPartition : Cells of robots of equal speeds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> square = rc.Region([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    >>> positions = np.array([[0.5, 1.0], [1.5, 1.0]])
+    >>> cells = rc.partition_by_travel_time(positions, np.array([0.5, 1.0]), square)
+    >>> bool(cells.mass[0] < cells.mass[1]), round(float(cells.mass.sum()), 9)
+    (True, 4.0)
     """
 
     speeds: Array
@@ -133,6 +165,11 @@ def partition_by_travel_time(
     ------
     InputError
         See `partition`; also if the speeds are not n positive, finite numbers.
+
+    See Also
+    --------
+    partition : Cells of the points that are nearest to each robot.
+    WeightedCells : Masses, centroids and outlines of the cells.
 
     Examples
     --------

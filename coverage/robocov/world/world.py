@@ -76,6 +76,11 @@ class World:
     ParameterError
         If a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
 
+    See Also
+    --------
+    Simulation : A world with a controller and sensors.
+    RangeSensor : What robots sense of the obstacles.
+
     Notes
     -----
     In each step the controllers' forces, the viscous term of (28) and the kinematic limits are combined into
@@ -87,6 +92,17 @@ class World:
     some millimeters and in very acute corners by centimeters. Walls take precedence: where no space is left
     between a moving obstacle and a wall, the robot stays in front of the wall and the obstacle passes over
     it. Once there is space, the robot is pushed out on the nearest side.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import robocov as rc
+    >>> from robocov.world.obstacle_pieces import build_obstacles
+    >>> obstacles = build_obstacles(rc.load_map("square"))
+    >>> world = rc.World(obstacles, rc.Team.homogeneous(1), np.array([[1.0, 1.0]]))
+    >>> world.step(np.array([[1.0, 0.0]]), dt=0.02)
+    >>> world.velocities.round(4)
+    array([[0.0196, 0.    ]])
     """
 
     def __init__(
