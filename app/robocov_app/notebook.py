@@ -237,7 +237,7 @@ def plot_result(
     ParameterError
         If the axes or the theme cannot be used, or the result has no map.
     """
-    from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
+    from robocov_app.figures.coverage import DistanceSnapshot, plot_coverage, plot_distances
 
     _check_axes(axes)
     environment = result.environment
@@ -254,10 +254,10 @@ def plot_result(
         sites = finer_cost.sites
         result = finer_cost(result.positions)
     field = DistanceField(FieldLattice(sites), result)
-    moment = Moment(environment, team, field, environment.name, facts)
+    snapshot = DistanceSnapshot(environment, team, field, environment.name, facts)
     if axes is None:
-        return plot_coverage([], [moment], theme=theme, size=size).axes[-1]
-    plot_distances(moment, axes, theme)
+        return plot_coverage([], [snapshot], theme=theme, size=size).axes[-1]
+    plot_distances(snapshot, axes, theme)
     return axes
 
 

@@ -84,7 +84,7 @@ def draw_map(
     has_density : bool
         Whether the density is drawn.
     time : float, s
-        For obstacles that move.
+        Time at which moving obstacles are drawn.
     """
     if has_density and environment.density is not None and not environment.density.is_uniform:
         _draw_density(axes, environment, theme)
@@ -128,10 +128,13 @@ def _draw_moving_obstacle(
     axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme
 ) -> None:
     """Draw an obstacle that moves, its path, and an arrow in its direction."""
+    fill: Any = to_plot_color(theme.moving_obstacle)
     is_hollow = bool(obstacle.polygon.interiors)
+    if is_hollow:
+        fill = "none"
     shape = Polygon(
         np.asarray(obstacle.polygon.exterior.coords),
-        facecolor="none" if is_hollow else to_plot_color(theme.moving_obstacle),
+        facecolor=fill,
         edgecolor=to_plot_color(theme.obstacle_edge),
         linewidth=1.4,
         zorder=2.1,
@@ -232,7 +235,7 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
 def _draw_final_positions(
     axes: Axes, record: Record, hues: IntArray, theme: Theme, colors: ColorScheme
 ) -> dict[int, float]:
-    """Draw robots where they are at the end, and return the radius of each, points."""
+    """Draw the final positions of robots, and return the radius of each, points."""
     present = np.flatnonzero(record.present[-1])
     failed = record.present[-1] & ~record.working[-1]
     fills = []
@@ -277,7 +280,7 @@ def _draw_headings(
 def _draw_goals(
     axes: Axes, record: Record, centroids: Array, radii: Mapping[int, float], theme: Theme
 ) -> None:
-    """Draw the goals of working robots, as centroids if that is what they are."""
+    """Draw the goals of working robots, as centroids of their cells if all goals are centroids."""
     working = np.flatnonzero(record.working[-1])
     goals = record.goals[-1][working]
     is_centroid = are_centroids(goals, centroids)
@@ -353,7 +356,7 @@ def draw_robots(
 
 
 def _to_points(axes: Axes, positions: Array) -> Array:
-    """Return where (n, 2) positions, m, are drawn, in points of the page."""
+    """Convert (n, 2) positions, m, to points of the page."""
     axes.apply_aspect()
     return np.asarray(axes.transData.transform(positions)) * (POINTS_PER_INCH / axes.figure.dpi)
 
@@ -420,8 +423,8 @@ def build_map_handles(environment: Environment, theme: Theme, *, has_density: bo
             **_build_path_style(theme),
         )
         handles.append(square)
-    density = describe_density(environment) if has_density else ""
-    if density:
+    density = describe_density(environment)
+    if has_density and density:
         color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
         handles.append(Patch(facecolor=to_plot_color(color), linewidth=0.0, label=density))
     return handles
@@ -445,7 +448,9 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
     """Build the entries of the legend of a run, see `draw_run`."""
     robots = len(record.team)
     trail_color = choose_trail_colors(theme, list(range(robots)), colors)[0]
-    final_color = theme.final if colors == "paper" else theme.robots[0]
+    final_color = theme.robots[0]
+    if colors == "paper":
+        final_color = theme.final
     handles: list[Artist] = [
         Line2D([], [], label=legend.START, **_build_start_style(theme, _START_PT)),
         Line2D([], [], color=to_plot_color(trail_color), linewidth=1.6, label=legend.TRAJECTORY),

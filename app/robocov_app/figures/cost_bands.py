@@ -15,7 +15,7 @@ from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT
 
 _FULL_WEIGHT_WIDTH_PX = 700.0
-"""Width of a page from which on lines have their full width. They would fill a small page."""
+"""Minimum width of a page whose lines have their full width. On a smaller page they are thinner."""
 _SMALL_WEIGHT = 0.7
 _MARGINS = CurveMargins(left=44, top=44, bottom=50, right=30, max_right_fraction=1.0)
 _MAX_NAME_FRACTION = 0.5
@@ -59,12 +59,18 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
     matplotlib.figure.Figure
     """
     page = FigurePage(size, LIGHT, 1.0)
+    weight = 1.0
+    if page.size[0] < _FULL_WEIGHT_WIDTH_PX:
+        weight = _SMALL_WEIGHT
     curves = []
     quartile_bands: list[tuple[Array, Array] | None] = []
     for band in bands:
         low, middle, high = compute_quartiles(band.values)
         curves.append(_build_curve(page, band, middle, unit))
-        quartile_bands.append((low, high) if len(band.values) > 1 else None)
+        if len(band.values) > 1:
+            quartile_bands.append((low, high))
+        else:
+            quartile_bands.append(None)
     draw_curves(
         add_curve_axes(page, curves, _MARGINS, unit=unit),
         curves,
@@ -73,7 +79,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
         bands=quartile_bands,
         label=label,
         unit=unit,
-        weight=1.0 if page.size[0] >= _FULL_WEIGHT_WIDTH_PX else _SMALL_WEIGHT,
+        weight=weight,
     )
     return page.figure
 

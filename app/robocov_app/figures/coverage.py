@@ -1,4 +1,4 @@
-"""The coverage cost as one page: its curves, and maps of the distances that it is the mean of."""
+"""The coverage cost as one page: its curves, and maps of the distances to the nearest robot."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,12 +19,13 @@ from robocov_app.figures import arena
 from robocov_app.figures.curves import (
     DISTANCE,
     TIME,
-    WEIGHED,
+    WEIGHTED_DISTANCE,
     Curve,
     CurveMargins,
     add_curve_axes,
     draw_curves,
 )
+from robocov_app.figures.extent import Extent, enclose_maps
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, check_not_empty, to_plot_color
 from robocov_app.figures.runs import plot_cost
@@ -43,7 +44,7 @@ from robocov_app.render.distance_field import DistanceField
 DOTS_PER_PIXEL = 2
 """Dots of the image of a map for each pixel of the page."""
 MIN_SIZE_PX = (720, 400)
-"""Smallest page that has space for curves and maps. A smaller one has the curves alone."""
+"""Minimum size of a page with curves and maps. A smaller one has the curves alone."""
 DEFAULT_WIDTH_PX = 1500
 MAX_HEIGHT_PX = 2600
 MAX_MAP_HEIGHT_PX = 760
@@ -62,8 +63,8 @@ _CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=26)
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
-    """A team at one moment of a run.
+class DistanceSnapshot:
+    """A team at one time of a run, with the distances to its robots.
 
     Attributes
     ----------
@@ -94,8 +95,8 @@ class Moment:
         mean_distance: float,
         counted: IntArray | None = None,
         mean_time: float | None = None,
-    ) -> "Moment":
-        """Build the final moment of a run.
+    ) -> "DistanceSnapshot":
+        """Build the snapshot of the final positions of a run.
 
         Parameters
         ----------
@@ -109,55 +110,36 @@ class Moment:
 
         Returns
         -------
-        Moment
+        DistanceSnapshot
         """
         cost = format_cost(get_cost_name(record.environment), mean_distance, mean_time)
         # Three maps side by side leave little space.
         cost = cost.replace(", mean time", ", time")
         time = float(record.time[-1])
-        rows = np.arange(len(record.team)) if counted is None else counted
+        if counted is None:
+            counted = np.arange(len(record.team))
         return cls(
             environment=record.environment,
-            team=record.team[rows],
+            team=record.team[counted],
             field=field,
             title=record.label,
             facts=f"{cost} after {time:.1f} s".lstrip(),
-            numbers=tuple((rows + 1).tolist()),
+            numbers=tuple((counted + 1).tolist()),
             time=time,
         )
 
 
 @dataclass(frozen=True)
-class _Extent:
-    """Bounding box of several maps, m."""
-
-    low_x: float
-    low_y: float
-    high_x: float
-    high_y: float
-
-    @property
-    def aspect(self) -> float:
-        """Width by height."""
-        return (self.high_x - self.low_x) / (self.high_y - self.low_y)
-
-    @property
-    def width(self) -> float:
-        """Width, m."""
-        return self.high_x - self.low_x
-
-
-@dataclass(frozen=True)
 class _Arrangement:
-    """Positions of the parts of a page, px.
+    """Positions of the elements of a page, px.
 
     Attributes
     ----------
     curves, maps : PageBox
     bar_row : float
-        Middle of the scale of colors.
+        Vertical middle of the color scale.
     bar_min_left : float
-        Nothing of the scale of colors is to the left of this.
+        Left limit of the color scale and its label.
     is_below : bool
         Whether the maps are below the curves.
     """
@@ -172,20 +154,20 @@ class _Arrangement:
 @plain_style()
 def plot_coverage(
     curves: Sequence[Curve],
-    moments: Sequence[Moment],
+    snapshots: Sequence[DistanceSnapshot],
     *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost",
     times: Sequence[Curve] = (),
 ) -> Figure:
-    """Plot cost curves, and maps of the distance to the nearest robot with the same scale of colors.
+    """Plot cost curves, and maps of the distance to the nearest robot with a common color scale.
 
     Parameters
     ----------
     curves : sequence of Curve
         Mean distances, m; may be empty.
-    moments : sequence of Moment
+    snapshots : sequence of DistanceSnapshot
     theme : Theme or str
     size : (width, height), px, optional
         Size of the page. If it is smaller than `MIN_SIZE_PX`, the page has the curves alone.
@@ -200,25 +182,29 @@ def plot_coverage(
     Raises
     ------
     ParameterError
-        If there are no moments.
+        If there are no snapshots.
     """
-    check_not_empty("moments", moments)
+    check_not_empty("snapshots", snapshots)
     if curves and size is not None and (size[0] < MIN_SIZE_PX[0] or size[1] < MIN_SIZE_PX[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
     theme = get_theme(theme)
-    extent = _enclose(moments)
-    limit = _choose_limit(moments)
-    handles = _build_handles(moments, theme)
+    extent = enclose_maps(snapshot.environment for snapshot in snapshots)
+    limit = _choose_limit(snapshots)
+    handles = _build_handles(snapshots, theme)
     page, arrangement = _create_page(
-        theme, size, extent, handles, map_count=len(moments), has_curves=bool(curves)
+        theme, size, extent, handles, map_count=len(snapshots), has_curves=bool(curves)
     )
     bar_left = _draw_bar(page, limit, arrangement)
-    title_end = page.size[0] if arrangement.is_below else bar_left
+    title_end: float = page.size[0]
+    if not arrangement.is_below:
+        title_end = bar_left
     page.write_title(title, 26, title_end - 2 * page.margin)
     if curves:
-        has_density = any(describe_density(moment.environment) for moment in moments)
-        _draw_curves(page, curves, times, arrangement.curves, WEIGHED if has_density else DISTANCE)
-    boxes = _draw_maps(page, moments, extent, limit, arrangement.maps)
+        distance_label = DISTANCE
+        if any(describe_density(snapshot.environment) for snapshot in snapshots):
+            distance_label = WEIGHTED_DISTANCE
+        _draw_curves(page, curves, times, arrangement.curves, distance_label)
+    boxes = _draw_maps(page, snapshots, extent, limit, arrangement.maps)
     page.draw_footer(handles, boxes, boxes[0][2] / extent.width, arrangement.maps[0])
     return page.figure
 
@@ -226,7 +212,7 @@ def plot_coverage(
 def _create_page(
     theme: Theme,
     size: tuple[int, int] | None,
-    extent: _Extent,
+    extent: Extent,
     handles: Sequence[Artist],
     *,
     map_count: int,
@@ -235,8 +221,10 @@ def _create_page(
     """Create a page of a size, or one as high as its maps need, and arrange curves and maps on it."""
     is_beside = has_curves and map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE
     is_below = has_curves and not is_beside
-    scale = _DEFAULT_SCALE if size is None else None
-    page = FigurePage(size or (DEFAULT_WIDTH_PX, 1000), theme, scale)
+    if size is None:
+        page = FigurePage((DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE)
+    else:
+        page = FigurePage(size, theme)
     maps_fraction = 0.5 if is_beside else 1.0
     footer_start = (1.0 - maps_fraction) * page.size[0] + page.margin
     footer_height = page.measure_footer(handles, footer_start)
@@ -249,16 +237,8 @@ def _create_page(
     return page, _arrange_beside(page, maps_fraction, footer_height, has_curves=has_curves)
 
 
-def _enclose(moments: Sequence[Moment]) -> _Extent:
-    """Return the bounding box of all maps."""
-    bounds = np.array([moment.environment.region.bounds for moment in moments])
-    low_x, low_y = bounds[:, :2].min(axis=0).tolist()
-    high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
-    return _Extent(low_x, low_y, high_x, high_y)
-
-
 def _choose_height(
-    page: FigurePage, extent: _Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
+    page: FigurePage, extent: Extent, maps: int, maps_width: float, footer_height: float, *, is_below: bool
 ) -> int:
     """Return the height of a page of the default width, px."""
     scale = page.scale
@@ -269,8 +249,12 @@ def _choose_height(
     slot_height = min(slot_width / extent.aspect, MAX_MAP_HEIGHT_PX) + (_CAPTION_HEIGHT + _PANEL_GAP) * scale
     rows = -(-maps // columns)
     maps_height = rows * slot_height - _PANEL_GAP * scale
-    head_height = (2 * _HEAD + _CURVES_HEIGHT) * scale if is_below else _HEAD * scale
-    min_height = 480 * scale if maps == 1 and extent.aspect < MAX_ASPECT_BESIDE else 320
+    head_height = _HEAD * scale
+    if is_below:
+        head_height = (2 * _HEAD + _CURVES_HEIGHT) * scale
+    min_height = 320.0
+    if maps == 1 and extent.aspect < MAX_ASPECT_BESIDE:
+        min_height = 480 * scale
     return int(np.clip(head_height + maps_height + footer_height, min_height, MAX_HEIGHT_PX))
 
 
@@ -313,25 +297,25 @@ def _arrange_beside(
 
 
 @plain_style()
-def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
-    """Plot distances on axes of a notebook, which get ticks in meters and a scale of colors.
+def plot_distances(snapshot: DistanceSnapshot, axes: Axes, theme: Theme | str = LIGHT) -> None:
+    """Plot distances on axes of a notebook, which get ticks in meters and a color scale.
 
     Parameters
     ----------
-    moment : Moment
+    snapshot : DistanceSnapshot
     axes : matplotlib.axes.Axes
     theme : Theme or str
     """
     theme = get_theme(theme)
-    limit = _choose_limit([moment])
-    arena.set_meter_axes(axes, moment.environment, theme)
+    limit = _choose_limit([snapshot])
+    arena.set_meter_axes(axes, snapshot.environment, theme)
     axes.apply_aspect()
     extent = axes.get_window_extent()
     scale = axes.figure.dpi / 100
     # Small axes may be saved large.
     enlargement = max(MIN_SIZE_PX[0] / extent.width, 1.0)
     box = (0.0, 0.0, enlargement * extent.width, enlargement * extent.height)
-    _draw_moment(axes, moment, limit, theme, box=box, scale=enlargement * scale)
+    _draw_snapshot(axes, snapshot, limit, theme, box=box, scale=enlargement * scale)
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
     heat = theme.build_heat_table(256)[:, None]
@@ -341,26 +325,28 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     bar.yaxis.set_label_position("right")
 
 
-def _choose_limit(moments: Sequence[Moment]) -> float:
-    """Return the end of the scale of colors, m."""
-    finite = [moment.field.max_distance for moment in moments if np.isfinite(moment.field.max_distance)]
+def _choose_limit(snapshots: Sequence[DistanceSnapshot]) -> float:
+    """Return the end of the color scale, m."""
+    finite = [
+        snapshot.field.max_distance for snapshot in snapshots if np.isfinite(snapshot.field.max_distance)
+    ]
     return choose_color_limit(max(finite, default=1.0))
 
 
-def _build_handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
+def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[Artist]:
     """Build the entries of the legend."""
     border = Line2D(
         [], [], color=to_plot_color(theme.geodesic_border), linewidth=1.6, label=legend.GEODESIC_BORDER
     )
     handles: list[Artist] = [arena.build_robot_handle(legend.ROBOT, theme.final, theme), border]
     legends = [
-        arena.build_map_handles(moment.environment, theme, has_density=False)[1:] for moment in moments
+        arena.build_map_handles(snapshot.environment, theme, has_density=False)[1:] for snapshot in snapshots
     ]
     for handle in legend.merge_legends(legends, arena.get_label):
         if arena.get_label(handle) == legend.UNKNOWN_OBSTACLE:
             handle.set_label(legend.OBSTACLE)
         handles.append(handle)
-    if any((moment.field.result.owner < 0).any() for moment in moments):
+    if any((snapshot.field.result.owner < 0).any() for snapshot in snapshots):
         unreached = Patch(
             facecolor=to_plot_color(theme.unreached),
             edgecolor=to_plot_color(theme.obstacle_edge),
@@ -394,27 +380,27 @@ def _draw_curve_panel(page: FigurePage, curves: Sequence[Curve], box: PageBox, l
 
 
 def _draw_maps(
-    page: FigurePage, moments: Sequence[Moment], extent: _Extent, limit: float, room: PageBox
+    page: FigurePage, snapshots: Sequence[DistanceSnapshot], extent: Extent, limit: float, area: PageBox
 ) -> list[PageBox]:
-    """Draw the map of each moment below its title, and return their boxes, px."""
+    """Draw the map of each snapshot below its title, and return their boxes, px."""
     scale = page.scale
-    panels = _arrange_panels(room, len(moments), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
-    for moment, (box, caption_width) in zip(moments, panels, strict=True):
+    panels = _arrange_panels(area, len(snapshots), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
+    for snapshot, (box, caption_width) in zip(snapshots, panels, strict=True):
         axes = page.add_map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
-        _draw_moment(axes, moment, limit, page.theme, box=box, scale=scale)
+        _draw_snapshot(axes, snapshot, limit, page.theme, box=box, scale=scale)
         left, top, _, _ = box
         title_row = top - 35 * scale
         facts_row = top - 14 * scale
-        page.write(moment.title, left, title_row, points=TEXT + 1.5, bold=True, max_width=caption_width)
-        page.write(moment.facts, left, facts_row, color=page.theme.faint, max_width=caption_width)
+        page.write(snapshot.title, left, title_row, points=TEXT + 1.5, bold=True, max_width=caption_width)
+        page.write(snapshot.facts, left, facts_row, color=page.theme.faint, max_width=caption_width)
     return [box for box, _ in panels]
 
 
 def _arrange_panels(
-    room: PageBox, count: int, aspect: float, caption_height: float, gap: float
+    area: PageBox, count: int, aspect: float, caption_height: float, gap: float
 ) -> list[tuple[PageBox, float]]:
-    """Return the largest equal boxes in a room, with the width of the captions above them, px."""
-    left, top, width, height = room
+    """Return the largest equal boxes in an area, with the width of the captions above them, px."""
+    left, top, width, height = area
     panel_width = 0.0
     columns = 1
     for candidate in range(1, count + 1):
@@ -427,7 +413,9 @@ def _arrange_panels(
             columns = candidate
     slot = (width - (columns - 1) * gap) / columns
     panel_height = panel_width / aspect
-    indent = 0.0 if count > 1 else (slot - panel_width) / 2
+    indent = 0.0
+    if count == 1:
+        indent = (slot - panel_width) / 2
     panels = []
     for number in range(count):
         row, column = divmod(number, columns)
@@ -437,8 +425,8 @@ def _arrange_panels(
     return panels
 
 
-def _draw_moment(
-    axes: Axes, moment: Moment, limit: float, theme: Theme, *, box: PageBox, scale: float
+def _draw_snapshot(
+    axes: Axes, snapshot: DistanceSnapshot, limit: float, theme: Theme, *, box: PageBox, scale: float
 ) -> None:
     """Draw distances, the borders of geodesic cells, the map and the robots in axes of a box, px."""
     low_x, high_x = axes.get_xlim()
@@ -448,7 +436,9 @@ def _draw_moment(
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
     zoom = DOTS_PER_PIXEL * box[2] / (high_x - low_x)
-    pixels = _paint_distances(moment.field, x, y, limit, theme, zoom=zoom, border_width=_BORDER_WIDTH * scale)
+    pixels = _paint_distances(
+        snapshot.field, x, y, limit, theme, zoom=zoom, border_width=_BORDER_WIDTH * scale
+    )
     image = axes.imshow(
         pixels,
         extent=(low_x, high_x, low_y, high_y),
@@ -456,11 +446,11 @@ def _draw_moment(
         interpolation="antialiased",
         zorder=0,
     )
-    image.set_clip_path(Polygon(moment.environment.region.vertices, transform=axes.transData))
-    arena.draw_map(axes, moment.environment, theme, has_density=False, time=moment.time)
-    positions = moment.field.result.positions
+    image.set_clip_path(Polygon(snapshot.environment.region.vertices, transform=axes.transData))
+    arena.draw_map(axes, snapshot.environment, theme, has_density=False, time=snapshot.time)
+    positions = snapshot.field.result.positions
     fills = [theme.final] * len(positions)
-    arena.draw_robots(axes, positions, moment.team.radius, fills, theme, numbers=moment.numbers)
+    arena.draw_robots(axes, positions, snapshot.team.radius, fills, theme, numbers=snapshot.numbers)
 
 
 def _paint_distances(
@@ -485,7 +475,7 @@ def _paint_distances(
 
 
 def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> float:
-    """Draw the scale of colors above the right edge of the maps.
+    """Draw the color scale above the right edge of the maps.
 
     Its label is left out if there is not enough space.
 
@@ -499,7 +489,7 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> floa
     Returns
     -------
     float
-        Where the scale, or its label, starts, px.
+        Left end of the scale and its label, px.
     """
     maps = arrangement.maps
     middle = arrangement.bar_row

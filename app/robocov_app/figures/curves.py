@@ -29,14 +29,14 @@ Curve: TypeAlias = tuple[str, str, Array, Array]
 
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"
-WEIGHED = "mean distance to the nearest robot, weighted by φ (m)"
+WEIGHTED_DISTANCE = "mean distance to the nearest robot, weighted by φ (m)"
 
 _MIN_EXPONENT_VALUE = 1e7
 _MIN_THOUSANDS_VALUE = 1e4
 _MIN_SHORT_VALUE = 10.0
-"""Values from here on have four digits instead of three decimals."""
+"""Larger values have four digits instead of three decimals."""
 _MAX_WIDENED_LINES = 3
-"""Number of lines on top of others from which on a line gets no wider."""
+"""A line is widened for at most this number of lines on top of it."""
 _LINE_WIDTH_PT = 2.2
 _EXTRA_LINE_WIDTH_PT = 0.9
 """Additional width of a line for each one on top of it, so that equal curves can be seen."""
@@ -45,7 +45,7 @@ _EXTRA_MARK_PT = 2.0
 _LABEL_LINE_HEIGHT = 1.45
 """Height of a line of labels, in text sizes."""
 _MIN_MOVED_FRACTION = 0.3
-"""Fraction of the height of a line from which on a moved label is connected with its curve."""
+"""A label that was moved by more than this fraction of its height is connected with its curve."""
 # Horizontal distances from the axes.
 _CONNECTION_START_PT = 4
 _CONNECTION_END_PT = 10
@@ -139,7 +139,7 @@ def add_curve_axes(
         At least one.
     margins : CurveMargins
     box : PageBox, optional
-        Part of the page for the axes and all their labels. By default the whole page.
+        Area of the page for the axes and all their labels. By default the whole page.
     unit : str
         Of the values at the ends, as for `draw_curves`.
 
@@ -232,9 +232,10 @@ def _draw_line(
     extra = min(lines_above, _MAX_WIDENED_LINES)
     width = weight * (_LINE_WIDTH_PT + _EXTRA_LINE_WIDTH_PT * extra)
     dashes = style.dashes
-    if not isinstance(dashes, str):
+    dash_lengths = style.list_dash_lengths()
+    if dash_lengths:
         # Dashes are given in line widths. Those of wide lines are as long as those of others.
-        dashes = 0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dashes[1])
+        dashes = 0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dash_lengths)
     axes.plot(times, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
     last = int(np.nonzero(np.isfinite(values))[0][-1])
     axes.plot(

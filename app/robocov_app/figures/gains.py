@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FixedLocator, Locator, LogLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, format_value
@@ -26,7 +26,7 @@ MAX_NAME_CHARS = 28
 MAX_DRAWN_RUNS = 600
 """Maximum number of points of a controller that are drawn."""
 _MIN_LOG_RATIO = 8.0
-"""Ratio of the highest value to the lowest from which on an axis is logarithmic."""
+"""Minimum ratio of the highest value to the lowest for a logarithmic axis."""
 _MAX_LEVEL_TICKS = 8
 """Maximum number of values of a gain that have a tick each."""
 _MARGIN_FRACTION = 0.07
@@ -93,8 +93,8 @@ def plot_gains(
     label : str
         Of the axis of values.
     choices : sequence of str
-        Texts that the gain may be. If it is a number, a line joins the medians; the axis is logarithmic for a
-        wide range, and no limit is at its right end.
+        Values of a gain that is a text. For a number, a line connects the medians; the axis is logarithmic
+        for a wide range, and "none", for no limit, is at its right end.
 
     Returns
     -------
@@ -211,8 +211,9 @@ def _set_number_axis(axes: Axes, gains: Array) -> float | None:
         end = _set_linear_limits(axes, low, high, has_unlimited=has_unlimited)
     ticks: list[float] = levels.tolist()
     if len(levels) > _MAX_LEVEL_TICKS:
-        linear_locator = MaxNLocator(6, steps=[1, 2, 5, 10])
-        locator = LogLocator(subs=(1.0, 3.0)) if is_logarithmic else linear_locator
+        locator: Locator = MaxNLocator(6, steps=[1, 2, 5, 10])
+        if is_logarithmic:
+            locator = LogLocator(subs=(1.0, 3.0))
         ticks = [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
     labels = [format_value(value, digits=4) for value in ticks]
     if has_unlimited:
@@ -221,22 +222,31 @@ def _set_number_axis(axes: Axes, gains: Array) -> float | None:
     axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels(labels)
-    return end if has_unlimited else None
+    if not has_unlimited:
+        return None
+    return end
 
 
 def _set_logarithmic_limits(axes: Axes, low: float, high: float, *, has_unlimited: bool) -> float:
     """Set the limits of a logarithmic axis, and return its last position."""
     axes.set_xscale("log")
     margin = (high / low) ** _MARGIN_FRACTION
-    end = high * margin**3 if has_unlimited else high
+    end = high
+    if has_unlimited:
+        end *= margin**3
     axes.set_xlim(low / margin, end * margin)
     return end
 
 
 def _set_linear_limits(axes: Axes, low: float, high: float, *, has_unlimited: bool) -> float:
     """Set the limits of a linear axis, and return its last position."""
-    margin = _MARGIN_FRACTION * (high - low) if high > low else 0.5 * max(abs(high), 1.0)
-    end = high + 3 * margin if has_unlimited else high
+    if high > low:
+        margin = _MARGIN_FRACTION * (high - low)
+    else:
+        margin = 0.5 * max(abs(high), 1.0)
+    end = high
+    if has_unlimited:
+        end += 3 * margin
     axes.set_xlim(low - margin, end + margin)
     return end
 

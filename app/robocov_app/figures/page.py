@@ -72,7 +72,7 @@ def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal
     x, y : str
         Labels. That of the vertical axis is horizontal, above the axis.
     grid : {"x", "y", ""}
-        Axis at whose ticks there are lines.
+        Axis whose ticks have grid lines.
     """
     ink = to_plot_color(theme.ink)
     faint = to_plot_color(theme.faint)
@@ -92,7 +92,7 @@ def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal
 
 
 def set_even_ticks(axis: Axis, max_intervals: int) -> None:
-    """Give an axis round ticks in at most some intervals, which follow when a notebook zooms."""
+    """Give an axis round ticks with a maximum number of intervals; they adapt when a notebook zooms."""
     axis.set_major_locator(MaxNLocator(nbins=max_intervals, steps=list(TICK_FACTORS)))
     axis.set_major_formatter("{x:g}")
 
@@ -106,10 +106,15 @@ def set_value_axis(axis: Any, values: Array, *, margin: float = VALUE_MARGIN, or
     set_even_ticks(axis, MAX_VALUE_INTERVALS)
 
 
-class PageAxes(Axes):
-    """Axes of a page, as which notebooks display the page.
+def _get_font_weight(bold: bool) -> str:
+    """Return matplotlib's name of the weight of a text."""
+    return "bold" if bold else "normal"
 
-    A figure without pyplot would not be displayed.
+
+class PageAxes(Axes):
+    """Axes of a page. Notebooks display the whole page for them.
+
+    They would not display a figure that was made without pyplot.
     """
 
     def _repr_png_(self) -> tuple[bytes, dict[str, Any]]:
@@ -202,7 +207,7 @@ class FigurePage:
         return self.figure.add_axes(rectangle, axes_class=PageAxes)
 
     def add_map_axes(self, box: PageBox, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
-        """Add axes without ticks that show a part of the world, m, in a box of the same aspect."""
+        """Add axes without ticks that show a rectangle of the world, m, in a box of the same aspect."""
         axes = self.add_axes(box)
         axes.set(xlim=(low_x, high_x), ylim=(low_y, high_y))
         axes.set_axis_off()
@@ -219,7 +224,8 @@ class FigurePage:
         max_width : float, px, optional
             By default that between the margins.
         """
-        max_width = self.content_width if max_width is None else max_width
+        if max_width is None:
+            max_width = self.content_width
         self.write(text, self.margin, y * self.scale, points=TITLE, bold=True, max_width=max_width)
 
     def write(
@@ -249,10 +255,16 @@ class FigurePage:
             A longer text is shortened.
         align : {"left", "right", "center"}
         """
-        style: Any = {"fontsize": points, "fontweight": "bold" if bold else "normal", "ha": align}
         text_x, text_y = self.to_figure(x, y)
         artist = self.figure.text(
-            text_x, text_y, text, va="center", color=to_plot_color(color or self.theme.ink), **style
+            text_x,
+            text_y,
+            text,
+            color=to_plot_color(color or self.theme.ink),
+            fontsize=points,
+            fontweight=_get_font_weight(bold),
+            ha=align,
+            va="center",
         )
         if max_width is None:
             return
@@ -263,7 +275,7 @@ class FigurePage:
 
     def measure_text(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
         """Return the width of a text, px."""
-        artist = self.figure.text(0, 0, text, fontsize=points, fontweight="bold" if bold else "normal")
+        artist = self.figure.text(0, 0, text, fontsize=points, fontweight=_get_font_weight(bold))
         width = self._measure_width(artist)
         artist.remove()
         return width

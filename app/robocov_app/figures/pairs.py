@@ -23,7 +23,7 @@ from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 
 _MAX_INTERVAL_FACTOR = 1.5
-"""An axis of ratios extends at most by this factor beyond the ratios for the ends of intervals."""
+"""Maximum factor by which the ends of intervals extend an axis beyond the ratios."""
 _TICKS = (
     *(0.01, 0.02, 0.05),
     *(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
@@ -102,7 +102,7 @@ def _draw_interval(axes: Axes, interval: Interval, row: float, theme: Theme) -> 
 def _list_axis_values(pairs: Sequence[Pairs]) -> Array:
     """Return the values that an axis shows: all ratios, and the ends of intervals.
 
-    An interval of two or three values may be extremely wide. It leaves the axis then.
+    An interval of two or three values may be extremely wide. It is cut off at the limits of the axis then.
     """
     ratios = np.concatenate([row_pairs.ratios for row_pairs in pairs])
     ends = np.array([(row_pairs.interval.low, row_pairs.interval.high) for row_pairs in pairs]).ravel()

@@ -5,7 +5,7 @@ their rows.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ from robocov_app.look.theme import Theme
 MAX_POINTS = 250
 """Maximum number of points of a sample that are drawn; of more, ones with evenly distributed ranks."""
 MIN_BOX_VALUES = 5
-"""Number of values from which on a box is more informative than its points."""
+"""Minimum number of values for a box. Of fewer values, the points alone are more informative."""
 HALF_BOX_HEIGHT = 0.27
 _ROW_HEIGHT_PX = 30.0
 _HEADING_HEIGHT_PX = 26.0
@@ -106,7 +106,7 @@ def create_row_axes(
     -------
     axes : matplotlib.axes.Axes
     short_names : list of str
-        The names, shortened where they do not fit to the left of the axes.
+        The names, shortened if they do not fit to the left of the axes.
     """
     page = FigurePage((width, 200), theme, scale)
     max_name_width = _MAX_NAME_FRACTION * width
@@ -156,11 +156,14 @@ def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, th
     if len(values) > MAX_POINTS:
         ranks = np.rint(np.linspace(0, len(values) - 1, MAX_POINTS)).astype(int)
         values = values[ranks]
-    look: dict[str, Any] = {"markersize": _POINT_PT, "alpha": _POINT_OPACITY}
-    offsets = _scatter(len(values))
     if len(values) < MIN_BOX_VALUES:
-        look = {"markersize": _SINGLE_POINT_PT, "alpha": 1.0}
         offsets = np.zeros(len(values))
+        size = _SINGLE_POINT_PT
+        opacity = 1.0
+    else:
+        offsets = _scatter(len(values))
+        size = _POINT_PT
+        opacity = _POINT_OPACITY
     axes.plot(
         values,
         row + offsets,
@@ -169,12 +172,13 @@ def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, th
         zorder=3.5,
         markeredgecolor=to_plot_color(theme.background),
         markeredgewidth=0.4,
-        **look,
+        markersize=size,
+        alpha=opacity,
     )
 
 
 def _scatter(count: int) -> Array:
-    """Return vertical offsets of points by the sequence of van der Corput, in which neighbors differ much."""
+    """Return vertical offsets of points from the van der Corput sequence, whose neighbors differ widely."""
     bits = np.arange(1, MAX_POINTS.bit_length() + 1)
     digits = np.arange(1, count + 1)[:, None] >> (bits - 1) & 1
     fractions = digits @ 0.5**bits

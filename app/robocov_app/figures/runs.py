@@ -16,8 +16,18 @@ from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures import arena
 from robocov_app.figures.curves import Curve, CurveMargins, add_curve_axes, draw_curves
+from robocov_app.figures.extent import enclose_maps
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, TEXT, TITLE, FigurePage, PageBox, check_not_empty, get_figure
+from robocov_app.figures.page import (
+    HEADING,
+    TEXT,
+    TITLE,
+    FigurePage,
+    PageBox,
+    PagePanel,
+    check_not_empty,
+    get_figure,
+)
 from robocov_app.look.hues import ColorScheme
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -41,6 +51,8 @@ _TWO_LINE_CAPTION = 54
 _CAPTION_GAP = 16
 _COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=40)
 """Space around the curves of a page for curves alone: its title is above them."""
+_MAP_HEAD = 58
+"""Space above the map of a page at scale 1, px."""
 _METRIC_MARGINS = CurveMargins(left=44, top=36, bottom=48, right=24, max_right_fraction=0.5)
 
 
@@ -131,11 +143,11 @@ class _Captions:
     Attributes
     ----------
     shared : str
-        What all runs have in common, for the title of the page.
+        Facts that all runs have in common, for the title of the page.
     names, facts : list of str
-        Name of each run, and what is true of it alone.
+        Name of each run, and the facts in which it differs from others.
     name_widths, facts_widths : list of float, px
-        Widths of these.
+        Widths of the names and of the facts.
     gap : float, px
         Minimum space between a name and the facts in one line.
     """
@@ -185,50 +197,105 @@ def plot_comparison(
     matplotlib.figure.Figure
     """
     theme = get_theme(theme)
-    bounds = np.array([record.environment.region.bounds for record in records])
-    low_x, low_y = bounds[:, :2].min(axis=0).tolist()
-    high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
-    aspect = (high_x - low_x) / (high_y - low_y)
+    extent = enclose_maps(record.environment for record in records)
     legends = [arena.build_run_handles(record, theme, colors) for record in records]
     handles = merge_legends(legends, arena.get_label)
-    page = FigurePage(size or (_SHEET_WIDTH_PX, 1000), theme, _SHEET_SCALE if size is None else None)
-    scale = page.scale
-    captions = _build_captions(page, records, mean_distances, mean_times)
-    top = (50 if captions.shared else 8) * scale
-    columns = _choose_columns(page, captions, aspect, top)
-    slot = (page.size[0] - page.margin) / columns - page.margin
-    is_one_line = captions.max_joined_width <= slot
-    above = (_ONE_LINE_CAPTION if is_one_line else _TWO_LINE_CAPTION) * scale
     if size is None:
-        rows = -(-len(records) // columns)
-        panels_height = rows * (above + slot / aspect + _PANEL_GAP * scale)
-        height = top + panels_height + page.measure_footer(handles)
-        height = np.clip(height, _MIN_HEIGHT_PX, _MAX_COMPARISON_HEIGHT_PX)
-        page = FigurePage((page.size[0], int(height)), theme, _SHEET_SCALE)
-    caption_width = captions.max_joined_width if is_one_line else captions.max_width
+        page = FigurePage((_SHEET_WIDTH_PX, 1000), theme, _SHEET_SCALE)
+    else:
+        page = FigurePage(size, theme)
+    captions = _build_captions(page, records, mean_distances, mean_times)
+    layout = _arrange_comparison(page, captions, extent.aspect)
+    if size is None:
+        height = layout.compute_page_height(len(records), extent.aspect, page.measure_footer(handles))
+        page = FigurePage((page.size[0], height), theme, _SHEET_SCALE)
     panels = page.arrange_panels(
         len(records),
-        columns,
-        aspect=aspect,
-        caption_width=caption_width,
-        caption_height=above,
-        top=top,
+        layout.columns,
+        aspect=extent.aspect,
+        caption_width=layout.caption_width,
+        caption_height=layout.caption_height,
+        top=layout.top,
         bottom=page.measure_footer(handles),
     )
-    for number, (box, room) in enumerate(panels):
-        axes = page.add_map_axes(box, low_x, low_y, high_x, high_y)
+    for number, panel in enumerate(panels):
+        axes = page.add_map_axes(panel.box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         arena.draw_run(axes, records[number], theme, colors)
-        if is_one_line:
-            right = box[0] + max(box[2], min(room, caption_width))
-            _write_one_line(page, captions, number, box, right)
+        if layout.is_one_line:
+            _write_one_line(page, captions, number, panel, layout.caption_width)
         else:
-            _write_two_lines(page, captions, number, box, room)
+            _write_two_lines(page, captions, number, panel)
     first_box = panels[0].box
-    _write_heading(page, captions.shared, first_box, above + 20 * scale)
-    min_width = panels[0].caption_width if is_one_line else 0.0
-    footer_boxes = [(x, y, max(width, min_width), height) for (x, y, width, height), _ in panels]
-    page.draw_footer(handles, footer_boxes, first_box[2] / (high_x - low_x))
+    _write_heading(page, captions.shared, first_box, layout.caption_height + 20 * page.scale)
+    footer_boxes = [_widen_box(panel) if layout.is_one_line else panel.box for panel in panels]
+    page.draw_footer(handles, footer_boxes, first_box[2] / extent.width)
     return page.figure
+
+
+@dataclass(frozen=True)
+class _ComparisonLayout:
+    """Arrangement of the panels of a comparison, px.
+
+    Attributes
+    ----------
+    top : float
+        Space above all panels, for the heading.
+    columns : int
+    column_width : float
+    is_one_line : bool
+        Whether the name of a run and its facts are in one line.
+    caption_width, caption_height : float
+        Size of the lines above a panel.
+    gap : float
+        Space below each panel.
+    """
+
+    top: float
+    columns: int
+    column_width: float
+    is_one_line: bool
+    caption_width: float
+    caption_height: float
+    gap: float
+
+    def compute_page_height(self, count: int, aspect: float, footer_height: float) -> int:
+        """Return the height of a page for a number of panels of an aspect."""
+        rows = -(-count // self.columns)
+        panels_height = rows * (self.caption_height + self.column_width / aspect + self.gap)
+        height = self.top + panels_height + footer_height
+        return int(np.clip(height, _MIN_HEIGHT_PX, _MAX_COMPARISON_HEIGHT_PX))
+
+
+def _arrange_comparison(page: FigurePage, captions: _Captions, aspect: float) -> _ComparisonLayout:
+    """Arrange panels of an aspect in columns, with their captions in one line if they fit."""
+    scale = page.scale
+    top = 8 * scale
+    if captions.shared:
+        top = 50 * scale
+    columns = _choose_columns(page, captions, aspect, top)
+    column_width = (page.size[0] - page.margin) / columns - page.margin
+    is_one_line = captions.max_joined_width <= column_width
+    if is_one_line:
+        caption_width = captions.max_joined_width
+        caption_height = _ONE_LINE_CAPTION * scale
+    else:
+        caption_width = captions.max_width
+        caption_height = _TWO_LINE_CAPTION * scale
+    return _ComparisonLayout(
+        top=top,
+        columns=columns,
+        column_width=column_width,
+        is_one_line=is_one_line,
+        caption_width=caption_width,
+        caption_height=caption_height,
+        gap=_PANEL_GAP * scale,
+    )
+
+
+def _widen_box(panel: PagePanel) -> PageBox:
+    """Return the box of a panel, at least as wide as its caption."""
+    left, top, width, height = panel.box
+    return left, top, max(width, panel.caption_width), height
 
 
 def _write_heading(page: FigurePage, text: str, first_box: PageBox, up: float) -> None:
@@ -244,7 +311,7 @@ def _build_captions(
     mean_distances: Sequence[float | None] | None,
     mean_times: Sequence[float | None] | None,
 ) -> _Captions:
-    """Build the lines above the panels: what all runs have in common is not repeated."""
+    """Build the lines above the panels. Facts that all runs have in common are not repeated."""
     unknown = [None] * len(records)
     costs = [
         _format_cost(record, distance, time)
@@ -255,41 +322,47 @@ def _build_captions(
     facts = [(record.environment.name, _format_robots(record), _format_time(record)) for record in records]
     is_shared = [len(set(column)) == 1 for column in zip(*facts, strict=True)]
     shared = [fact for fact, is_same in zip(facts[0], is_shared, strict=True) if is_same]
-    own_facts = []
+    different_facts = []
     for cost, row in zip(costs, facts, strict=True):
         different = [fact for fact, is_same in zip(row, is_shared, strict=True) if not is_same]
-        own_facts.append(_join_facts([cost, *different]))
+        different_facts.append(_join_facts([cost, *different]))
     return _Captions(
         shared=_join_facts(shared),
         names=[record.label for record in records],
-        facts=own_facts,
+        facts=different_facts,
         name_widths=[page.measure_text(record.label, points=TITLE, bold=True) for record in records],
-        facts_widths=[page.measure_text(text) for text in own_facts],
+        facts_widths=[page.measure_text(text) for text in different_facts],
         gap=_CAPTION_GAP * page.scale,
     )
 
 
 def _choose_columns(page: FigurePage, captions: _Captions, aspect: float, top: float) -> int:
-    """Return how many panels are side by side: as large as possible, with space for their captions."""
+    """Return the number of columns that makes panels as large as possible, with space for their captions."""
     space = (page.size[0], page.size[1] - 2 * top)
     best = choose_column_count(len(captions.names), aspect, space, row_margin=_TWO_LINE_CAPTION * page.scale)
-    fitting = (page.size[0] - page.margin) / (captions.max_width + page.margin)
-    return max(min(best, int(fitting)), 1)
+    max_columns = int((page.size[0] - page.margin) / (captions.max_width + page.margin))
+    return max(min(best, max_columns), 1)
 
 
-def _write_one_line(page: FigurePage, captions: _Captions, number: int, box: PageBox, right: float) -> None:
+def _write_one_line(
+    page: FigurePage, captions: _Captions, number: int, panel: PagePanel, width: float
+) -> None:
     """Write the name of a run at the left above its panel, and its facts at the right."""
-    row = box[1] - 16 * page.scale
-    page.write(captions.names[number], box[0], row, points=TITLE, bold=True)
+    left, top, panel_width, _ = panel.box
+    row = top - 16 * page.scale
+    right = left + max(panel_width, min(panel.caption_width, width))
+    page.write(captions.names[number], left, row, points=TITLE, bold=True)
     page.write(captions.facts[number], right, row, color=page.theme.faint, align="right")
 
 
-def _write_two_lines(page: FigurePage, captions: _Captions, number: int, box: PageBox, room: float) -> None:
+def _write_two_lines(page: FigurePage, captions: _Captions, number: int, panel: PagePanel) -> None:
     """Write the name of a run above its panel, and its facts below the name."""
-    name_row = box[1] - 38 * page.scale
-    facts_row = box[1] - 16 * page.scale
-    page.write(captions.names[number], box[0], name_row, points=TITLE, bold=True, max_width=room)
-    page.write(captions.facts[number], box[0], facts_row, color=page.theme.faint, max_width=room)
+    left, top, _, _ = panel.box
+    name_row = top - 38 * page.scale
+    facts_row = top - 16 * page.scale
+    max_width = panel.caption_width
+    page.write(captions.names[number], left, name_row, points=TITLE, bold=True, max_width=max_width)
+    page.write(captions.facts[number], left, facts_row, color=page.theme.faint, max_width=max_width)
 
 
 @plain_style()
@@ -366,13 +439,11 @@ def _create_map_page(
     """Create a page with one map, a title and facts above it, and the legend below."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
-    page = FigurePage(size or (1400, 1000), theme, None if size else _MAP_SCALE)
     if size is None:
-        surroundings = 58 * page.scale + page.measure_footer(handles)
-        page_width = float(np.clip((1300 - surroundings) * aspect + 2 * page.margin, 840, 1400))
-        page_height = float(np.clip((page_width - 2 * page.margin) / aspect + surroundings, 300, 1300))
-        page = FigurePage((int(page_width), int(page_height)), theme, _MAP_SCALE)
-    above = 58 * page.scale
+        page = FigurePage(_choose_map_page_size(aspect, theme, handles), theme, _MAP_SCALE)
+    else:
+        page = FigurePage(size, theme)
+    above = _MAP_HEAD * page.scale
     free_height = page.size[1] - above - page.measure_footer(handles)
     width = min(page.content_width, free_height * aspect)
     height = width / aspect
@@ -381,6 +452,15 @@ def _create_map_page(
     _write_above_map(page, facts, box, up=16, points=TEXT, is_title=False)
     page.draw_footer(handles, [box], width / (high_x - low_x))
     return page.add_map_axes(box, low_x, low_y, high_x, high_y)
+
+
+def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]) -> tuple[int, int]:
+    """Return the width and height of a page that suits a map of an aspect, px."""
+    page = FigurePage((1400, 1000), theme, _MAP_SCALE)
+    surroundings = _MAP_HEAD * page.scale + page.measure_footer(handles)
+    width = float(np.clip((1300 - surroundings) * aspect + 2 * page.margin, 840, 1400))
+    height = float(np.clip((width - 2 * page.margin) / aspect + surroundings, 300, 1300))
+    return int(width), int(height)
 
 
 def _write_above_map(
@@ -433,7 +513,9 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     """
     theme = get_theme(theme)
     drawn = environments[:MAX_MAPS]
-    title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
+    title = ""
+    if len(drawn) < len(environments):
+        title = f"{len(drawn)} of {len(environments)}"
     bounds = np.array([environment.region.bounds for environment in drawn])
     map_width, map_height = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
     aspect = map_width / map_height
@@ -459,11 +541,13 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
         top=top,
         bottom=page.measure_footer(handles),
     )
-    for environment, (box, room) in zip(drawn, panels, strict=True):
+    for environment, panel in zip(drawn, panels, strict=True):
+        left, map_top, _, _ = panel.box
         low_x, low_y, _, _ = environment.region.bounds
-        axes = page.add_map_axes(box, low_x, low_y, low_x + map_width, low_y + map_height)
+        axes = page.add_map_axes(panel.box, low_x, low_y, low_x + map_width, low_y + map_height)
         arena.draw_map(axes, environment, theme)
-        page.write(environment.name, box[0], box[1] - 12 * scale, bold=True, max_width=room)
+        name_row = map_top - 12 * scale
+        page.write(environment.name, left, name_row, bold=True, max_width=panel.caption_width)
     first_box, _ = panels[0]
     _write_heading(page, title, first_box, above + 18 * scale)
     page.draw_footer(handles, [box for box, _ in panels], first_box[2] / map_width)
@@ -471,7 +555,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
 
 
 def _list_different_handles(environments: Sequence[Environment], theme: Theme) -> list[Artist]:
-    """Return the entries of the legends of maps, each once."""
+    """Return the entries of the legends of maps without duplicates."""
     handles: dict[str, Artist] = {}
     for environment in environments:
         for handle in arena.build_map_handles(environment, theme):

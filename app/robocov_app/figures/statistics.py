@@ -66,9 +66,10 @@ class Interval:
         """
         if self.trials:
             return self._compute_binomial_p_value(low, high)
-        values = np.empty(0) if self.resampled_values is None else self.resampled_values
-        is_outside = ~((low <= values) & (values <= high))
-        return float(1 + np.count_nonzero(is_outside)) / (1 + values.size)
+        if self.resampled_values is None:
+            return 1.0
+        is_outside = ~((low <= self.resampled_values) & (self.resampled_values <= high))
+        return float(1 + np.count_nonzero(is_outside)) / (1 + self.resampled_values.size)
 
     def _compute_binomial_p_value(self, low: float, high: float) -> float:
         """Return the larger p-value of the one-sided binomial tests against the bounds."""
@@ -111,10 +112,11 @@ def bootstrap(
         Without limits if there are fewer than two clusters. The same values give the same interval.
     """
     sample = np.asarray(values, dtype=float)
-    labels = range(len(sample)) if clusters is None else clusters
+    if clusters is None:
+        clusters = range(len(sample))
     if statistic == "median":
-        return _bootstrap(lambda rows: np.median(sample[rows], axis=1), labels, resamples)
-    return _bootstrap(lambda rows: np.mean(sample[rows], axis=1), labels, resamples)
+        return _bootstrap(lambda rows: np.median(sample[rows], axis=1), clusters, resamples)
+    return _bootstrap(lambda rows: np.mean(sample[rows], axis=1), clusters, resamples)
 
 
 def bootstrap_statistic(
@@ -182,8 +184,10 @@ def _compute_limits(values: Array) -> tuple[float, float]:
     if not len(values):
         return np.nan, np.nan
     tail = (1.0 - CONFIDENCE_LEVEL) / 2.0
-    # One cannot interpolate between a number and infinity.
-    method: Literal["linear", "inverted_cdf"] = "linear" if np.isfinite(values).all() else "inverted_cdf"
+    method: Literal["linear", "inverted_cdf"] = "linear"
+    if not np.isfinite(values).all():
+        # One cannot interpolate between a number and infinity.
+        method = "inverted_cdf"
     low, high = np.quantile(values, [tail, 1.0 - tail], method=method).tolist()
     return low, high
 

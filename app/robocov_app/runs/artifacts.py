@@ -30,7 +30,7 @@ from robocov_app.terminal.progress import make_counter, show_progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from robocov_app.figures.coverage import Moment
+    from robocov_app.figures.coverage import DistanceSnapshot
     from robocov_app.figures.curves import Curve
 
 _COMPARISON_HEADER = {"format": "robocov-comparison", "version": 1}
@@ -280,7 +280,7 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
     robots = format_count(len(record.team), "robot")
     return plot_coverage(
         _build_curves(runs, "mean_distance"),
-        build_final_moments(runs, cost),
+        build_final_snapshots(runs, cost),
         theme=settings.video.color_theme,
         size=settings.video.size,
         title=f"Coverage cost  ·  {record.environment.name}  ·  {robots}",
@@ -299,7 +299,7 @@ def _build_curves(runs: Sequence[Run], quantity: str) -> list[Curve]:
     return curves
 
 
-def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
+def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[DistanceSnapshot]:
     """Return the final states of runs for figures of the coverage cost.
 
     Parameters
@@ -311,16 +311,16 @@ def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]
 
     Returns
     -------
-    list of Moment
+    list of DistanceSnapshot
         Those in which a robot works.
     """
-    from robocov_app.figures.coverage import Moment
+    from robocov_app.figures.coverage import DistanceSnapshot
     from robocov_app.render.distance_field import DistanceField
     from robocov_app.render.field_lattice import FieldLattice
 
     environment = runs[0].record.environment
     cost = refine_cost_for_figures(environment, cost)
-    moments = []
+    snapshots = []
     for run in runs:
         record = run.record
         if record.environment != environment:
@@ -336,5 +336,5 @@ def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]
         rows = np.flatnonzero(is_available)
         field = DistanceField(FieldLattice(final_cost.sites), final_cost(positions[rows]))
         mean_distance = float(run.history.mean_distance[-1])
-        moments.append(Moment.build_final(record, field, mean_distance, rows, run.final_time))
-    return moments
+        snapshots.append(DistanceSnapshot.build_final(record, field, mean_distance, rows, run.final_time))
+    return snapshots

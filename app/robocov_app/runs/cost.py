@@ -100,7 +100,7 @@ def save_distance_figure(
     OutputError
         If the file cannot be written.
     """
-    from robocov_app.figures.coverage import Moment, plot_coverage
+    from robocov_app.figures.coverage import DistanceSnapshot, plot_coverage
     from robocov_app.figures.files import save_figure
     from robocov_app.render.distance_field import DistanceField
     from robocov_app.render.field_lattice import FieldLattice
@@ -108,5 +108,5 @@ def save_distance_figure(
     team = Team.homogeneous(len(positions), radius=radius)
     field = DistanceField(FieldLattice(cost.sites), cost(positions, speeds))
     robots = format_count(len(team), "robot")
-    moment = Moment(cost.environment, team, field, cost.environment.name, f"{robots}, {mean}")
-    save_figure(plot_coverage([], [moment], theme=theme, title=title), path)
+    snapshot = DistanceSnapshot(cost.environment, team, field, cost.environment.name, f"{robots}, {mean}")
+    save_figure(plot_coverage([], [snapshot], theme=theme, title=title), path)

@@ -9,7 +9,7 @@ from PIL import Image
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
-from robocov_app.figures.coverage import Moment, plot_coverage
+from robocov_app.figures.coverage import DistanceSnapshot, plot_coverage
 from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.files import save_figure
 from robocov_app.look.theme import DARK, LIGHT
@@ -21,11 +21,13 @@ T = np.linspace(0.0, 60.0, 61)
 COSTS = {map_.name: CoverageCost(map_, 64) for map_ in (ROOMS, HALL, CORRIDOR, SHAFT)}
 
 
-def moment_of(environment, n=5, seed=0):
+def build_snapshot(environment, n=5, seed=0):
     cost = COSTS[environment.name]
     record = run_of(environment, n, seed=seed)
     positions = environment.start("spread").sample(n, seed)
-    return Moment.build_final(record, DistanceField(FieldLattice(cost.sites), cost(positions)), 1.234)
+    return DistanceSnapshot.build_final(
+        record, DistanceField(FieldLattice(cost.sites), cost(positions)), 1.234
+    )
 
 
 def curves(count):
@@ -62,8 +64,8 @@ def written(figure):
     ids=lambda map_: map_.name,
 )
 def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
-    moments = [moment_of(environment, seed=k) for k in range(count)]
-    figure = plot_coverage(curves(count if with_curves else 0), moments, size=size)
+    snapshots = [build_snapshot(environment, seed=k) for k in range(count)]
+    figure = plot_coverage(curves(count if with_curves else 0), snapshots, size=size)
     extents = written(figure)
     page = figure.bbox
     for k, box in enumerate(extents):
@@ -83,7 +85,7 @@ def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
 @pytest.mark.slow
 def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
     figure = plot_coverage(
-        curves(count), [moment_of(HALL, seed=k) for k in range(count)], size=size, times=curves(count)
+        curves(count), [build_snapshot(HALL, seed=k) for k in range(count)], size=size, times=curves(count)
     )
     labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
     assert labels == [DISTANCE, TIME]
@@ -98,16 +100,16 @@ def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
     "theme", [LIGHT, pytest.param(DARK, marks=pytest.mark.slow)], ids=lambda theme: theme.name
 )
 def test_the_colors_are_those_of_the_scale(theme, tmp_path):
-    moment = moment_of(HALL)
-    figure = plot_coverage([], [moment], theme=theme, size=(800, 640))
+    snapshot = build_snapshot(HALL)
+    figure = plot_coverage([], [snapshot], theme=theme, size=(800, 640))
     save_figure(figure, tmp_path / "a.png")
     pixels = np.array(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
     (axes,) = [axes for axes in figure.axes if not axes.axison]
-    limit = choose_color_limit(moment.field.max_distance)
+    limit = choose_color_limit(snapshot.field.max_distance)
     geodesics = COSTS["hall"].geodesics
     hits = 0
     for place in COSTS["hall"].points[::97]:
-        exact = geodesics.compute_distances(place[None], moment.field.result.positions)[0]
+        exact = geodesics.compute_distances(place[None], snapshot.field.result.positions)[0]
         column, height = axes.transData.transform(place)
         row = len(pixels) - 1 - int(height)
         around = pixels[row - 3 : row + 4, int(column) - 3 : int(column) + 4].reshape(-1, 3)
@@ -123,14 +125,14 @@ def test_the_colors_are_those_of_the_scale(theme, tmp_path):
 
 
 def test_all_maps_are_in_one_scale_of_colors():
-    near, far = moment_of(ROOMS, n=12), moment_of(ROOMS, n=1)
+    near, far = build_snapshot(ROOMS, n=12), build_snapshot(ROOMS, n=1)
     figure = plot_coverage([], [near, far])
     (bar,) = [axes for axes in figure.axes if axes.axison]
     assert bar.get_xlim()[1] == choose_color_limit(far.field.max_distance) > near.field.max_distance
 
 
 def test_the_words_say_what_is_seen():
-    figure = plot_coverage(curves(1), [moment_of(ROOMS)], title="Coverage cost  ·  rooms")
+    figure = plot_coverage(curves(1), [build_snapshot(ROOMS)], title="Coverage cost  ·  rooms")
     words = [text.get_text() for text in figure.texts]
     assert "Coverage cost  ·  rooms" in words
     assert "distance to the nearest robot" in words
@@ -138,38 +140,38 @@ def test_the_words_say_what_is_seen():
     (legend,) = figure.legends
     said = [text.get_text() for text in legend.get_texts()]
     assert said == ["robot", "geodesic cell border", "obstacle", "no robot can come"]
-    (legend,) = plot_coverage(curves(1), [moment_of(SHAFT)]).legends
+    (legend,) = plot_coverage(curves(1), [build_snapshot(SHAFT)]).legends
     assert [text.get_text() for text in legend.get_texts()] == ["robot", "geodesic cell border"]
 
 
 @pytest.mark.slow
 def test_the_same_plot_gives_the_same_bytes(tmp_path):
     for name in ("a.svg", "b.svg", "a.png", "b.png"):
-        save_figure(plot_coverage(curves(1), [moment_of(HALL)]), tmp_path / name)
+        save_figure(plot_coverage(curves(1), [build_snapshot(HALL)]), tmp_path / name)
     for suffix in (".svg", ".png"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
 @pytest.mark.parametrize("size", [(320, 240), (719, 900), (1200, 399)])
 def test_a_small_page_has_the_curves_alone(size):
-    figure = plot_coverage(curves(2), [moment_of(HALL)], size=size)
+    figure = plot_coverage(curves(2), [build_snapshot(HALL)], size=size)
     (axes,) = figure.axes
     assert axes.get_xlabel() == "time (s)"
     assert tuple(figure.canvas.get_width_height()) == size
 
 
-def test_no_moments_are_refused():
-    with pytest.raises(ParameterError, match="moments: expected at least one, got none"):
+def test_no_snapshots_are_refused():
+    with pytest.raises(ParameterError, match="snapshots: expected at least one, got none"):
         plot_coverage(curves(1), [])
 
 
 def test_moving_obstacles_have_a_path_and_a_legend_entry_of_their_own():
     cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
-    plain = moment_of(ROOMS)
+    plain = build_snapshot(ROOMS)
     moving = replace(plain, environment=replace(ROOMS, obstacles=(*ROOMS.obstacles, cart)), time=1.0)
     drawn = {}
-    for name, moment in (("plain", plain), ("moving", moving)):
-        figure = plot_coverage([], [moment], size=(900, 600))
+    for name, snapshot in (("plain", plain), ("moving", moving)):
+        figure = plot_coverage([], [snapshot], size=(900, 600))
         drawn[name] = [text.get_text() for text in figure.legends[0].get_texts()], figure.axes[-1].lines
     assert "obstacle" in drawn["plain"][0]
     assert set(drawn["moving"][0]) - set(drawn["plain"][0]) == {"moving obstacle and its path"}
