@@ -52,8 +52,9 @@ class Scene:
     snapshot : Snapshot or None
         State and knowledge of the robots; without it, only the map is drawn.
     starts : (n, 2) array or None, m
-    trail : (k, n, 2) array or None, m
-        Positions until now, the oldest first.
+    trail : (k, n + f, 2) array or None, m
+        Positions until now, the oldest first: of the robots, then of f robots that have failed, if their
+        trajectories are known; nan where a robot does not work.
     trail_time : (k,) array or None, s
         Times of the trail, for trajectories that fade.
     trail_fade : float or None, s

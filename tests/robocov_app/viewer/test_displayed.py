@@ -64,12 +64,15 @@ def test_recent_positions_of_a_robot():
     assert session.displayed.get_recent_positions(pane, 99).shape == (0, 2)
 
 
-def test_trails_of_the_past_are_of_the_robots_that_worked_then():
+def test_trails_of_failed_robots_end_where_they_failed():
     session = advance_session(start_session(), 30)
     session.fail_robot(2)
     advance_session(session, 30)
     pane = session.timeline.panes[0]
-    assert session.displayed.get_trail(pane)[0].shape[1] == 2
+    positions, times = session.displayed.get_trail(pane)
+    assert positions.shape[1] == 3, "the failed robot is the last one"
+    assert np.isfinite(positions[times < 0.49, 2]).all()
+    assert np.isnan(positions[times > 0.49, 2]).all()
     session.show_time(0.25)
     positions, times = session.displayed.get_trail(pane)
     assert positions.shape[1] == 3
@@ -77,8 +80,6 @@ def test_trails_of_the_past_are_of_the_robots_that_worked_then():
     assert np.isfinite(positions).all()
     repeated_positions, _ = session.displayed.get_trail(pane)
     assert np.shares_memory(repeated_positions, positions), "a trail is rebuilt once"
-    session.show_time(0.5)
-    assert session.displayed.get_trail(pane)[0].shape[1] == 2
 
 
 def test_costs_are_compared_at_a_time_that_all_curves_contain():

@@ -74,7 +74,7 @@ class TrajectoriesLayer:
             return
         n_robots = trail.shape[1]
         width = canvas.scale * canvas.theme.trajectory_line * choose_width_factor(n_robots)
-        pen = Pen(self._choose_colors(canvas), width)
+        pen = Pen(self._choose_colors(canvas, n_robots), width)
         key = _build_key(canvas, scene, pen, n_robots)
         is_continued = key == self._key and self._n_drawn_rows > 0 and self._find_last_row(trail)
         is_fading = False
@@ -193,13 +193,14 @@ class TrajectoriesLayer:
             else:
                 pygame.draw.lines(canvas.surface, color, False, points)
 
-    def _choose_colors(self, canvas: Canvas) -> list[Color]:
-        """Return the color of the trajectory of each robot."""
+    def _choose_colors(self, canvas: Canvas, n_robots: int) -> list[Color]:
+        """Return the color of the trajectory of each robot. The last ones are those of failed robots."""
         theme = canvas.theme
         hues = canvas.hues.tolist()
-        return self._colors.get(
+        working = self._colors.get(
             None, (theme.name, hues), lambda: choose_trail_colors(theme, hues, self._color_scheme)
         )
+        return working + [theme.failed_robot] * (n_robots - len(working))
 
     def build_legend(self, scene: Scene) -> list[LegendEntry]:
         """Build the legend, whose symbol is a wave in the color of the first robot."""
@@ -212,7 +213,7 @@ class TrajectoriesLayer:
             sketch = Sketch.from_points(wave, 3.0)
             if sketch is not None:
                 width = canvas.theme.trajectory_line * canvas.scale
-                sketch.draw_path(wave, self._choose_colors(canvas)[0], width)
+                sketch.draw_path(wave, self._choose_colors(canvas, 1)[0], width)
                 sketch.draw_on(canvas.surface)
 
         return [LegendEntry(legend.TRAJECTORY, draw_symbol, self._color_scheme)]

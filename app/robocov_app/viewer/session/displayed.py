@@ -12,11 +12,13 @@ from robocov.observation import Snapshot
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.decision_replay import rebuild_snapshot
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
-from robocov_app.viewer.session.past.trails import Trail, rebuild_trail
+from robocov_app.viewer.session.past.trails import MAX_TRAIL_RATE_HZ
 from robocov_app.viewer.session.timeline import Timeline
 
 MAX_RECENT_POSITIONS = 30
 """Approximate maximum number of recent positions of a robot."""
+MAX_TRAIL_GAP_S = 1.5 / MAX_TRAIL_RATE_HZ
+"""Time between the last row of a trail and the displayed state, above which the latter is appended."""
 
 
 class DisplayedState:
@@ -30,7 +32,6 @@ class DisplayedState:
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline
-        self._rebuilt_trails: dict[int, tuple[object, Trail]] = {}
 
     @property
     def time(self) -> float:
@@ -75,17 +76,17 @@ class DisplayedState:
         Returns
         -------
         positions : (k, n, 2) array, m
+            Of the working robots, then of those that failed, which are nan since then.
         times : (k,) array, s
         """
-        if self.get_setup(pane).numbers == pane.numbers:
-            return pane.trail.get_until(self.time)
-        timeline = self._timeline
-        key = (timeline.shown_index, timeline.past_version)
-        rebuilt_key, trail = self._rebuilt_trails.get(pane.number, (None, pane.trail))
-        if rebuilt_key != key:
-            trail, _ = rebuild_trail(timeline.history, pane.number, timeline.displayed_index)
-            self._rebuilt_trails[pane.number] = (key, trail)
-        return trail.positions, trail.times
+        positions, times = pane.trail.get_until(self.time)
+        if self._timeline.is_live or self.time - times[-1] <= MAX_TRAIL_GAP_S:
+            return positions, times
+        # Rows of a straight path were removed. The path leads on to the robots.
+        last = np.full((1, *positions.shape[1:]), np.nan)
+        displayed = self.get_positions(pane)
+        last[0, : len(displayed)] = displayed
+        return np.concatenate([positions, last]), np.append(times, self.time)
 
     def get_recent_positions(self, pane: Pane, number: int) -> Array:
         """Return positions of a robot during the seconds before the displayed time.

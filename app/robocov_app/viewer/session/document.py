@@ -18,6 +18,7 @@ from robocov_app.viewer.session.edits import Restart, SessionEdit
 from robocov_app.viewer.session.lockstep import AutomaticEvent, Lockstep
 from robocov_app.viewer.session.past.curves import Curve, SessionEvent
 from robocov_app.viewer.session.past.states import RunState
+from robocov_app.viewer.session.past.trails import TrailSection
 from robocov_app.viewer.session.scenario import SessionScenario
 
 MAX_CACHED_STATES = 160
@@ -52,6 +53,8 @@ class Node:
         States in the time span of the node; they are not in files, because they can be recomputed.
     curves : dict
         Cost curves by pane and quantity.
+    trails : dict
+        Trajectories in the time span of the node, by pane; like the states, they are not in files.
     controllers : dict
         Controllers by pane.
     automatic_events : set of AutomaticEvent
@@ -69,6 +72,7 @@ class Node:
     redo: "Node | None" = field(default=None, repr=False)
     cached_states: list[RunState] = field(default_factory=list, repr=False)
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
+    trails: dict[int, list[TrailSection]] = field(default_factory=dict, repr=False)
     controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)
     automatic_events: set[AutomaticEvent] = field(default_factory=set, repr=False)
 

@@ -17,7 +17,7 @@ from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.past.curves import Curve
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
-from robocov_app.viewer.session.past.trails import Trail, select_robots
+from robocov_app.viewer.session.past.trails import Trail
 
 STEPS_BETWEEN_SENSED_POINTS = 3
 """Number of steps between two records of the points that robots sense."""
@@ -55,10 +55,8 @@ class Pane:
 
     Attributes
     ----------
-    starts : (n, 2) array, m
-        First positions of the working robots.
     trail : Trail
-        Trajectories of the working robots.
+        Trajectories of the working robots, then those of the robots that failed.
     curves : dict of str to Curve
         Cost curves by quantity, ``"distance"`` and ``"time"``.
     distance_curve : Curve
@@ -71,9 +69,8 @@ class Pane:
         self.number = number
         self.setup = setup
         self.simulation = simulation
-        self.starts = simulation.positions
-        self.trail = Trail(len(self.starts))
-        self.trail.add(simulation.time, self.starts)
+        self.trail = Trail(setup.tracked_numbers)
+        self.trail.add(simulation.time, simulation.positions)
         self.curves = {"distance": Curve(), "time": Curve()}
         self.distance_curve = self.curves["distance"]
         self.sensed = SensedPoints()
@@ -88,6 +85,11 @@ class Pane:
     def numbers(self) -> tuple[int, ...]:
         """Numbers of the working robots."""
         return self.setup.numbers
+
+    @property
+    def starts(self) -> Array:
+        """First positions of the working robots, (n, 2) m."""
+        return self.trail.get_starts(self.time, self.numbers)
 
     @property
     def time(self) -> float:
@@ -144,8 +146,8 @@ class Pane:
             failed=setup.failed,
             failed_radii={number: setup.properties.get_radius(number) for number in setup.failed},
             label=setup.controller.label,
-            starts=self.starts if len(self.starts) == len(setup.numbers) else None,
-            trail=positions if len(positions) else None,
+            starts=self.trail.get_starts(snapshot.time, setup.numbers),
+            trail=positions,
             trail_time=times,
             **more,
         )
@@ -249,14 +251,9 @@ class Pane:
 
     def adopt(self, setup: PaneSetup, simulation: Simulation) -> None:
         """Continue with another setup and simulation."""
-        before = self.numbers
-        after = setup.numbers
-        if after != before:
-            self.trail = self.trail.select_robots(before, after)
-            starts = select_robots(self.starts, before, after)
-            self.starts = np.where(np.isnan(starts), simulation.positions, starts)
         self.simulation = simulation
         self.setup = setup
+        self.trail.change_robots(setup.tracked_numbers)
         self.trail.add(self.time, simulation.positions, always=True)
 
 

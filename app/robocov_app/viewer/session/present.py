@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,7 +16,7 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.decision_replay import get_sensor
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import RunState
-from robocov_app.viewer.session.past.trails import rebuild_trail
+from robocov_app.viewer.session.past.trails import TrailSection, build_trail, merge_sections
 
 MAX_SENSED_STATES = 300
 """Maximum number of states from which the sensed points of another branch are recomputed."""
@@ -158,6 +158,9 @@ def cache_present(document: SessionDocument, present: Present) -> None:
         node.cached_states = _select_cached_states(states_by_node[node.number], node.cached_states)
         end_time = np.inf if following is None else following.branch_step * dt
         for pane in present.run.panes:
+            node.trails[pane.number] = merge_sections(
+                pane.trail.extract(node.first_step * dt, end_time), node.trails.get(pane.number, [])
+            )
             node.controllers[pane.number] = pane.controller
             for quantity, curve in pane.curves.items():
                 merged = curve.extract(node.first_step * dt, end_time)
@@ -174,10 +177,17 @@ def _select_cached_states(recorded: list[RunState], cached: list[RunState]) -> l
     return states[::-stride][::-1]
 
 
-def restore_trails(run: Lockstep, history: RunHistory) -> None:
-    """Rebuild the trails and starts of all panes of a run from its recorded past."""
-    for pane in run.panes:
-        pane.trail, pane.starts = rebuild_trail(history, pane.number, len(history) - 1)
+def _restore_trail(path: list[Node], last_steps: Mapping[int, int], pane: Pane, dt: float) -> None:
+    """Put the known trail of a path before that of the steps that were simulated again."""
+    sections: list[TrailSection] = []
+    for node, following in zip(path, [*path[1:], None], strict=True):
+        end = last_steps[node.number] * dt
+        if following is None:
+            # The edit of the following node replaces the row of its step; without one, the row belongs here.
+            end += 0.5 * dt
+        sections += [section.cut(-np.inf, end) for section in node.trails.get(pane.number, [])]
+    simulated = pane.trail.extract(-np.inf, np.inf)
+    pane.trail = build_trail(merge_sections(sections, simulated))
 
 
 def _copy_common_past(document: SessionDocument, old: Present, node: Node, step: int) -> RunHistory:
@@ -208,7 +218,6 @@ def _copy_common_past(document: SessionDocument, old: Present, node: Node, step:
 
 def _restore_panes(document: SessionDocument, old: Present, new: Present) -> None:
     """Rebuild the trails, curves and sensed points of the panes of a new present."""
-    restore_trails(new.run, new.history)
     path = document.get_path(new.head)
     last_steps = document.get_last_steps(new.head, new.run.step)
     old_last_step = document.get_last_steps(old.head, old.run.step).get(new.head.number, -1)
@@ -216,6 +225,7 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Non
     old_panes = {pane.number: pane for pane in old.run.panes} if is_earlier else {}
     dt = new.run.scenario.dt
     for pane in new.run.panes:
+        _restore_trail(path, last_steps, pane, dt)
         for quantity, curve in pane.curves.items():
             for node in path:
                 curve.extend(node.curves[pane.number, quantity], last_steps[node.number] * dt)

@@ -21,7 +21,8 @@ from robocov_app.viewer.session.missing_controller import find_controller, use_p
 from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
 from robocov_app.viewer.session.past.history import MAX_HISTORY_BYTES, RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState, RunState
-from robocov_app.viewer.session.present import Present, restore_trails
+from robocov_app.viewer.session.past.trails import rebuild_trail
+from robocov_app.viewer.session.present import Present
 from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.session import Session
@@ -69,7 +70,6 @@ def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] =
     head.last_step = history.last.step
     head.automatic_events.update(_list_drag_events(records[0], history.dt))
     run = _resume_end(history.last)
-    restore_trails(run, history)
     for pane, saved_run in zip(run.panes, runs, strict=True):
         _restore_pane(pane, saved_run, history)
     timeline = Timeline(
@@ -264,9 +264,9 @@ def _resume_end(last: RunState) -> Lockstep:
 
 
 def _restore_pane(pane: Pane, saved: SavedRun, history: RunHistory) -> None:
-    """Restore the starts, sensed points and cost curves of a pane from a saved run."""
+    """Restore the trail, sensed points and cost curves of a pane from a saved run."""
     record = saved.record
-    pane.starts = record.positions[0][record.working[-1]]
+    pane.trail = rebuild_trail(history, pane.number)
     stride = max(1, round(STEPS_BETWEEN_SENSED_POINTS * history.dt / record.dt))
     for index in range(0, len(record), stride):
         numbers = history[index].states[pane.number].setup.numbers

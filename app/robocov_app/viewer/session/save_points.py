@@ -3,6 +3,8 @@
 from contextlib import suppress
 from dataclasses import dataclass
 
+import numpy as np
+
 from robocov.errors import RobocovError
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.edits import SessionEdit
@@ -10,7 +12,8 @@ from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import RunState
-from robocov_app.viewer.session.present import Present, restore_trails
+from robocov_app.viewer.session.past.trails import build_trail, merge_sections
+from robocov_app.viewer.session.present import Present
 from robocov_app.viewer.session.timeline import Timeline
 
 
@@ -109,10 +112,13 @@ def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
     # A record whose controller no longer exists cannot be resumed, but it was not changed either.
     with suppress(RobocovError):
         run = Lockstep.resume(point.last)
-    restore_trails(run, point.history)
     old_panes = {pane.number: pane for pane in point.panes}
     for pane in run.panes:
         if pane.number in old_panes:
+            old_trail = old_panes[pane.number].trail
+            pane.trail = build_trail(
+                merge_sections(old_trail.extract(-np.inf, run.time), pane.trail.extract(-np.inf, np.inf))
+            )
             pane.curves = old_panes[pane.number].curves
             pane.distance_curve = pane.curves["distance"]
             pane.sensed = old_panes[pane.number].sensed.copy()

@@ -57,6 +57,11 @@ class PaneSetup:
         return sorted([*self.numbers, *self.failed])
 
     @property
+    def tracked_numbers(self) -> tuple[int, ...]:
+        """Numbers of the robots that have a trail: the working ones, then those that failed."""
+        return (*self.numbers, *sorted(self.failed))
+
+    @property
     def team(self) -> Team:
         """The working robots."""
         return self.properties.build_team(self.numbers)

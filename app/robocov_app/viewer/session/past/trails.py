@@ -1,49 +1,104 @@
 """Trajectories of the robots of a pane up to the present, in bounded memory."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
+from robocov.environment import Point
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup
 
 MAX_TRAIL_RATE_HZ = 30.0
 """Maximum number of rows for each simulated second."""
 MAX_TRAIL_ROWS = 4096
-"""Number of rows at which every second row of the older half is removed."""
+"""Number of rows at which those are removed that matter least to the shape of the trajectories."""
 _MIN_ROW_INTERVAL_S = 1.0 / MAX_TRAIL_RATE_HZ - 1e-6
 _SAME_TIME_S = 1e-9
 _TIME_TOLERANCE_S = 1e-6
 
+Numbers: TypeAlias = tuple[int, ...]
+"""Numbers of robots, one for each column of a trail."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrailSection:
+    """Rows of a trail between two changes of the team.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Robots of the columns.
+    starts : mapping of int to tuple
+        First positions of these robots, (x, y) m.
+    positions : (k, n, 2) array, m
+        nan for robots that do not work.
+    times : (k,) array, s
+        Ascending times of the rows.
+    """
+
+    numbers: Numbers
+    starts: Mapping[int, Point]
+    positions: Array
+    times: Array
+
+    def cut(self, start: float, end: float) -> "TrailSection":
+        """Return a copy of the rows from a time on and before another one, s."""
+        first, last = np.searchsorted(self.times, [start - _SAME_TIME_S, end - _SAME_TIME_S])
+        positions = self.positions[first:last].copy()
+        return TrailSection(self.numbers, self.starts, positions, self.times[first:last].copy())
+
 
 class Trail:
-    """Positions of the working robots at ascending times.
+    """Positions of robots at ascending times.
+
+    Each robot has a column. When the team changes, the columns are those of the new team from then on: robots
+    that were removed are left out, and those that have joined are nan before that.
 
     Parameters
     ----------
-    robots : int
-        Number of robots.
+    numbers : sequence of int
+        Numbers of the robots, in the order of the columns.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Numbers of the present robots.
     """
 
-    def __init__(self, robots: int) -> None:
+    def __init__(self, numbers: Sequence[int]) -> None:
+        self.numbers: Numbers = tuple(numbers)
         # The operating system provides the memory only as it is written to.
-        self._positions = np.empty((MAX_TRAIL_ROWS, robots, 2))
+        self._positions = np.empty((MAX_TRAIL_ROWS, len(numbers), 2))
         self._times = np.empty(MAX_TRAIL_ROWS)
         self._count = 0
+        self._starts: dict[int, Point] = {}
+        self._closed_sections: list[TrailSection] = []
+        self._section_start = 0
+        self._start_arrays: dict[Numbers, Array] = {}
+        self._earlier_trail: tuple[int, Trail] | None = None
 
     def __len__(self) -> int:
         return self._count
 
     @property
     def positions(self) -> Array:
-        """Positions, (k, n, 2) m, the oldest first; nan before a robot has joined."""
+        """Positions of the present robots, (k, n, 2) m, the oldest first; nan where they do not work."""
         return self._positions[: self._count]
 
     @property
     def times(self) -> Array:
         """Times of the positions, (k,) s."""
         return self._times[: self._count]
+
+    @property
+    def last_time(self) -> float:
+        """Time of the last row, s; -inf if there is none."""
+        if self._count == 0:
+            return -np.inf
+        return float(self._times[self._count - 1])
 
     def add(self, time: float, positions: Array, *, always: bool = False) -> None:
         """Append positions, unless the last row is too recent.
@@ -52,48 +107,187 @@ class Trail:
         ----------
         time : float, s
             Time of the positions.
-        positions : (n, 2) array, m
-            Positions of all robots.
+        positions : (m, 2) array, m
+            Positions of the first m robots. The others do not work.
         always : bool
             Whether to append the positions in any case. They replace a row of the same time.
         """
-        elapsed = time - self._times[self._count - 1] if self._count else np.inf
+        elapsed = time - self.last_time
         if elapsed < _SAME_TIME_S and always:
             self._count -= 1
+            self._section_start = min(self._section_start, self._count)
         elif elapsed < _MIN_ROW_INTERVAL_S and not always:
             return
         if self._count == len(self._times):
-            self._thin()
-        self._positions[self._count] = positions
+            self._simplify()
+        row = self._positions[self._count]
+        row[: len(positions)] = positions
+        row[len(positions) :] = np.nan
         self._times[self._count] = time
         self._count += 1
+        self._note_starts(positions)
+
+    def change_robots(self, numbers: Sequence[int]) -> None:
+        """Continue with the columns of other robots; the rows so far stay known to `get_until`."""
+        numbers = tuple(numbers)
+        if numbers == self.numbers:
+            return
+        self._closed_sections = self.extract(-np.inf, np.inf)
+        positions = select_robots(self.positions, self.numbers, numbers)
+        self._positions = np.empty((MAX_TRAIL_ROWS, len(numbers), 2))
+        self._positions[: self._count] = positions
+        self._starts = {number: start for number, start in self._starts.items() if number in numbers}
+        self._start_arrays = {}
+        self._earlier_trail = None
+        self._section_start = self._count
+        self.numbers = numbers
 
     def get_until(self, time: float) -> tuple[Array, Array]:
-        """Return the trail up to a time.
+        """Return the trail of the robots that were in the team at a time, up to that time.
 
         Returns
         -------
         positions : (k, n, 2) array, m
         times : (k,) array, s
         """
-        count = int(np.searchsorted(self.times, time + _TIME_TOLERANCE_S, side="right"))
-        return self._positions[:count], self._times[:count]
+        trail = self._find_trail(time)
+        count = int(np.searchsorted(trail.times, time + _TIME_TOLERANCE_S, side="right"))
+        return trail._positions[:count], trail._times[:count]
 
-    def select_robots(self, before: Sequence[int], after: Sequence[int]) -> "Trail":
-        """Return the trail of other robots; see the function `select_robots`."""
-        selected = Trail(len(after))
-        selected._positions[: self._count] = select_robots(self.positions, before, after)
-        selected._times[: self._count] = self.times
-        selected._count = self._count
-        return selected
+    def get_starts(self, time: float, numbers: Sequence[int]) -> Array:
+        """Return the first positions of robots that are in the team at a time.
 
-    def _thin(self) -> None:
-        """Remove every second row of the older half."""
-        half = self._count // 2
-        rows = np.r_[0:half:2, half : self._count]
-        self._count = len(rows)
-        self._positions[: self._count] = self._positions[rows]
-        self._times[: self._count] = self._times[rows]
+        Returns
+        -------
+        (n, 2) array, m
+            The same array as before, as long as the starts are the same.
+        """
+        trail = self._find_trail(time)
+        key = tuple(numbers)
+        if key not in trail._start_arrays:
+            unknown = (np.nan, np.nan)
+            starts = [trail._starts.get(number, unknown) for number in numbers]
+            trail._start_arrays[key] = np.array(starts).reshape(-1, 2)
+        return trail._start_arrays[key]
+
+    def extract(self, start: float, end: float) -> list[TrailSection]:
+        """Return the rows from a time on and before another one, s, with the robots that each row has."""
+        open_rows = slice(self._section_start, self._count)
+        open_section = TrailSection(
+            self.numbers, dict(self._starts), self._positions[open_rows], self._times[open_rows]
+        )
+        sections: list[TrailSection] = []
+        # The first row of a section replaces a row of the same time before it.
+        for section in [open_section, *reversed(self._closed_sections)]:
+            part = section.cut(start, end)
+            if len(part.times):
+                sections.append(part)
+            if len(section.times):
+                end = min(end, float(section.times[0]))
+        return sections[::-1]
+
+    def extend(self, sections: Iterable[TrailSection]) -> None:
+        """Append the rows of sections that are later than the last row."""
+        for section in sections:
+            later = section.cut(self.last_time + 2 * _SAME_TIME_S, np.inf)
+            if not len(later.times):
+                continue
+            self.change_robots(later.numbers)
+            self._starts = {**later.starts, **self._starts}
+            self._start_arrays = {}
+            chunk = max(MAX_TRAIL_ROWS // 8, 1)
+            for first in range(0, len(later.times), chunk):
+                self._append_rows(later.positions[first : first + chunk], later.times[first : first + chunk])
+
+    def _append_rows(self, positions: Array, times: Array) -> None:
+        while self._count + len(times) > len(self._times):
+            self._simplify()
+        rows = slice(self._count, self._count + len(times))
+        self._positions[rows] = positions
+        self._times[rows] = times
+        self._count += len(times)
+
+    def _note_starts(self, positions: Array) -> None:
+        """Note the positions of robots that have joined."""
+        for row, number in enumerate(self.numbers[: len(positions)]):
+            if number not in self._starts:
+                x, y = positions[row].tolist()
+                self._starts[number] = (x, y)
+                self._start_arrays = {}
+
+    def _find_trail(self, time: float) -> "Trail":
+        """Return the trail whose robots are those of the team at a time."""
+        index = len(self._closed_sections)
+        starts = [section.times[0] for section in self._closed_sections]
+        if self._section_start < self._count:
+            starts.append(self._times[self._section_start])
+            index += 1
+        while index > 1 and starts[index - 1] > time + _TIME_TOLERANCE_S:
+            index -= 1
+        if index > len(self._closed_sections) or not self._closed_sections:
+            return self
+        if self._earlier_trail is None or self._earlier_trail[0] != index:
+            self._earlier_trail = (index, build_trail(self._closed_sections[:index]))
+        return self._earlier_trail[1]
+
+    def _simplify(self) -> None:
+        """Remove a quarter of the rows: those without which the trajectories change least."""
+        candidates = np.arange(1, self._count - 1, 2)
+        deviations = _compute_deviations(self.positions, candidates)
+        order = np.argsort(deviations, kind="stable")
+        removed = candidates[order[: max(len(candidates) // 2, 1)]]
+        is_kept = np.ones(self._count, dtype=bool)
+        is_kept[removed] = False
+        self._section_start -= int((removed < self._section_start).sum())
+        count = int(is_kept.sum())
+        self._positions[:count] = self.positions[is_kept]
+        self._times[:count] = self.times[is_kept]
+        self._count = count
+
+
+def build_trail(sections: Sequence[TrailSection]) -> Trail:
+    """Build the trail of sections in the order of time, of which there is at least one."""
+    trail = Trail(sections[0].numbers)
+    trail.extend(sections)
+    return trail
+
+
+def merge_sections(sections: list[TrailSection], later: Iterable[TrailSection]) -> list[TrailSection]:
+    """Return sections, followed by the rows of others that are later than all of theirs."""
+    merged = [section for section in sections if len(section.times)]
+    last_time = -np.inf
+    if merged:
+        last_time = float(merged[-1].times[-1])
+    rest = [section.cut(last_time + 2 * _SAME_TIME_S, np.inf) for section in later]
+    return merged + [section for section in rest if len(section.times)]
+
+
+def _compute_deviations(positions: Array, rows: IntArray) -> Array:
+    """Return how far the trajectories move if single rows are removed, (r,) m.
+
+    A row at which a robot joins or fails has an infinite deviation.
+
+    Parameters
+    ----------
+    positions : (k, n, 2) array, m
+        All rows; nan for robots that do not work.
+    rows : (r,) int array
+        Rows that have a neighbor on either side.
+    """
+    before = positions[rows - 1]
+    point = positions[rows] - before
+    chord = positions[rows + 1] - before
+    with np.errstate(invalid="ignore", divide="ignore"):
+        fraction = (point * chord).sum(axis=2) / (chord * chord).sum(axis=2)
+    # Without a chord, the nearest point is its start.
+    fraction = np.clip(np.nan_to_num(fraction), 0.0, 1.0)
+    offset = point - fraction[..., None] * chord
+    distances = np.hypot(offset[..., 0], offset[..., 1])
+    is_absent = np.isnan(positions[..., 0])
+    is_change = (is_absent[rows] != is_absent[rows - 1]) | (is_absent[rows] != is_absent[rows + 1])
+    distances[is_change] = np.inf
+    deviations: Array = np.nan_to_num(distances, nan=0.0, posinf=np.inf).max(axis=1, initial=0.0)
+    return deviations
 
 
 def select_robots(positions: Array, before: Sequence[int], after: Sequence[int]) -> Array:
@@ -112,12 +306,12 @@ def select_robots(positions: Array, before: Sequence[int], after: Sequence[int])
         Positions of the robots `after`; nan for those that are not among the robots `before`.
     """
     row_by_number = {number: row for row, number in enumerate(before)}
-    rows = np.array([row_by_number.get(number, -1) for number in after])
+    rows = np.array([row_by_number.get(number, -1) for number in after], dtype=np.intp)
     return np.where(rows[:, None] < 0, np.nan, positions[..., rows, :])
 
 
-def rebuild_trail(history: RunHistory, pane: int, last: int) -> tuple[Trail, Array]:
-    """Build the trail up to a recorded state.
+def rebuild_trail(history: RunHistory, pane: int) -> Trail:
+    """Build the trail from recorded states, for a run whose trail is not known.
 
     Parameters
     ----------
@@ -125,32 +319,19 @@ def rebuild_trail(history: RunHistory, pane: int, last: int) -> tuple[Trail, Arr
         The recorded past.
     pane : int
         Number of the pane.
-    last : int
-        Index of the state.
 
     Returns
     -------
-    trail : Trail
-        Trail of the robots that work in that state.
-    starts : (n, 2) array, m
-        Their first positions.
+    Trail
     """
-    numbers = history[last].states[pane].setup.numbers
-    trail = Trail(len(numbers))
-    start_by_number: dict[int, list[float]] = {}
+    trail = Trail(history[0].states[pane].setup.tracked_numbers)
     previous_setup: PaneSetup | None = None
-    latest_time = -np.inf
-    for index in range(last + 1):
-        time = history.get_time(index)
+    for index in range(len(history)):
         state = history[index].states[pane]
         is_edited = state.setup is not previous_setup
+        is_last = index == len(history) - 1
+        trail.change_robots(state.setup.tracked_numbers)
         # The last state is always added, because it contains robots that have just joined.
-        if time - latest_time < _MIN_ROW_INTERVAL_S and not is_edited and index < last:
-            continue
-        if is_edited:
-            previous_setup = state.setup
-            positions = state.positions.tolist()
-            start_by_number = dict(zip(state.setup.numbers, positions, strict=True)) | start_by_number
-        trail.add(time, select_robots(state.positions, state.setup.numbers, numbers), always=True)
-        latest_time = time
-    return trail, np.array([start_by_number[number] for number in numbers])
+        trail.add(history.get_time(index), state.positions, always=is_edited or is_last)
+        previous_setup = state.setup
+    return trail
