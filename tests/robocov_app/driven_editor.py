@@ -60,7 +60,7 @@ def opened_editor(
             document, readings or create_measurement_worker(direct=True), folder, EditorSettings()
         )
         editor.theme = theme
-        hands = Hands(EditorWindow(editor, size, scale, drafts, patient=True))
+        hands = Hands(EditorWindow(editor, size, scale, drafts, waits_for_workers=True))
         hands.settle()
         hands.frames(2)
         try:

@@ -49,7 +49,7 @@ class Editor(EditorContext):
         The tools, and the one in use.
     theme : str
         Colors: "light" or "dark".
-    panel : bool
+    shows_panel : bool
         Whether the panel is shown.
     shown : set of str
         Layers that are shown, see `LAYERS`.
@@ -76,7 +76,7 @@ class Editor(EditorContext):
     typed : str
         Value that is being typed for the tool.
     moves_since : float or None
-        Time since which moving obstacles are shown moving, s; None while they stand.
+        Time since which moving obstacles are shown moving, s; None while they stand still.
     """
 
     error_message_s = 8.0
@@ -93,7 +93,7 @@ class Editor(EditorContext):
         self.folder = folder
         self.toolbox = EditorToolbox()
         self.theme: str = settings.theme
-        self.panel = True
+        self.shows_panel = True
         self.shown = set(settings.shown) & set(LAYERS)
         self.snaps = set(settings.snaps) & set(SNAPS)
         self.grid = settings.grid
@@ -128,8 +128,17 @@ class Editor(EditorContext):
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """Problems of the map, as far as it has been measured."""
-        return self.measurement.problems if self.measurement is not None else ()
+        """Problems found by the latest measurement."""
+        if self.measurement is None:
+            return ()
+        return self.measurement.problems
+
+    @property
+    def shown_measurement(self) -> Measurement | None:
+        """The measurement, if passages that are too narrow are shown."""
+        if "impassable" in self.shown:
+            return self.measurement
+        return None
 
     @property
     def start_names(self) -> list[str]:
@@ -227,20 +236,21 @@ class Editor(EditorContext):
     def toggle_layer(self, name: str) -> None:
         """Show or hide a layer."""
         self.shown ^= {name}
-        self._report_switch(LAYERS[name].title, is_on=name in self.shown)
+        self.show_message(_describe_switch(LAYERS[name].title, is_on=name in self.shown))
 
     def toggle_snap(self, name: str) -> None:
         """Switch a snap mode on or off."""
         self.snaps ^= {name}
-        self._report_switch(SNAPS[name].title, is_on=name in self.snaps)
+        self.show_message(_describe_switch(SNAPS[name].title, is_on=name in self.snaps))
 
     def toggle_all_snaps(self) -> None:
         """Switch all snap modes off, or on if all are off."""
-        self.snaps = set() if self.snaps else set(SNAPS)
-        self.show_message("snaps to everything" if self.snaps else "snaps to nothing")
-
-    def _report_switch(self, title: str, *, is_on: bool) -> None:
-        self.show_message(f"{title}: {'on' if is_on else 'off'}")
+        if self.snaps:
+            self.snaps = set()
+            self.show_message("snaps to nothing")
+        else:
+            self.snaps = set(SNAPS)
+            self.show_message("snaps to everything")
 
     def set_length(self, name: str, length: float) -> None:
         """Set the attribute grid, wall_width or radius to a length, m."""
@@ -255,12 +265,12 @@ class Editor(EditorContext):
     def refine_grid(self) -> None:
         """Choose the next finer grid."""
         finer = [grid for grid in GRIDS_M if grid < self.grid * 0.999]
-        self.set_length("grid", finer[-1] if finer else GRIDS_M[0])
+        self.set_length("grid", max(finer, default=GRIDS_M[0]))
 
     def coarsen_grid(self) -> None:
         """Choose the next coarser grid."""
         coarser = [grid for grid in GRIDS_M if grid > self.grid * 1.001]
-        self.set_length("grid", coarser[0] if coarser else GRIDS_M[-1])
+        self.set_length("grid", min(coarser, default=GRIDS_M[-1]))
 
     def set_robots(self, count: int) -> None:
         """Set the number of robots in the team."""
@@ -277,4 +287,9 @@ class Editor(EditorContext):
 
     def toggle_panel(self) -> None:
         """Show or hide the panel."""
-        self.panel = not self.panel
+        self.shows_panel = not self.shows_panel
+
+
+def _describe_switch(title: str, *, is_on: bool) -> str:
+    state = "on" if is_on else "off"
+    return f"{title}: {state}"

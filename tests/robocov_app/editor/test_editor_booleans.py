@@ -176,7 +176,7 @@ def test_what_sticks_out_is_cut_off():
     assert shapely.Polygon(HALL).covers(half.geometry)
     with pytest.raises(MapError, match="nothing sticks out"):
         boolean.clip_to_boundary(change.sketch, Selection())
-    with pytest.raises(MapError, match="boundary must be sound"):
+    with pytest.raises(MapError, match="boundary must be valid"):
         boolean.clip_to_boundary(replace(sketch, boundary=None), Selection())
 
 

@@ -278,7 +278,7 @@ def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
     hands.click(*hands.widget("option", "problem:0").rect.center)
     assert hands.editor.problem is not None and hands.editor.problem.kind == "outside"
     hands.wait()
-    hands.push("mend:0")
+    hands.push("fix:0")
     assert hands.said == "circle “lamp” deleted"
 
 

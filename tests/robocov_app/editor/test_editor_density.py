@@ -86,7 +86,7 @@ class TestEdits:
     def test_with_the_last_one_the_density_goes(self):
         assert density_edits.remove_feature(heavy(), 0).sketch.density is None
         assert density_edits.remove_density(heavy()).sketch.density is None
-        with pytest.raises(MapError, match="the same already"):
+        with pytest.raises(MapError, match="the same weight already"):
             density_edits.remove_density(sheet())
 
     def test_move_size_weigh(self):
@@ -114,7 +114,7 @@ class TestEdits:
             (lambda: density_edits.add_peak(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
             (lambda: density_edits.set_weight(heavy(), 0, float("nan")), "weight: expected .*, got nan"),
             (lambda: density_edits.set_weight(heavy(), 0, 1e9), "weight: expected .*, got 1e"),
-            (lambda: density_edits.move_feature(heavy(), 5, 1.0, 1.0), "no such hot spot"),
+            (lambda: density_edits.move_feature(heavy(), 5, 1.0, 1.0), "hot spot no longer exists"),
             (lambda: density_edits.set_floor(sheet(), 0.0), "weight: expected .*, got 0"),
             (lambda: density_edits.add_peak(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
         ],
@@ -135,7 +135,7 @@ class TestEdits:
         assert sketch.build_environment().density == sketch.density
 
     def test_in_words(self):
-        assert density_edits.describe_density(None) == "none: every place counts the same"
+        assert density_edits.describe_density(None) == "none: all positions have the same weight"
         assert density_edits.describe_density(ONE) == "1 hot spot, floor 0.5"
         assert density_edits.describe_density(KINDS["bilinear"]) == "picture, 13 x 11"
         assert density_edits.describe_density(KINDS["rooms"]) == "2 areas, 0.3 to 4"
@@ -234,8 +234,8 @@ class TestAreas:
                 "crossings",
             ),
             (lambda s: density_edits.add_area(heavy(), WeightedArea(AREA, 1.0)), "is a gaussians"),
-            (lambda s: density_edits.move_corner(s, 0, 9, (0.0, 0.0)), "no such corner"),
-            (lambda s: density_edits.resize_peak(s, 0, 1.0), "no such hot spot"),
+            (lambda s: density_edits.move_corner(s, 0, 9, (0.0, 0.0)), "corner no longer exists"),
+            (lambda s: density_edits.resize_peak(s, 0, 1.0), "hot spot no longer exists"),
             (lambda s: density_edits.set_weight(density_edits.set_floor(s, 0.0).sketch, 0, 0.0), "above 0"),
         ],
     )

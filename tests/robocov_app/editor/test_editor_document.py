@@ -273,8 +273,8 @@ def test_what_no_map_could_hold_covers_nothing():
 
 
 def test_parts_are_found_by_key():
-    sketch, (a, b) = Sketch().with_obstacles(
-        [CircleObstacle((0.0, 0.0), 1.0), (WallObstacle(HALL, 0.1), "note")]
+    sketch, (a, b) = Sketch().with_annotated_obstacles(
+        [(CircleObstacle((0.0, 0.0), 1.0), ""), (WallObstacle(HALL, 0.1), "note")]
     )
     assert sketch.get_item(b).note == "note"
     assert sketch.next_key > max(a, b)

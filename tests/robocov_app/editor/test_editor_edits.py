@@ -97,7 +97,7 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: create.add_wall(s, [(1, 1), (2, 1)], 0.0), "width is at least 1 mm"),
         (lambda s: create.set_boundary(s, [(1, 1), (2, 1)]), "three corners"),
         (lambda s: create.add_disc_start(s, (1, 1), 0.0), "needs a radius"),
-        (lambda s: create.add_points_start(s, []), "a place for a robot"),
+        (lambda s: create.add_points_start(s, []), "at least one position"),
         (lambda s: transform.move(s, Selection(), 1, 1), "select something"),
         (lambda s: transform.move(s, ALL, 1e9, 1), "too far away"),
         (lambda s: transform.move(s, ALL, math.nan, 1), "too far away"),

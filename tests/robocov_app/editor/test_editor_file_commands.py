@@ -171,7 +171,7 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Pat
     path.unlink()
     hands.window.run_frame(2.0)
     hands.window.run_frame(2.0)
-    assert "no longer there" in hands.said
+    assert "no longer exists" in hands.said
 
 
 def test_a_picture_is_laid_under_by_its_path_from_the_map(hands: Hands, tmp_path: Path) -> None:
@@ -248,7 +248,7 @@ def test_settings_are_remembered(places: Path) -> None:
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")
-        window.documents.leaving = True
+        window.documents.may_close = True
     with opening(places) as window:
         editor = window.editor
         assert (editor.theme, editor.grid, window.panel.tab) == ("dark", 0.25, "snap")
@@ -258,17 +258,17 @@ def test_settings_are_remembered(places: Path) -> None:
 def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
     with opening(places, theme="dark") as window:
         assert window.editor.theme == "dark"
-        window.documents.leaving = True
+        window.documents.may_close = True
     with opening(places) as window:
         assert window.editor.theme == "light"
-        window.documents.leaving = True
+        window.documents.may_close = True
 
 
 def test_a_picture_given_at_the_start_is_shown_whatever_was_hidden_before(places: Path) -> None:
     Image.new("RGB", (40, 30)).save(places / "plan.png")
     with opening(places) as window:
         window.editor.shown.discard("picture")
-        window.documents.leaving = True
+        window.documents.may_close = True
     with opening(places, background=places / "plan.png") as window:
         assert "picture" in window.editor.shown and window.editor.sketch.background is not None
 
@@ -298,7 +298,7 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
         Hands(window).key("l")
         offer_recovery(window, find_recoverable(places / "drafts"))
         Hands(window).key("d")
-        window.documents.leaving = True
+        window.documents.may_close = True
     assert find_recoverable(places / "drafts") == ()
 
 
@@ -314,7 +314,7 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
     with opening(places) as window:
         window.editor.attempt(lambda: window.documents.open(places / "plan.json"))
         assert window.editor.has_error_message and "another editor" in window.editor.message
-        window.documents.leaving = True
+        window.documents.may_close = True
     document.close(discard=True)
 
 
@@ -325,7 +325,7 @@ def test_a_new_name_is_a_new_map(places: Path) -> None:
             and not window.editor.document.history.has_unsaved_changes
         )
         window.editor.attempt(window.documents.save)
-        window.documents.leaving = True
+        window.documents.may_close = True
     assert load_map(places / "fresh.json").area == 100.0
 
 
@@ -384,7 +384,7 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
             window.run_frame(0.01)
         assert window.editor.document.path is None and window.editor.document.history.has_unsaved_changes
         assert window.editor.sketch.build_environment().free_area == 12.0
-        window.documents.leaving = True
+        window.documents.may_close = True
 
 
 def test_a_file_of_no_map_is_named_for_what_it_is(places: Path) -> None:

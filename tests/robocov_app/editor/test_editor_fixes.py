@@ -30,7 +30,7 @@ def rooms(width: float) -> Sketch:
 @pytest.mark.parametrize(
     ("sketch", "kind", "words"),
     [
-        (hall(CircleObstacle((3.0, 3.0), 1.0), boundary=None), "no boundary", "drawn round everything"),
+        (hall(CircleObstacle((3.0, 3.0), 1.0), boundary=None), "no boundary", "drawn around everything"),
         (hall(BOW_TIE), "crossing", "1 outline repaired"),
         (hall(CircleObstacle((20.0, 3.0), 1.0, "lamp")), "outside", "circle “lamp” deleted"),
         (hall(*[CircleObstacle((5.0, 5.0), 1.0)] * 2), "twice", "circle deleted"),
@@ -43,11 +43,11 @@ def rooms(width: float) -> Sketch:
         (
             hall(PolygonObstacle(BOX), starts=(("a", PointsStart(((2.1, 4.0), (1.0, 4.0)))),)),
             "spot",
-            "start “a”: place 1 moved",
+            "start “a”: position 1 moved",
         ),
-        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.1, 1.0)))),)), "spot", "place 2 moved"),
-        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)), "spot", "place 2 moved"),
-        (hall(starts=(("a", PointsStart(((0.05, 4.0),))),)), "spot", "place 1 moved"),
+        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.1, 1.0)))),)), "spot", "position 2 moved"),
+        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)), "spot", "position 2 moved"),
+        (hall(starts=(("a", PointsStart(((0.05, 4.0),))),)), "spot", "position 1 moved"),
         (hall(PolygonObstacle(BOX), starts=(("a", DiscStart((3.0, 4.0), 0.3)),)), "no room", "“a” moved"),
     ],
 )

@@ -199,7 +199,7 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
             else:
                 window.advance(1 / 50)
             if window.closed:
-                window.closed = window.documents.leaving = False
+                window.closed = window.documents.may_close = False
             if step % 50 == 0:
                 sketch = hands.sketch
                 assert parse_sketch(dump_sketch(sketch), "map") == renumbered(sketch)

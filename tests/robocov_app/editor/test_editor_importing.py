@@ -53,9 +53,9 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
     asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(ImportJob()), None)
     assert asked.form.build_settings() == (ReadOptions(), Shaping())
-    given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
+    given = {"number": "1", "position": "1 2", "words": "a, b", "text": "walls"}
     given |= {"colors": "red, #00ff00", "width": "3px"}
-    meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
+    meant = {"number": 1.0, "position": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
     meant |= {"colors": ("red", "#00ff00"), "width": "3px"}
     for option in options:
         asked.form.entries = {option.name: option.choices[-1] if option.choices else given[option.kind]}

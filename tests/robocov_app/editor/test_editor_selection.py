@@ -108,7 +108,7 @@ def test_handles(sketch):
     assert list_vertices(sketch, 77) == list_vertices(sketch, "none") == ()
     assert [closed for _, _, closed in sketch.list_rings(2)] == [False]
     assert sketch.list_rings(1) == sketch.list_rings("disc") == ()
-    with pytest.raises(MapError, match="no such vertex"):
+    with pytest.raises(MapError, match="vertex no longer exists"):
         find_position(sketch, Vertex(0, 0, 4))
 
 

@@ -31,7 +31,7 @@ def test_no_vertex_that_is_left_out_is_far_from_the_new_outline(seed, count, tol
     try:
         change = simplify(sketch, Selection.of(key), tolerance)
     except MapError as error:
-        assert "no vertex can be left out" in str(error)
+        assert "no vertex can be removed" in str(error)
         return
     after = change.sketch.get_item(key).shape
     assert len(after.vertices) < len(ring)
@@ -60,11 +60,11 @@ def test_walls_keep_their_ends_and_the_boundary_is_asked_for():
     )
     change = simplify(sketch, Selection(), 0.01)
     assert change.sketch.get_item(key).shape.points == (line[0], line[-1])
-    assert change.description == "38 vertices left out"
+    assert change.description == "38 vertices removed"
     assert change.sketch.boundary == sketch.boundary
     change = simplify(sketch, Selection(boundary=True), 0.01)
     assert set(change.sketch.boundary) == set(HALL)
-    assert change.description == "1 vertex left out"
+    assert change.description == "1 vertex removed"
 
 
 def test_traced_plans_become_straight():
@@ -122,7 +122,7 @@ def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
     [
         (lambda s: simplify(s, Selection.of(0), 0.1), "select polygons, walls or the boundary"),
         (lambda s: simplify(s, Selection(boundary=True), math.nan), "a tolerance"),
-        (lambda s: simplify(s, Selection(boundary=True), 0.1), "no vertex can be left out"),
+        (lambda s: simplify(s, Selection(boundary=True), 0.1), "no vertex can be removed"),
         (lambda s: straighten(s, Selection(boundary=True), 90.0), "up to 30 degrees"),
     ],
 )

@@ -30,5 +30,5 @@ def test_large_maps_are_known_later_unless_there_is_time() -> None:
         first = snapper.find_targets(LARGE)
     snapper.close()
     patient = Snapper()
-    patient.patient = True
+    patient.waits_for_targets = True
     assert patient.find_targets(LARGE) is not None

@@ -60,7 +60,7 @@ def test_lengths_and_angles_are_told_as_people_write_them() -> None:
     )
     assert describe_path(ObstaclePath(((0.0, 0.0), (3.0, 0.0)), 0.5)) == "0.5 m/s, loop of 6 m in 12 s"
     assert find_free_name(Sketch(starts=(("start", UniformStart()),)), "start") == "start 2"
-    assert translate_message('map: starts["a b"].positions[1]: x', Sketch()) == "start “a b”, place 2: x"
+    assert translate_message('map: starts["a b"].positions[1]: x', Sketch()) == "start “a b”, position 2: x"
 
 
 def test_points_and_angles_are_exact_where_they_are_round() -> None:

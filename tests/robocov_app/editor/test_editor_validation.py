@@ -64,7 +64,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
 @pytest.mark.parametrize(
     ("sketch", "words", "where", "of"),
     [
-        (Sketch("n"), "there is no boundary: draw one round all that is free", None, BOUNDARY),
+        (Sketch("n"), "there is no boundary: draw one around the free space", None, BOUNDARY),
         (hall(name=""), "the map has no name", None, None),
         (hall(name="x" * 101), "the map has a name of 101 characters: at most 100 are possible", None, None),
         (hall(boundary=()), "boundary: it has no corners: it needs three", None, BOUNDARY),
@@ -163,23 +163,23 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             hall(PolygonObstacle(BOX, (), "desk"), starts=(("a", PointsStart(((5.0, 5.0), (2.0, 2.0)))),)),
-            "start “a”: place 2 at (2, 2) is inside polygon “desk”",
+            "start “a”: position 2 at (2, 2) is inside polygon “desk”",
             (2.0, 2.0),
             "a",
         ),
         (
             hall(starts=(("a", PointsStart(((50.0, 5.0),))),)),
-            "start “a”: place 1 at (50, 5) is outside the boundary",
+            "start “a”: position 1 at (50, 5) is outside the boundary",
             (50.0, 5.0),
             "a",
         ),
         (
             hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)),
-            "start “a”: the place (1, 1) is given twice: every robot needs its own",
+            "start “a”: the position (1, 1) occurs twice: each robot needs its own",
             (1.0, 1.0),
             "a",
         ),
-        (hall(starts=(("a", PointsStart(())),)), "start “a”: has no places: it needs one a robot", None, "a"),
+        (hall(starts=(("a", PointsStart(())),)), "start “a”: has no positions: it needs one for each robot", None, "a"),
         (
             hall(starts=(("", DiscStart((2.0, 2.0), 1.0)),)),
             "a start has no name",
@@ -217,9 +217,9 @@ def test_what_is_broken_keeps_nothing_else_from_being_found():
     assert words == [
         "polygon 1: its outline crosses or touches itself at (2, 2)",
         "wall 3: it has no length: it needs two points that are apart",
-        "start “a”: place 1 at (6, 6) is inside circle 2",
+        "start “a”: position 1 at (6, 6) is inside circle 2",
         # of the bow tie's two halves, one place lies in one; the other is free
-        "start “b”: place 1 at (1.5, 2) is inside polygon 1",
+        "start “b”: position 1 at (1.5, 2) is inside polygon 1",
     ]
 
 
@@ -239,10 +239,10 @@ def test_warnings_of_what_may_be_a_mistake():
     assert warned(hall(beside)) == ["polygon 1 lies outside the boundary"]
     twice = CircleObstacle((5.0, 5.0), 1.0, "a")
     assert warned(hall(twice, replace(twice, name="b"))) == [
-        "circle “b” lies on another one that is just the same"
+        "circle “b” duplicates another obstacle"
     ]
     doubled = PolygonObstacle(((1.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.0, 3.0)))
-    assert warned(hall(doubled)) == ["polygon 1: two vertices lie in the same place, (1, 1)"]
+    assert warned(hall(doubled)) == ["polygon 1: two vertices have the same position, (1, 1)"]
     ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
     assert not [words for words in warned(hall(ended)) if "two vertices" in words]
 
@@ -268,7 +268,7 @@ def test_sealed_rooms_and_pockets_are_told_of():
     )
     words = warned(hall(frame, box))
     assert words == [
-        "the room of 9 m² round (4, 4) is sealed: no way leads in",
+        "the room of 9 m² around (4, 4) is sealed: it has no entrance",
         "1 sealed pocket is smaller than a robot, 0.04 m² in total",
     ]
 
@@ -283,7 +283,7 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     assert not [words for words in warned(sketch, 0.2) if "start" in words]
     words = [words for words in warned(sketch, 0.5) if "start" in words]
     assert words[0] == "start “a”: its disc has no room for a robot of radius 0.5 m"
-    assert words[1] == "start “b”: place 1 at (1, 1) and place 2 are 0.5 m apart: robots need 1 m"
+    assert words[1] == "start “b”: position 1 at (1, 1) and position 2 are 0.5 m apart: robots need 1 m"
     assert warned(hall(starts=(("all", UniformStart()),)), 3.9) == []
     assert warned(hall(starts=(("all", UniformStart()),)), 4.0) == [
         "start “all”: the free space has no room for a robot of radius 4 m"
@@ -294,13 +294,13 @@ def test_each_spot_that_is_too_tight_is_told_of_where_it_is():
     spots = ((0.1, 1.0), (5.0, 5.0), (5.3, 5.0), (11.95, 7.0))
     found = problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
     assert [(problem.message, problem.geometry.centroid.coords[0]) for problem in found] == [
-        ("start “a”: place 1 at (0.1, 1) is 0.1 m from a wall: robots need 0.2 m", (0.1, 1.0)),
+        ("start “a”: position 1 at (0.1, 1) is 0.1 m from a wall: robots need 0.2 m", (0.1, 1.0)),
         (
-            "start “a”: place 4 at (11.95, 7) is 0.05 m from a wall: robots need 0.2 m",
+            "start “a”: position 4 at (11.95, 7) is 0.05 m from a wall: robots need 0.2 m",
             (11.95, 7.0),
         ),
         (
-            "start “a”: place 2 at (5, 5) and place 3 are 0.3 m apart: robots need 0.4 m",
+            "start “a”: position 2 at (5, 5) and position 3 are 0.3 m apart: robots need 0.4 m",
             (5.15, 5.0),
         ),
     ]
@@ -318,7 +318,7 @@ def test_messages_of_the_map_name_things_and_where_they_are():
         ("obstacles[1].path.speed: is odd", "polygon 2, path, speed: is odd"),
         ("obstacles[1].path.points[0]: is odd", "polygon 2, path, point 1: is odd"),
         ("density.areas[2].vertices[0]: is odd", "density, area 3, corner 1: is odd"),
-        ("starts.corner.positions[1]: is odd", "start “corner”, place 2: is odd"),
+        ("starts.corner.positions[1]: is odd", "start “corner”, position 2: is odd"),
         ("boundary[3]: is odd", "boundary, corner 4: is odd"),
     ]:
         assert translate_message(message, sketch) == words

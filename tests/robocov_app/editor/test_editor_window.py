@@ -376,7 +376,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
     sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).with_obstacles(shapes)[0]
     with opened_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as hands:
         window, sheet = hands.window, hands.window.canvas.sheet
-        hands.editor.snapper.patient = False
+        hands.editor.snapper.waits_for_targets = False
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
         hands.press(x, y)
@@ -418,9 +418,9 @@ def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
     hands.key("ctrl+tab")
     hands.editor.select(Selection())
     hands.frames(2)
-    lines = [each for each in hands.window.panel.ui.widgets.values() if each.key.startswith("thing:")]
+    lines = [each for each in hands.window.panel.ui.widgets.values() if each.key.startswith("object:")]
     assert lines[-1].text == "boundary" and len(lines) == len(hands.shapes) + 1 + len(hands.sketch.starts)
-    hands.click(*hands.widget("option", "thing:0").rect.center)
+    hands.click(*hands.widget("option", "object:0").rect.center)
     assert hands.editor.selection.items == {0}
 
 

@@ -48,7 +48,7 @@ def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
         fuzz = RandomEvents(hands.window, folder / "odd", seed)
 
         def stay_open() -> None:
-            hands.window.documents.leaving = False
+            hands.window.documents.may_close = False
 
         fuzz.play(events, stay_open)
         leave_everything(hands)

@@ -1,7 +1,6 @@
 """The canvas: the sheet under a camera, the layers on top of it, and the strips above and below."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from pygame import Rect, Surface
@@ -41,17 +40,17 @@ BADGE_REACH_PX = 10
 SCALE_BAR_LABEL_PX = 90
 
 MAX_PAN_FRACTION = 0.45  # of the view, by which the map can be moved out of its middle
-EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # shown of an empty sheet
-MIN_VIEW_M = 0.2  # width and height that are shown at least
+EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # part of an empty sheet that is shown
+MIN_VIEW_M = 0.2  # minimum width and height that are shown
 MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
 
 
 def describe_map(editor: Editor) -> str:
     """Return the facts about the map in the strip at the foot."""
-    history = editor.document.history
-    unsaved_mark = "● " if history.has_unsaved_changes else ""
-    facts = [f"{unsaved_mark}{editor.document.title}"]
-    facts.append(format_count(len(editor.sketch.obstacles), "obstacle"))
+    title = editor.document.title
+    if editor.document.history.has_unsaved_changes:
+        title = f"● {title}"
+    facts = [title, format_count(len(editor.sketch.obstacles), "obstacle")]
     measurement = editor.measurement
     if measurement is not None:
         facts.append(f"{measurement.free_area:.2f} m² free")
@@ -121,11 +120,15 @@ class EditorCanvas:
 
     def _update_legend(self, canvas: Canvas) -> None:
         is_shown = "legend" in self.editor.shown
-        self.entries = self._build_legend_entries() if is_shown else []
+        self.entries = []
+        if is_shown:
+            self.entries = self._build_legend_entries()
         rows = max(len(legend_strip.arrange_legend_rows(canvas, self.entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, self.editor.document, is_shown)
-        # While entries come and go the legend does not shrink again, so that the map does not jump.
-        self._legend_rows = max(rows, self._legend_rows) if key == self._legend_key else rows
+        if key == self._legend_key:
+            # While entries come and go the legend does not shrink again, so that the map does not jump.
+            rows = max(rows, self._legend_rows)
+        self._legend_rows = rows
         self._legend_key = key
 
     def _build_legend_entries(self) -> list[LegendEntry]:
@@ -136,7 +139,7 @@ class EditorCanvas:
         )
         team = self.team
         entries = build_legend_entries(
-            editor.measurement if "impassable" in editor.shown else None,
+            editor.shown_measurement,
             has_starts=bool(sketch.starts),
             has_team="robots" in editor.shown and team is not None and bool(team.positions),
             has_hull_excess=has_excess,
@@ -150,13 +153,17 @@ class EditorCanvas:
 
     def fit(self, selection: Selection | None = None) -> None:
         """Show the whole map, or a selection."""
-        bounds = transform.compute_bounds(self.editor.sketch, selection) if selection else None
+        bounds = None
+        if selection:
+            bounds = transform.compute_bounds(self.editor.sketch, selection)
         low_x, low_y, high_x, high_y = bounds or self.editor.sketch.bounds or EMPTY_VIEW_M
         margin_x = max(MIN_VIEW_M - (high_x - low_x), 0) / 2
         margin_y = max(MIN_VIEW_M - (high_y - low_y), 0) / 2
         box = (low_x - margin_x, low_y - margin_y, high_x + margin_x, high_y + margin_y)
         self._set_camera(Camera.fit(box, self._compute_view_box(), MARGIN_PX * self.layout.scale))
-        self._fitted = None if bounds else (self.camera.center, self.camera.zoom)
+        self._fitted = None
+        if bounds is None:
+            self._fitted = (self.camera.center, self.camera.zoom)
 
     def show_problem(self, problem: Problem | None) -> None:
         """Move the view so that a problem is visible."""
@@ -170,10 +177,10 @@ class EditorCanvas:
 
     def zoom(self, factor: float, at: Point | None = None) -> None:
         """Magnify about a pixel of the window: by default the cursor, or the middle."""
+        if at is None and self.at is not None and self.contains(self.at):
+            at = self.at
         if at is None:
-            is_over_map = self.at is not None and self.contains(self.at)
-            at = self.at if is_over_map else self.camera.middle
-        assert at is not None
+            at = self.camera.middle
         low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
         extent = max(high_x - low_x, high_y - low_y, 1.0)
         self._set_camera(zoom_about(self.camera, factor, at, extent))
@@ -220,7 +227,6 @@ class EditorCanvas:
 
     def _build_view(self) -> View:
         editor = self.editor
-        path = editor.document.path
         return View(
             camera=self.camera,
             theme=self.theme,
@@ -228,7 +234,7 @@ class EditorCanvas:
             size=self.layout.size,
             shown=frozenset(editor.shown),
             grid=editor.grid,
-            folder=Path(path.parent if path is not None else editor.folder),
+            folder=editor.document.get_folder(editor.folder),
         )
 
     def draw(self, screen: Surface) -> None:
@@ -262,15 +268,17 @@ class EditorCanvas:
             saved=editor.sketch,
             sketch=sketch,
             selection=selection,
-            lifted=_find_lifted(editor.sketch, sketch, state),
+            lifted=_find_lifted_keys(editor.sketch, sketch, state),
             team=self.team,
             hovered=self.hovered,
             cursor=self.at,
         )
 
     def _draw_sheet(self, scene: EditorScene) -> None:
+        sketch = scene.saved
         is_boundary_changed = scene.sketch.boundary is not scene.saved.boundary
-        sketch = scene.sketch if is_boundary_changed else scene.saved
+        if is_boundary_changed:
+            sketch = scene.sketch
         if scene.state.background is not None:
             sketch = replace(sketch, background=scene.state.background)
         if scene.state.pending is not None:
@@ -310,11 +318,12 @@ class EditorCanvas:
         canvas.draw_text(text, (box.width - annotations.EDGE_PX * scale, height / 2), anchor="right")
 
 
-def _find_lifted(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:
+def _find_lifted_keys(saved: Sketch, displayed: Sketch, state: EditorDrawState) -> frozenset[int]:
     """Return the keys of obstacles that are not drawn on the sheet: they are dragged, changed or gone."""
-    if state.carried is not None:
-        return frozenset() if state.carried.are_copies else state.carried.selection.items
-    if displayed is saved:
+    carried = state.carried
+    if carried is not None and not carried.are_copies:
+        return carried.selection.items
+    if carried is not None or displayed is saved:
         return frozenset()
     items = {item.key: item for item in displayed.obstacles}
     return frozenset(item.key for item in saved.obstacles if items.get(item.key) is not item)

@@ -11,9 +11,10 @@ from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color
 
 HATCH_STEP_PX = 7  # between slanted lines, at scale 1
-CUT_OFF_FORCE = "repulsion_robots"  # the force whose color areas have that are cut off
+CUT_OFF_FORCE = "repulsion_robots"  # areas that are cut off have the color of this force
 CUT_OFF_STRENGTH = 0.5
 _WHITE = (255, 255, 255)
+_TRANSPARENT = (0, 0, 0, 0)
 _TINT_OPACITY = 56
 _LINE_OPACITY = 235
 
@@ -31,7 +32,7 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
     Returns
     -------
     tuple of Surface and Rect, or None
-        A premultiplied picture and its position in the window, px; None if nothing is visible.
+        A premultiplied image and its position in the window, px; None if nothing is visible.
     """
     areas: list[tuple[Outline, Color, float]] = []
     if not measurement.sealed.is_empty:
@@ -58,10 +59,12 @@ def _hatch_area(view: View, patch: Surface, box: Rect, outline: Outline, ink: tu
     edges = view.build_canvas(patch)
     rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
     for ring, is_outer in zip(rings, outline.outer, strict=True):
-        mask.fill_polygon(ring, (*_WHITE, 255) if is_outer else (0, 0, 0, 0))
         if is_outer:
+            mask.fill_polygon(ring, (*_WHITE, 255))
             # Areas thinner than a pixel become a line.
             mask.draw_outline(ring, _WHITE, 1)
+        else:
+            mask.fill_polygon(ring, _TRANSPARENT)
     lines = draw_hatch_page(box, color, view.scale, strength)
     mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
     patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)

@@ -24,7 +24,7 @@ from robocov_app.render.crowding import fit_radii
 from robocov_app.render.layers.robots import READABLE_RADIUS_PX
 from robocov_app.render.surface_cache import LatestValue
 
-MANY_OBJECTS = 200  # outlines of more selected objects are drawn once, and then as a picture
+MANY_OBJECTS = 200  # the outlines of more selected objects are drawn once, and kept as an image
 DRAGGED_TINT = 0.22  # share of the accent color in obstacles that are dragged
 MAX_RADIUS_PX = 400.0  # of a robot that is drawn as a sprite
 MIN_NUMBER_PX = 7.5  # at scale 1: smaller numbers are not written on robots
@@ -43,30 +43,30 @@ class DraggedObstacles:
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
-        self._picture: LatestValue[Surface] = LatestValue()
+        self._image: LatestValue[Surface] = LatestValue()
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the obstacles."""
         if scene.state.carried is not None:
-            self._draw_carried(scene, scene.state.carried)
+            self._draw_carried_items(scene, scene.state.carried)
         elif scene.sketch is not scene.saved:
             theme = scene.canvas.theme
             keys = scene.saved.index_by_key.keys() - scene.lifted
             items = [item for item in scene.sketch.obstacles if item.key not in keys]
             self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.final, DRAGGED_TINT))
 
-    def _draw_carried(self, scene: EditorScene, carried: CarriedItems) -> None:
+    def _draw_carried_items(self, scene: EditorScene, carried: CarriedItems) -> None:
         camera = scene.view.camera
-        picture = self._picture.get(
+        image = self._image.get(
             scene.saved,
             (carried.selection, camera, scene.view.theme.name),
-            lambda: self._draw_picture(scene, carried.selection),
+            lambda: self._draw_image(scene, carried.selection),
         )
         dx = round(camera.zoom * carried.offset[0])
         dy = round(-(camera.zoom * carried.offset[1]))
-        scene.screen.blit(picture, (dx, dy), special_flags=_PREMULTIPLIED)
+        scene.screen.blit(image, (dx, dy), special_flags=_PREMULTIPLIED)
 
-    def _draw_picture(self, scene: EditorScene, selection: Selection) -> Surface:
+    def _draw_image(self, scene: EditorScene, selection: Selection) -> Surface:
         theme = scene.view.theme
         page = scene.view.build_page()
         items = [item for item in scene.saved.obstacles if item.key in selection.items]
@@ -103,14 +103,15 @@ class Paths:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the paths."""
-        sketch = scene.sketch if scene.state.pending is None else scene.state.pending
+        sketch = scene.state.pending or scene.sketch
         theme = scene.canvas.theme
         for key in paths.list_moving_obstacles(sketch):
             item = sketch.get_item(key)
             path = item.shape.path
             assert path is not None
-            is_selected = key in scene.editor.selection.items
-            color = theme.final if is_selected else mix(theme.background, theme.ink, 0.6)
+            color = mix(theme.background, theme.ink, 0.6)
+            if key in scene.editor.selection.items:
+                color = theme.final
             overlay.draw_path(scene.canvas, path, color)
             if scene.editor.moves_since is not None and paths.leads_somewhere(path):
                 shift = path.compute_displacement(scene.editor.now - scene.editor.moves_since)
@@ -124,9 +125,11 @@ class StartMarkers:
     def draw(self, scene: EditorScene) -> None:
         """Draw the starts with their names."""
         for number, (name, start) in enumerate(scene.sketch.starts):
-            label = f"{name}, default" if number == 0 else name
+            label = name
+            if name and number == 0:
+                label = f"{name}, default"
             is_selected = name in scene.editor.selection.starts
-            overlay.draw_start(scene.canvas, start, label if name else "", is_selected=is_selected)
+            overlay.draw_start(scene.canvas, start, label, is_selected=is_selected)
 
 
 class TeamAtStart:
@@ -147,8 +150,6 @@ class TeamAtStart:
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist(), strict=True)):
             size = round(2 * min(radius, MAX_RADIUS_PX)) / 2
-            number = str(k + 1)
-            is_legible = sprites.choose_number_size(size, min(len(number), 4)) > MIN_NUMBER_PX * scale
             sprite = partial(
                 sprites.render_disc,
                 size,
@@ -156,9 +157,18 @@ class TeamAtStart:
                 ring=theme.robot_ring,
                 ring_width=min(1.4 * scale, 0.3 * size),
                 edge=edge,
-                text=number if is_legible else "",
+                text=_choose_number(k + 1, size, scale),
             )
             canvas.draw_sprite(sprite, center)
+
+
+def _choose_number(number: int, radius: float, scale: float) -> str:
+    """Return the number of a robot as a text; empty if its disc, of a radius in px, is too small for it."""
+    text = str(number)
+    text_size = sprites.choose_number_size(radius, min(len(text), 4))
+    if text_size > MIN_NUMBER_PX * scale:
+        return text
+    return ""
 
 
 class SelectedObjects:
@@ -174,12 +184,12 @@ class SelectedObjects:
             return
         selection = scene.selection.restrict_to(scene.sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.owner for vertex in selection.vertices}
-        self._draw_hovered(scene, owners)
+        self._draw_hovered_object(scene, owners)
         self._draw_outlines(scene, selection, owners)
         if "handles" in scene.view.shown and scene.state.shows_handles and selection:
             self._draw_handles(scene, selection)
 
-    def _draw_hovered(self, scene: EditorScene, selected: set[Owner]) -> None:
+    def _draw_hovered_object(self, scene: EditorScene, selected: set[Owner]) -> None:
         hovered = scene.state.hovered
         if hovered is None or hovered in selected or not scene.cursor:
             return
@@ -217,7 +227,7 @@ class SelectedObjects:
         handles = editor.handles
         if scene.sketch is not editor.sketch:
             handles = list_handles(scene.sketch, selection, editor.pixel)
-        overlay.draw_handles(canvas, handles, selection.vertices, scene.state.near)
+        overlay.draw_handles(canvas, handles, selection.vertices, scene.state.hovered_handle)
 
 
 class GapLabel:
@@ -227,7 +237,9 @@ class GapLabel:
         """Write the width."""
         measurement = scene.measurement
         if measurement is not None and measurement.gap is not None:
-            cursor = scene.cursor if scene.state.labels_cursor else None
+            cursor = None
+            if scene.state.labels_cursor:
+                cursor = scene.cursor
             overlay.draw_gap_label(scene.canvas, measurement.gap, measurement.radius, cursor)
 
 

@@ -8,7 +8,7 @@ from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.hatching import CUT_OFF_FORCE, draw_hatch_page
 from robocov_app.editor.canvas.view import choose_outside_color
 from robocov_app.editor.model.measurement import Measurement
-from robocov_app.look.colors import mix
+from robocov_app.look.colors import Color, mix
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
 
 
@@ -41,11 +41,9 @@ def build_legend_entries(
         (has_team, "robot", _draw_robot),
     ]
     if measurement is not None:
-        narrow = partial(_draw_hatch, is_narrow=True)
-        cut_off = partial(_draw_hatch, is_narrow=False)
         badge = partial(overlay.draw_badge, is_error=True, is_small=True)
-        rows.append((bool(measurement.impassable), "too narrow for a robot", narrow))
-        rows.append((bool(measurement.sealed), "cut off", cut_off))
+        rows.append((bool(measurement.impassable), "too narrow for a robot", _draw_narrow_area))
+        rows.append((bool(measurement.sealed), "cut off", _draw_cut_off_area))
         rows.append((bool(measurement.problems), "problem", badge))
     return [LegendEntry(text, glyph) for is_present, text, glyph in rows if is_present]
 
@@ -77,8 +75,15 @@ def _draw_robot(canvas: Canvas, x: float, y: float) -> None:
     overlay.draw_disc(canvas, (x, y), 6.5, colors, rim=1.4)
 
 
-def _draw_hatch(canvas: Canvas, x: float, y: float, *, is_narrow: bool) -> None:
+def _draw_narrow_area(canvas: Canvas, x: float, y: float) -> None:
+    _draw_hatching(canvas, x, y, canvas.theme.trajectory)
+
+
+def _draw_cut_off_area(canvas: Canvas, x: float, y: float) -> None:
+    _draw_hatching(canvas, x, y, canvas.theme.forces[CUT_OFF_FORCE])
+
+
+def _draw_hatching(canvas: Canvas, x: float, y: float, color: Color) -> None:
     size = round(12 * canvas.scale)
-    color = canvas.theme.trajectory if is_narrow else canvas.theme.forces[CUT_OFF_FORCE]
     page = draw_hatch_page(Rect(0, 0, size, size), color, canvas.scale)
     canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))

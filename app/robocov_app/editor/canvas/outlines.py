@@ -13,9 +13,9 @@ from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.surface_cache import LatestValue
 
-MAX_OUTLINES_PER_OBSTACLE = 4  # kept, among them those of obstacles that may come back by undoing
+MAX_OUTLINES_PER_OBSTACLE = 4  # kept outlines; undoing may bring their obstacles back
 SPARE_OUTLINES = 1000
-MIN_NAME_GAIN = 1.2  # a second position for a name must be so much wider than the first
+MIN_NAME_GAIN = 1.2  # minimum ratio of the width of another position for a name to the best one so far
 
 
 class NameSpace(NamedTuple):

@@ -60,7 +60,9 @@ class DiscColors(NamedTuple):
 
 def choose_problem_color(theme: Theme, *, is_error: bool) -> Color:
     """Return the color of an error or of a warning."""
-    return theme.trajectory if is_error else theme.others[1]
+    if is_error:
+        return theme.trajectory
+    return theme.others[1]
 
 
 def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
@@ -112,7 +114,7 @@ def draw_dashes(canvas: Canvas, points: Iterable[sprites.Pixel], color: Color, d
 
 
 def draw_handles(
-    canvas: Canvas, handles: Sequence[Handle], selected: frozenset[Vertex], near: Handle | None
+    canvas: Canvas, handles: Sequence[Handle], selected: frozenset[Vertex], hovered: Handle | None
 ) -> None:
     """Draw the handles of a selection.
 
@@ -124,14 +126,14 @@ def draw_handles(
         The handles.
     selected : frozenset of Vertex
         Selected vertices, whose handles are filled.
-    near : Handle or None
+    hovered : Handle or None
         Handle under the cursor, which is drawn larger.
     """
     floor = canvas.theme.background
     accent = canvas.theme.final
     positions = to_pixels(canvas, (handle.at for handle in handles)).tolist()
     for handle, (x, y) in zip(handles, positions, strict=True):
-        is_large = handle == near
+        is_large = handle == hovered
         if handle.kind == "turn":
             canvas.draw_line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.scale_width(1.0))
             radius = 5.5 if is_large else 4.5
@@ -139,7 +141,9 @@ def draw_handles(
         elif handle.kind == "scale":
             _draw_square(canvas, (x, y), floor, is_large=is_large)
         else:
-            fill = accent if handle.vertex in selected else floor
+            fill = floor
+            if handle.vertex in selected:
+                fill = accent
             _draw_square(canvas, (x, y), fill, is_large=is_large, is_rounded=True)
 
 
@@ -341,7 +345,9 @@ def _draw_selection_box(canvas: Canvas, corners: tuple[Point, Point], *, selects
     high = ends.max(axis=0)
     left, top, width, height = np.rint([*low, *(high - low)]).astype(int).tolist()
     box = Rect(left, top, width, height).clip(canvas.surface.get_clip())
-    color = canvas.theme.start if selects_touched else canvas.theme.final
+    color = canvas.theme.final
+    if selects_touched:
+        color = canvas.theme.start
     if box:
         page = Surface(box.size, pygame.SRCALPHA, 32)
         page.fill((*color, 34))
@@ -377,7 +383,9 @@ def draw_typed_text(canvas: Canvas, text: str, at: Point) -> None:
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
     """Draw the narrowest gap: in the color of errors if robots of a radius, m, do not pass."""
     start, end, across = _locate_gap(canvas, gap)
-    color = canvas.theme.trajectory if gap.width < 2 * radius else canvas.theme.start
+    color = canvas.theme.start
+    if gap.width < 2 * radius:
+        color = canvas.theme.trajectory
     for a, b in ((start, end), (start - across, start + across), (end - across, end + across)):
         canvas.draw_line(a.tolist(), b.tolist(), color, canvas.scale_width(2))
     for point in (start, end):
@@ -402,8 +410,10 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     scale = canvas.scale
     sign = "<" if gap.width < 2 * radius else "≥"
     label = f"gap {format_length(gap.width)} {sign} {format_length(2 * radius)}"
-    is_upright = abs(across[0]) < MIN_LENGTH_PX
-    side = 1.0 if is_upright else float(np.sign(across[0]))
+    side = 1.0
+    if abs(across[0]) >= MIN_LENGTH_PX:
+        # The label is to the right of the gap.
+        side = float(np.sign(across[0]))
     position = (start + end) / 2 + across * side * 2.4
     x = float(position[0]) + 8 * scale
     y = float(position[1]) - 16 * scale
@@ -453,9 +463,9 @@ def draw_problems(
         canvas.draw_line((x, y), (x, foot), color, canvas.scale_width(1.5))
         canvas.draw_sprite(partial(sprites.render_dot, 1.8 * canvas.scale, color), (x, foot))
         draw_badge(canvas, x, y, is_error=problem.is_error)
-    only_error = problems[0] if len(problems) == 1 and problems[0].is_error else None
+    is_single_error = len(problems) == 1 and problems[0].is_error
     for problem, position in badges:
-        if problem in noted or problem is only_error:
+        if problem in noted or is_single_error:
             _draw_problem_message(canvas, problem, position)
             if problem is chosen:
                 draw_ring(canvas, position, BADGE_RADIUS_PX + 4, canvas.theme.ink, 1.6)
@@ -479,8 +489,9 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
     scale = canvas.scale
     text_x = x + (BADGE_RADIUS_PX + 10) * scale
     free_width = canvas.surface.get_width() - text_x - 8 * scale
-    is_wide_enough = free_width > canvas.measure_text(problem.message)
-    text_y = y if is_wide_enough else y - (BADGE_RADIUS_PX + 14) * scale
+    text_y = y
+    if free_width <= canvas.measure_text(problem.message):
+        text_y = y - (BADGE_RADIUS_PX + 14) * scale
     draw_tag(canvas.surface, problem.message, (text_x, text_y), canvas.theme, scale)
 
 

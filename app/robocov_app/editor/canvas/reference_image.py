@@ -11,9 +11,9 @@ from robocov_app.editor.model.background import Background
 from robocov_app.render.camera import Camera
 from robocov_app.storage.regular_files import require_regular_file
 
-MAX_IMAGE_PX = 4096  # side that is kept of a larger picture
+MAX_IMAGE_PX = 4096  # side to which larger pictures are reduced
 MAX_SHOWN_PX = 8192  # side of the magnified part that is drawn
-MIN_PIXELATED_FACTOR = 4.0  # from this magnification on pixels stay sharp
+MIN_PIXELATED_FACTOR = 4.0  # magnification above which pixels are not smoothed
 
 
 class ReferenceImage:
@@ -104,9 +104,10 @@ class ReferenceImage:
         if last_x <= first_x or last_y <= first_y or max(size_x, size_y) > MAX_SHOWN_PX:
             return None
         part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
-        is_smooth = factor < MIN_PIXELATED_FACTOR
-        magnify = pygame.transform.smoothscale if is_smooth else pygame.transform.scale
-        return magnify(part, (size_x, size_y)), Rect(low_x, low_y, 0, 0)
+        position = Rect(low_x, low_y, 0, 0)
+        if factor < MIN_PIXELATED_FACTOR:
+            return pygame.transform.smoothscale(part, (size_x, size_y)), position
+        return pygame.transform.scale(part, (size_x, size_y)), position
 
 
 def _convert_to_rgb(picture: Image.Image) -> Image.Image:

@@ -64,4 +64,4 @@ class EditorScene:
     @property
     def measurement(self) -> Measurement | None:
         """The measurement, if passages that are too narrow are shown."""
-        return self.editor.measurement if "impassable" in self.view.shown else None
+        return self.editor.shown_measurement

@@ -36,6 +36,7 @@ MAX_REDRAWN_FRACTION = 0.5  # of the page; if more has changed, the whole page i
 MAX_BOXES = 40  # more boxes are redrawn as one
 MIN_LABEL_CHARACTERS = 6  # of a shortened name
 OBSTACLE_OPACITY = 0.62  # over a picture
+_TRANSPARENT = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +160,9 @@ class Sheet:
         if sketch.boundary is not None and len(sketch.boundary) > 2:
             boundary = view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
             canvas.fill_polygon(boundary, theme.background)
-        background = sketch.background if "picture" in view.shown else None
+        background = None
+        if "picture" in view.shown:
+            background = sketch.background
         has_picture = background is not None and background.shown
         if background is not None:
             self.reference_image.draw(page, background, view.folder, view.camera, view.clip)
@@ -168,8 +171,8 @@ class Sheet:
         if boundary is not None:
             _draw_density(canvas, sketch)
         self._draw_hull_excess(canvas, sketch)
-        near = self.outlines.find_items(sketch, _compute_visible_box(view, box))
-        visible = [item for item in near if items.get(item.key) is item]
+        candidates = self.outlines.find_items(sketch, _compute_visible_box(view, box))
+        visible = [item for item in candidates if items.get(item.key) is item]
         if has_picture:
             self._draw_translucent_items(canvas, visible, box)
         else:
@@ -181,7 +184,7 @@ class Sheet:
         page.set_clip(None)
 
     def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:
-        """Draw what robots take for free although it lies outside the boundary: their hull contains it."""
+        """Draw areas outside the boundary that count as free for the robots, as they lie in its hull."""
         theme = canvas.theme
         excess = self._hull_excess.get(sketch.boundary, None, lambda: compute_hull_excess(sketch))
         fill = mix(choose_outside_color(theme), theme.obstacle, 0.55)
@@ -213,7 +216,10 @@ class Sheet:
             corners = canvas.camera.to_pixels(np.concatenate(rings))
             fills: list[Color | None] = []
             for outline in outlines:
-                fills += [None if outline.has_holes else fill] * len(outline.rings)
+                ring_fill: Color | None = fill
+                if outline.has_holes:
+                    ring_fill = None
+                fills += [ring_fill] * len(outline.rings)
             canvas.draw_polygons(corners, ends, fills)
             for outline in outlines:
                 if outline.has_holes:
@@ -357,7 +363,10 @@ def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
     page = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
     for ring, is_outer in zip(outline.rings, outline.outer, strict=True):
         corners = canvas.camera.to_pixels(ring) - np.array(clip.topleft)
-        page.fill_polygon(corners, (*fill, 255) if is_outer else (0, 0, 0, 0))
+        if is_outer:
+            page.fill_polygon(corners, (*fill, 255))
+        else:
+            page.fill_polygon(corners, _TRANSPARENT)
     canvas.surface.blit(page.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 

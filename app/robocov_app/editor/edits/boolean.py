@@ -73,7 +73,9 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
     """Return an obstacle grown by a distance, m; a circle stays one."""
     if isinstance(item.shape, CircleObstacle):
         radius = round_length(item.shape.radius + distance)
-        return [replace(item.shape, radius=radius)] if radius >= MIN_SIZE_M else []
+        if radius < MIN_SIZE_M:
+            return []
+        return [replace(item.shape, radius=radius)]
     grown = item.geometry.buffer(distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
     return extract_polygons(grown, item.shape.name)
 
@@ -81,10 +83,12 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
     """Cut off what sticks out of the boundary: of the selected obstacles, or of all."""
     if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
-        raise MapError("the boundary must be sound first")
+        raise MapError("the boundary must be valid first")
     inside = shapely.Polygon(sketch.boundary)
     shapely.prepare(inside)
-    items = selection.list_items(sketch) if selection.items else sketch.obstacles
+    items: Sequence[Item] = sketch.obstacles
+    if selection.items:
+        items = selection.list_items(sketch)
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in items:
         if not inside.covers(item.geometry):
@@ -125,7 +129,9 @@ def _repair_boundary(sketch: Sketch) -> tuple[tuple[float, float], ...] | None:
     if boundary is None or len(boundary) < 3 or shapely.Polygon(boundary).is_valid:
         return boundary
     parts = extract_polygons(shapely.make_valid(shapely.Polygon(boundary)))
-    return parts[0].vertices if parts else None
+    if not parts:
+        return None
+    return parts[0].vertices
 
 
 def _unite_geometries(items: Sequence[Item]) -> shapely.Geometry:

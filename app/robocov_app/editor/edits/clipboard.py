@@ -21,9 +21,12 @@ SOURCE = "clipboard"  # in error messages
 
 def copy_selection(sketch: Sketch, selection: Selection) -> str:
     """Return the selected objects as JSON text."""
+    boundary = None
+    if selection.boundary:
+        boundary = sketch.boundary
     part = Sketch(
         sketch.name,
-        boundary=sketch.boundary if selection.boundary else None,
+        boundary=boundary,
         obstacles=tuple(selection.list_items(sketch)),
         starts=tuple((name, start) for name, start in sketch.starts if name in selection.starts),
     )
@@ -66,7 +69,7 @@ def paste(sketch: Sketch, text: str, position: Point | None = None, grid: float 
         shapes.append((PolygonObstacle(part.boundary), ""))
     pasted, added = create.add_objects(sketch, shapes, part.starts)
     selection = replace(added, boundary=sets_boundary)
-    require(selection, f"there is nothing to paste in {SOURCE}")
+    require(selection, f"there is nothing to paste in the {SOURCE}")
     if sets_boundary:
         pasted = replace(pasted, boundary=part.boundary)
     dx, dy = _compute_displacement(pasted, selection, position, grid)
@@ -92,7 +95,7 @@ def _compute_displacement(
 
 def _parse(text: str) -> Sketch:
     require(text.strip(), "there is nothing to paste")
-    require(text.lstrip()[:1] in ("{", "["), f"{SOURCE} is no part of a map")
+    require(text.lstrip()[:1] in ("{", "["), f"the {SOURCE} contains no part of a map")
     try:
         return build_sketch(_build_document(parse_json(text, SOURCE)), SOURCE)
     except MapError as error:
@@ -102,8 +105,12 @@ def _parse(text: str) -> Sketch:
 def _build_document(value: Any) -> Any:
     """Return the document of a map: as copied, or around an obstacle, a list of obstacles, or of points."""
     if isinstance(value, dict) and "format" in value:
-        return {**value, "format": HEADER["format"]} if value["format"] == FORMAT else value
-    obstacles = [value] if isinstance(value, dict) else value
+        if value["format"] == FORMAT:
+            return {**value, "format": HEADER["format"]}
+        return value
+    obstacles = value
+    if isinstance(value, dict):
+        obstacles = [value]
     are_obstacles = obstacles and all(isinstance(obstacle, dict) for obstacle in obstacles)
     if not are_obstacles:
         require(len(obstacles) >= 3, "expected at least three points, obstacles or a map")

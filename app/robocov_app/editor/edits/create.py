@@ -26,7 +26,7 @@ from robocov_app.editor.model.hit_test import find_obstacles
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Sketch
 
-MIN_DRAWN_LENGTH_M = 0.02  # shorter strokes are slips of the hand
+MIN_DRAWN_LENGTH_M = 0.02  # shorter strokes are drawn by accident
 MAX_TEXT_CHARACTERS = 10_000
 
 
@@ -67,7 +67,9 @@ def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
 
 def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
     """Replace the boundary, and select it."""
-    description = "boundary drawn" if sketch.boundary is None else "boundary drawn again"
+    description = "boundary drawn again"
+    if sketch.boundary is None:
+        description = "boundary drawn"
     boundary = _build_outline(points, "a boundary")
     return Change(replace(sketch, boundary=boundary), Selection(boundary=True), description)
 
@@ -80,7 +82,7 @@ def add_disc_start(sketch: Sketch, center: Point, radius: float) -> Change:
 def add_points_start(sketch: Sketch, points: Sequence[Point]) -> Change:
     """Add a start with a position, m, for each robot; repeated positions are dropped."""
     positions = tuple(dict.fromkeys(round_ring(points)))
-    require(positions, "a start needs a place for a robot at least")
+    require(positions, "a start needs at least one position")
     return _add_start(sketch, env.PointsStart(positions))
 
 
@@ -115,7 +117,7 @@ def add_objects(
     selection : Selection
         The added objects.
     """
-    added, keys = sketch.with_obstacles(shapes)
+    added, keys = sketch.with_annotated_obstacles(shapes)
     names = []
     for name, start in starts:
         free_name = find_free_name(added, name or "start")
@@ -134,7 +136,7 @@ def find_free_name(sketch: Sketch, name: str) -> str:
 
 
 def clean_label(name: str) -> str:
-    """Return a name without needless blanks; raise MapError if it is too long or has control characters."""
+    """Return a name with single blanks; raise MapError if it is too long or has control characters."""
     name = clean_text(" ".join(name.split()), "a name", MAX_LABEL_CHARACTERS)
     is_printable = all(ord(char) >= 32 and ord(char) != 127 for char in name)
     require(is_printable, "a name is text on one line")

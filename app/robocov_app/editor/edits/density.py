@@ -29,7 +29,9 @@ def list_features(sketch: Sketch) -> tuple[Feature, ...]:
     """Return the hot spots or areas; none if the density is of another kind."""
     if isinstance(sketch.density, Gaussians):
         return sketch.density.peaks
-    return sketch.density.areas if isinstance(sketch.density, WeightedPolygons) else ()
+    if isinstance(sketch.density, WeightedPolygons):
+        return sketch.density.areas
+    return ()
 
 
 def compute_spread(peak: Gaussian) -> float:
@@ -90,7 +92,7 @@ def resize_peak(sketch: Sketch, number: int, sigma: float) -> Change:
     peak = _get_feature(sketch, number)
     rounded = _check_sigma(sigma)
     if not isinstance(peak, Gaussian):
-        raise MapError("there is no such hot spot any more")
+        raise MapError("this hot spot no longer exists")
     if peak.covariance is None:
         return _replace_feature(sketch, number, replace(peak, sigma=rounded), "sized")
     factor = (sigma / compute_spread(peak)) ** 2
@@ -103,7 +105,7 @@ def move_corner(sketch: Sketch, number: int, corner: int, position: Point) -> Ch
     """Move a corner of an area to a position, m."""
     area = _get_feature(sketch, number)
     if not isinstance(area, WeightedArea) or corner >= len(area.vertices):
-        raise MapError("there is no such corner any more")
+        raise MapError("this corner no longer exists")
     vertices = (*area.vertices[:corner], check_point(position), *area.vertices[corner + 1 :])
     return _replace_feature(sketch, number, _check_area(replace(area, vertices=vertices)), "changed")
 
@@ -111,7 +113,9 @@ def move_corner(sketch: Sketch, number: int, corner: int, position: Point) -> Ch
 def set_weight(sketch: Sketch, number: int, weight: float) -> Change:
     """Set the weight of a feature."""
     feature = _get_feature(sketch, number)
-    minimum = MIN_PEAK_WEIGHT if isinstance(feature, Gaussian) else 0.0
+    minimum = 0.0
+    if isinstance(feature, Gaussian):
+        minimum = MIN_PEAK_WEIGHT
     weight = _check_weight(weight, minimum)
     return _replace_feature(sketch, number, replace(feature, weight=weight), f"weighs {weight:g}")
 
@@ -119,13 +123,16 @@ def set_weight(sketch: Sketch, number: int, weight: float) -> Change:
 def set_floor(sketch: Sketch, floor: float) -> Change:
     """Set the density away from hot spots, or outside the areas."""
     features = list_features(sketch)
-    floor = _check_weight(floor, 0.0 if features else MIN_PEAK_WEIGHT)
-    return _set_features(sketch, features, f"every place counts {floor:g} at least", floor)
+    minimum = MIN_PEAK_WEIGHT
+    if features:
+        minimum = 0.0
+    floor = _check_weight(floor, minimum)
+    return _set_features(sketch, features, f"the weight is at least {floor:g} everywhere", floor)
 
 
 def remove_density(sketch: Sketch) -> Change:
-    """Remove the density, so that every position counts the same."""
-    require(sketch.density is not None, "every place counts the same already")
+    """Remove the density, so that all positions have the same weight."""
+    require(sketch.density is not None, "all positions have the same weight already")
     return Change(replace(sketch, density=None), Selection(), "density removed")
 
 
@@ -141,7 +148,7 @@ def parse_weight(text: str) -> float:
 def describe_density(density: Density | None) -> str:
     """Describe a density in a few words: "2 hot spots, floor 0.5"."""
     if density is None:
-        return "none: every place counts the same"
+        return "none: all positions have the same weight"
     if isinstance(density, Gaussians):
         return f"{format_count(len(density.peaks), 'hot spot')}, floor {density.floor:g}"
     if isinstance(density, Raster):
@@ -154,7 +161,7 @@ def describe_density(density: Density | None) -> str:
 
 
 def _build_kind_error(density: Density, reason: str = "") -> MapError:
-    return MapError(f"this map's density is a {density.kind}{reason}: “density none” takes it away first")
+    return MapError(f"this map's density is a {density.kind}{reason}: remove it first by “density none”")
 
 
 def _set_features(
@@ -163,13 +170,17 @@ def _set_features(
     """Return the change to other features, and to another value `base` where there are none."""
     # Raises for densities of other kinds, even if their value is replaced.
     present_base = _get_base(sketch.density)
-    base = present_base if base is None else base
+    if base is None:
+        base = present_base
     peaks = tuple(feature for feature in features if isinstance(feature, Gaussian))
     areas = tuple(feature for feature in features if isinstance(feature, WeightedArea))
+    density: Density
     if areas:
         max_weight = max(base, *(area.weight for area in areas))
-        require(max_weight > 0.0, "some place must have a weight above 0")
-    density: Density = WeightedPolygons(areas, base) if areas else Gaussians(peaks, base)
+        require(max_weight > 0.0, "at least one weight must be above 0")
+        density = WeightedPolygons(areas, base)
+    else:
+        density = Gaussians(peaks, base)
     return Change(replace(sketch, density=density), Selection(), description)
 
 
@@ -194,14 +205,16 @@ def _replace_feature(sketch: Sketch, number: int, feature: Feature, verb: str) -
 
 def _get_feature(sketch: Sketch, number: int) -> Feature:
     features = list_features(sketch)
-    require(0 <= number < len(features), "there is no such hot spot any more")
+    require(0 <= number < len(features), "this hot spot no longer exists")
     return features[number]
 
 
 def _name_feature(feature: Feature) -> str:
     if isinstance(feature, Gaussian):
         return "hot spot"
-    return f"area “{feature.name}”" if feature.name else "area"
+    if feature.name:
+        return f"area “{feature.name}”"
+    return "area"
 
 
 def _check_area(area: WeightedArea) -> WeightedArea:

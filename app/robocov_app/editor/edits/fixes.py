@@ -101,20 +101,24 @@ def fill_unreachable(sketch: Sketch, radius: float) -> Change:
 
 
 def _draw_boundary(sketch: Sketch, problem: Any, radius: float) -> Change:
-    low_x, low_y, high_x, high_y = sketch.bounds or DEFAULT_BOUNDS_M
-    margin = BOUNDARY_MARGIN_M if sketch.bounds else 0.0
+    margin = BOUNDARY_MARGIN_M
+    bounds = sketch.bounds
+    if bounds is None:
+        margin = 0.0
+        bounds = DEFAULT_BOUNDS_M
+    low_x, low_y, high_x, high_y = bounds
     low = round_point((low_x - margin, low_y - margin))
     high = round_point((high_x + margin, high_y + margin))
     boundary = build_rectangle(low, high)
-    description = "boundary drawn round everything"
+    description = "boundary drawn around everything"
     return Change(replace(sketch, boundary=boundary), Selection(boundary=True), description)
 
 
-def _fill_sealed(sketch: Sketch, problem: Any, radius: float) -> Change:
+def _fill_sealed_area(sketch: Sketch, problem: Any, radius: float) -> Change:
     return _fill(sketch, problem.geometry)
 
 
-def _fill_cut_off(sketch: Sketch, problem: Any, radius: float) -> Change:
+def _fill_cut_off_area(sketch: Sketch, problem: Any, radius: float) -> Change:
     _, free = find_problems(sketch, radius)
     swept, _ = compute_reach(free, radius)
     return _fill(sketch, _find_parts(free, swept[0], [problem.geometry]))
@@ -132,7 +136,7 @@ def _widen_gap(sketch: Sketch, problem: Any, radius: float) -> Change:
             description = f"{format_numbered_name(sketch, key)} shortened by {missing:.2g} m"
             return Change(sketch.with_objects({key: shortened}), Selection.of(key), description)
     movable = _drop_obstacles_at_both_ends(sides)
-    require(movable and gap.length > 0.0, "nothing can move away")
+    require(movable and gap.length > 0.0, "no obstacle next to the gap can be moved")
     item, end, opposite = min(movable, key=lambda side: side.item.geometry.area)
     dx = missing * (end[0] - opposite[0]) / gap.length
     dy = missing * (end[1] - opposite[1]) / gap.length
@@ -146,8 +150,8 @@ def _list_gap_sides(sketch: Sketch, gap: LineString) -> list[_GapSide]:
     last = gap.coords[-1]
     sides: list[_GapSide] = []
     for end, opposite in ((first, last), (last, first)):
-        near = sketch.tree.query(shapely.Point(end), predicate="dwithin", distance=MAX_SAGITTA_M)
-        items = [sketch.obstacles[k] for k in near.tolist()]
+        indices = sketch.tree.query(shapely.Point(end), predicate="dwithin", distance=MAX_SAGITTA_M)
+        items = [sketch.obstacles[k] for k in indices.tolist()]
         sides += [_GapSide(item, end, opposite) for item in items if not item.locked]
     return sides
 
@@ -206,8 +210,8 @@ def _move_start(sketch: Sketch, problem: Any, radius: float) -> Change:
         number = max(k for k, position in enumerate(start.positions) if position == (x, y))
         others = shapely.points(np.delete(np.array(start.positions), number, axis=0))
         space -= shapely.union_all(shapely.buffer(others, START_DISTANCE_RADII * radius + SPARE_M))
-        label = f": place {number + 1}"
-    require(not space.is_empty, "a robot fits nowhere")
+        label = f": position {number + 1}"
+    require(not space.is_empty, "there is no free position for a robot")
     vertex = Vertex(name, 0, number)
     nearest = shapely.shortest_line(space, shapely.Point(find_position(sketch, vertex)))
     moved = vertices.place_vertices(sketch, {vertex: round_point(nearest.coords[0])})
@@ -220,7 +224,7 @@ def _fill(sketch: Sketch, area: Geometry) -> Change:
     polygons = extract_polygons(grown)
     require(polygons, "there is nothing to fill")
     filled, keys = sketch.with_obstacles(polygons)
-    return Change(filled, Selection.of(*keys), "filled what cannot be reached")
+    return Change(filled, Selection.of(*keys), "unreachable areas filled")
 
 
 def _find_parts(free: MultiPolygon, largest: Geometry, areas: list[Geometry]) -> Geometry:
@@ -239,7 +243,7 @@ FIXES: Final[dict[ProblemKind, Fix]] = {
     "no room": Fix("Move", _move_start),
     "outside": Fix("Delete", _delete_object),
     "twice": Fix("Delete", _delete_object),
-    "sealed": Fix("Fill", _fill_sealed),
-    "cut off": Fix("Fill", _fill_cut_off),
+    "sealed": Fix("Fill", _fill_sealed_area),
+    "cut off": Fix("Fill", _fill_cut_off_area),
 }
 """The fix for each kind of problem; other kinds have none."""

@@ -51,7 +51,7 @@ def add_waypoint(
     item = sketch.get_item(key)
     path = item.shape.path
     if path is None:
-        require(not item.geometry.is_empty, "what covers nothing cannot move")
+        require(not item.geometry.is_empty, "an obstacle that covers nothing cannot move")
         ends = (check_point(compute_center(item.geometry.bounds)), check_point(point))
         return _set_path(sketch, key, ObstaclePath(ends, _check_speed(speed), "back-and-forth"), "moves")
     if index is None:
@@ -85,8 +85,11 @@ def toggle_repeat(sketch: Sketch, selection: Selection) -> Change:
     """Let the selected obstacles go back and forth, or in a loop if they do."""
     shape_paths = [item.shape.path for item in selection.list_items(sketch)]
     has_loop = any(path is not None and path.repeat == "loop" for path in shape_paths)
-    repeat: Repeat = "back-and-forth" if has_loop else "loop"
-    description = "goes back and forth" if has_loop else "goes in a loop"
+    repeat: Repeat = "loop"
+    description = "goes in a loop"
+    if has_loop:
+        repeat = "back-and-forth"
+        description = "goes back and forth"
     return _edit_paths(sketch, selection, lambda path: replace(path, repeat=repeat), description)
 
 
@@ -118,7 +121,9 @@ def find_leg(path: ObstaclePath, point: Point, reach: float) -> int | None:
         points = to_array([*path.points, *path.points[:1]])
     _, gaps = find_nearest_on_edges(points[:-1], points[1:], point)
     leg = _find_nearest(gaps, reach)
-    return None if leg is None else leg + 1
+    if leg is None:
+        return None
+    return leg + 1
 
 
 def _find_nearest(gaps: Array, reach: float) -> int | None:
@@ -126,16 +131,20 @@ def _find_nearest(gaps: Array, reach: float) -> int | None:
     if not len(gaps):
         return None
     nearest = int(gaps.argmin())
-    return None if gaps[nearest] > reach else nearest
+    if gaps[nearest] > reach:
+        return None
+    return nearest
 
 
 def describe_path(path: ObstaclePath | None) -> str:
     """Describe a path in a few words: "0.5 m/s, loop of 6 m in 12 s"."""
     if path is None:
-        return "stands"
+        return "stands still"
     if not leads_somewhere(path):
         return "leads nowhere"
-    kind = "loop" if path.repeat == "loop" else "there and back"
+    kind = "there and back"
+    if path.repeat == "loop":
+        kind = "loop"
     length = path.speed * path.period
     return f"{path.speed:g} m/s, {kind} of {length:.4g} m in {path.period:.4g} s"
 

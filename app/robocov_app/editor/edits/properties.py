@@ -34,7 +34,9 @@ def rename(sketch: Sketch, owner: Owner, name: str) -> Change:
     if isinstance(owner, str):
         return _rename_start(sketch, owner, name)
     previous = sketch.display_name(owner)
-    description = f"{previous} renamed to “{name}”" if name else f"{previous}: name removed"
+    description = f"{previous}: name removed"
+    if name:
+        description = f"{previous} renamed to “{name}”"
     shape = replace(sketch.get_item(owner).shape, name=name or None)
     return Change(sketch.with_objects({owner: shape}), Selection.of(owner), description)
 
@@ -43,7 +45,8 @@ def _rename_start(sketch: Sketch, previous: str, name: str) -> Change:
     require(name, "a start needs a name")
     is_free = name == previous or name not in dict(sketch.starts)
     require(is_free, f"there is a start “{name}” already")
-    starts = tuple((name if key == previous else key, start) for key, start in sketch.starts)
+    new_names = {previous: name}
+    starts = tuple((new_names.get(key, key), start) for key, start in sketch.starts)
     description = f"{sketch.display_name(previous)} renamed to “{name}”"
     return Change(replace(sketch, starts=starts), Selection.of(name), description)
 
@@ -53,7 +56,9 @@ def set_note(sketch: Sketch, selection: Selection, note: str) -> Change:
     require(selection.items, "select obstacles first: notes are written to them")
     note = create.clean_text(note, "a note")
     obstacles = Selection(items=selection.items).describe(sketch)
-    description = f"note on {obstacles}" if note else f"note on {obstacles} removed"
+    description = f"note on {obstacles}"
+    if not note:
+        description = f"note on {obstacles} removed"
     return replace(_mark(sketch, selection, "", note=note), description=description)
 
 
@@ -98,11 +103,9 @@ def release(sketch: Sketch) -> Change:
 def _mark(sketch: Sketch, selection: Selection, verb: str, **marks: Any) -> Change:
     """Change fields of the selected obstacles."""
     require(selection.items, "select obstacles first")
-    items = tuple(
-        replace(item, **marks) if item.key in selection.items else item for item in sketch.obstacles
-    )
+    items = [replace(item, **marks) for item in selection.list_items(sketch)]
     description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
-    return Change(replace(sketch, obstacles=items), selection, description)
+    return Change(sketch.with_items(items), selection, description)
 
 
 def set_title(sketch: Sketch, name: str) -> Change:
@@ -157,8 +160,11 @@ def restack(sketch: Sketch, selection: Selection, end: Literal["top", "bottom"])
     require(end in ("top", "bottom"), "expected top or bottom")
     selected = tuple(item for item in sketch.obstacles if item.key in selection.items)
     others = tuple(item for item in sketch.obstacles if item.key not in selection.items)
-    order = others + selected if end == "top" else selected + others
-    verb = "brought to the top" if end == "top" else "sent to the bottom"
+    order = selected + others
+    verb = "sent to the bottom"
+    if end == "top":
+        order = others + selected
+        verb = "brought to the top"
     description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
     return Change(replace(sketch, obstacles=order), selection, description)
 

@@ -83,7 +83,9 @@ class Affine:
             return None
         if skew > RELATIVE_TOLERANCE * factor_x * factor_y:
             return None
-        return 1.0 if abs(factor_x - 1.0) <= RELATIVE_TOLERANCE else factor_x
+        if abs(factor_x - 1.0) <= RELATIVE_TOLERANCE:
+            return 1.0
+        return factor_x
 
     def ring(self, ring: Sequence[Point]) -> Ring:
         """Return where points go, m."""
@@ -129,7 +131,9 @@ class Affine:
 
     def _apply_to_length(self, length: float) -> float:
         factor = self.factor
-        return length if factor in (None, 1.0) else round_length(length * factor)
+        if factor is None or factor == 1.0:
+            return length
+        return round_length(length * factor)
 
 
 # How each field of obstacles, starts, paths and densities is mapped; other fields stay as they are.
@@ -206,7 +210,7 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
             return replace(change, sketch=_apply_affine(change.sketch, change.selection, shift))
         factor_x = max(factor_x + missing_width / present_width, MIN_RESIZE_FACTOR)
         factor_y = max(factor_y + missing_height / present_height, MIN_RESIZE_FACTOR)
-    raise MapError("it cannot get that size: walls keep their width when width and height change apart")
+    raise MapError("this size is not possible: walls keep their width unless all lengths are scaled alike")
 
 
 def _check_size(size: float | None, present: float, name: str) -> None:
@@ -221,8 +225,12 @@ def _check_size(size: float | None, present: float, name: str) -> None:
 def place(sketch: Sketch, selection: Selection, x: float | None, y: float | None) -> Change:
     """Move the lower left corner of the selection's box to (x, y) m; None leaves a coordinate."""
     low_x, low_y, *_ = _require_bounds(sketch, selection)
-    dx = 0.0 if x is None else x - low_x
-    dy = 0.0 if y is None else y - low_y
+    dx = 0.0
+    dy = 0.0
+    if x is not None:
+        dx = x - low_x
+    if y is not None:
+        dy = y - low_y
     return move(sketch, selection, dx, dy)
 
 
@@ -266,9 +274,9 @@ def align(sketch: Sketch, selection: Selection, side: Side) -> Change:
     if selection.vertices and not selection.owners:
         return _align_vertices(sketch, selection, side)
     boxes = _list_boxes(sketch, selection)
-    frame = compute_box(sketch, BOUNDARY) if selection.boundary else None
-    require(frame is not None or not selection.boundary, "there is no boundary to align with")
-    if frame is None:
+    if selection.boundary:
+        frame = require(compute_box(sketch, BOUNDARY), "there is no boundary to align with")
+    else:
         require(len(boxes) >= 2, "select two or more obstacles or starts to align")
         frame = enclose_boxes(boxes.values())
     require(boxes, "select obstacles or starts to align")
@@ -286,7 +294,10 @@ def _align_vertices(sketch: Sketch, selection: Selection, side: Side) -> Change:
     level = _compute_level(frame, side)
     moved: dict[Vertex, Point] = {}
     for vertex, (x, y) in positions.items():
-        moved[vertex] = (level, y) if side in ALONG_X else (x, level)
+        if side in ALONG_X:
+            moved[vertex] = (level, y)
+        else:
+            moved[vertex] = (x, level)
     description = f"{selection.describe(sketch)} aligned {_describe_side(side)}"
     return Change(place_vertices(sketch, moved), selection, description)
 
@@ -332,8 +343,8 @@ def _turn_density(density: Density | None, affine: Affine) -> Density | None:
         turned: Density = affine.apply(density)
         return turned
     if density is not None and not density.is_uniform:
-        what = f"a density that is a {density.kind} cannot be turned"
-        raise MapError(f"{what}: “density none” takes it away first")
+        kind = density.kind
+        raise MapError(f"a density that is a {kind} cannot be turned: remove it first by “density none”")
     return density
 
 
@@ -344,9 +355,14 @@ def compute_box(sketch: Sketch, owner: Owner) -> Box | None:
     if is_obstacle and not isinstance(sketch.find_object(owner), CircleObstacle):
         assert isinstance(owner, int)
         covered = sketch.get_item(owner).geometry
-        return None if covered.is_empty else covered.bounds
+        if covered.is_empty:
+            return None
+        bounds: Box = covered.bounds
+        return bounds
     points = [point for ring in sketch.list_vertex_rings(owner) for point in ring]
-    return enclose_boxes((*point, *point) for point in points) if points else None
+    if not points:
+        return None
+    return enclose_boxes((*point, *point) for point in points)
 
 
 def compute_bounds(sketch: Sketch, selection: Selection) -> Box | None:
@@ -367,7 +383,9 @@ def compute_bounds(sketch: Sketch, selection: Selection) -> Box | None:
     for vertex in selection.vertices:
         position = find_position(sketch, vertex)
         boxes.append((*position, *position))
-    return enclose_boxes(boxes) if boxes else None
+    if not boxes:
+        return None
+    return enclose_boxes(boxes)
 
 
 def _list_uncurved_keys(sketch: Sketch, selection: Selection) -> list[int]:
@@ -380,18 +398,26 @@ def _list_boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
     objects = selection.items | selection.starts
     boxes: dict[Owner, Box] = {}
     for owner in sketch.owners:
-        box = compute_box(sketch, owner) if owner in objects else None
-        if box:
+        if owner not in objects:
+            continue
+        box = compute_box(sketch, owner)
+        if box is not None:
             boxes[owner] = box
     return boxes
 
 
 def _compute_level(box: Box, side: Side) -> float:
     """Return the coordinate of a side of a box, or of its center, m."""
-    axis = 0 if side in ALONG_X else 1
-    if side in ("center", "middle"):
-        return compute_center(box)[axis]
-    return box[axis] if side in ("left", "bottom") else box[axis + 2]
+    x, y = compute_center(box)
+    levels = {
+        "left": box[0],
+        "center": x,
+        "right": box[2],
+        "bottom": box[1],
+        "middle": y,
+        "top": box[3],
+    }
+    return levels[side]
 
 
 def _copy(sketch: Sketch, objects: Selection, affine: Affine) -> tuple[Sketch, Selection]:
@@ -405,7 +431,9 @@ def _move_objects(sketch: Sketch, offsets: Mapping[Owner, float], *, along_x: bo
     moved = {}
     for owner, offset in offsets.items():
         if offset:
-            shift = Affine(x0=offset) if along_x else Affine(y0=offset)
+            shift = Affine(y0=offset)
+            if along_x:
+                shift = Affine(x0=offset)
             moved[owner] = shift.apply(sketch.find_object(owner))
     return sketch.with_objects(moved)
 

@@ -113,10 +113,8 @@ def _reshape_circle(
 def insert_vertex(sketch: Sketch, edge: Edge) -> Change:
     """Insert a vertex into an edge, and select it."""
     rings = [list(ring) for ring in sketch.list_vertex_rings(edge.owner)]
-    edge_counts = {}
-    for number, ring, is_closed in sketch.list_rings(edge.owner):
-        edge_counts[number] = len(ring) if is_closed else len(ring) - 1
-    require(0 <= edge.index < edge_counts.get(edge.ring, 0), "there is no such edge any more")
+    edge_counts = {ring.number: ring.edge_count for ring in sketch.list_rings(edge.owner)}
+    require(0 <= edge.index < edge_counts.get(edge.ring, 0), "this edge no longer exists")
     rings[edge.ring].insert(edge.index + 1, check_point(edge.point))
     inserted = Vertex(edge.owner, edge.ring, edge.index + 1)
     return Change(
@@ -204,7 +202,9 @@ def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, 
         if rings != list(sketch.list_vertex_rings(owner)):
             changed = changed.with_rings(owner, rings)
     require(count, "select corners first, of polygons, walls or the boundary")
-    description = f"{count} corners {verb}" if count > 1 else f"corner {verb}"
+    description = f"corner {verb}"
+    if count > 1:
+        description = f"{count} corners {verb}"
     return Change(changed, selection.without_vertices(), description)
 
 
@@ -212,7 +212,10 @@ def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool)
     """Return a ring with arcs in place of the corners that are cut off."""
     points: list[Array] = []
     for index, point in enumerate(ring):
-        points.append(_build_arc(ring, index, cuts[index]) if index in cuts else np.array([point]))
+        if index in cuts:
+            points.append(_build_arc(ring, index, cuts[index]))
+        else:
+            points.append(np.array([point]))
     return drop_repeated_points(round_ring(np.concatenate(points)), closed=is_closed)
 
 
@@ -233,10 +236,12 @@ def _compute_cuts(
     for index, cut in cuts.items():
         for neighbor in ((index - 1) % count, (index + 1) % count):
             edge_length = math.dist(ring[index], ring[neighbor])
-            has_both = neighbor in cuts
-            required = cut.length + (cuts[neighbor].length if has_both else 0.0)
+            required = cut.length
+            reason = ""
+            if neighbor in cuts:
+                required += cuts[neighbor].length
+                reason = " for the corners at both ends"
             if required > edge_length + _EDGE_TOLERANCE_M:
-                reason = " for the corners at both ends" if has_both else ""
                 lengths = f"{round_length(required):g} m of an edge that is {round_length(edge_length):g} m"
                 raise MapError(f"that takes {lengths} long{reason}: expected less")
     return cuts
@@ -276,7 +281,9 @@ def extend_wall(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     """Extend a wall from its first or last vertex to a point, m, and select the new end."""
     points = _require_wall(sketch, vertex).points
     require(vertex.index in (0, len(points) - 1), "a wall can be extended from its ends only")
-    index = 0 if vertex.index == 0 else len(points)
+    index = 0
+    if vertex.index > 0:
+        index = len(points)
     extended = sketch.with_rings(vertex.owner, [(*points[:index], check_point(point), *points[index:])])
     selection = Selection(vertices=frozenset({Vertex(vertex.owner, 0, index)}))
     return Change(extended, selection, f"{sketch.display_name(vertex.owner)} extended")
@@ -298,7 +305,7 @@ def _require_wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
     find_position(sketch, vertex)
     wall = sketch.find_object(vertex.owner)
     if not isinstance(wall, env.WallObstacle):
-        raise MapError("that is no wall")
+        raise MapError("this is not a wall")
     return wall
 
 
@@ -312,8 +319,7 @@ def join_walls(sketch: Sketch, selection: Selection) -> Change:
     note = next((item.note for item in items if item.note), "")
     joined = replace(items[0], shape=env.WallObstacle(points, walls[0].width, name), note=note)
     remaining = sketch.without(item.key for item in items[1:])
-    obstacles = tuple(joined if item.key == joined.key else item for item in remaining.obstacles)
-    changed = replace(sketch, obstacles=obstacles)
+    changed = remaining.with_items([joined])
     return Change(changed, Selection.of(joined.key), f"{len(items)} walls joined")
 
 
@@ -328,8 +334,9 @@ def _join_lines(lines: list[Ring]) -> Ring:
                 for tail in (line, line[::-1]):
                     pairs.append((math.dist(head[-1], tail[0]), len(pairs), head, tail, line))
         _, _, head, tail, line = min(pairs)
-        is_same_point = math.dist(head[-1], tail[0]) <= JOIN_DISTANCE_M
-        chain = (*head, *(tail[1:] if is_same_point else tail))
+        if math.dist(head[-1], tail[0]) <= JOIN_DISTANCE_M:
+            tail = tail[1:]
+        chain = (*head, *tail)
         remaining.remove(line)
     return chain
 
@@ -343,8 +350,10 @@ def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
 
     changed, replaced = _redraw(sketch, selection, redraw)
     count = sum(len(old) - len(new) for old, new in replaced)
-    require(count, "no vertex can be left out at that tolerance")
-    description = "1 vertex left out" if count == 1 else f"{count} vertices left out"
+    require(count, "no vertex can be removed at this tolerance")
+    description = f"{count} vertices removed"
+    if count == 1:
+        description = "1 vertex removed"
     return Change(changed, selection.without_vertices(), description)
 
 
@@ -395,22 +404,24 @@ def _simplify_rings(rings: tuple[Ring, ...], tolerance: float, is_closed: bool) 
     """Simplify the rings of an obstacle to a tolerance, m, or less if they would cross."""
     for attempt in range(SIMPLIFY_ATTEMPTS):
         simplified = tuple(_simplify_ring(ring, tolerance / 2**attempt, is_closed) for ring in rings)
-        if not is_closed or _is_sound(simplified) or not _is_sound(rings):
+        if not is_closed or _is_valid_polygon(simplified) or not _is_valid_polygon(rings):
             return simplified
     return rings
 
 
-def _is_sound(rings: tuple[Ring, ...]) -> bool:
+def _is_valid_polygon(rings: tuple[Ring, ...]) -> bool:
     """Return whether closed rings make a valid polygon."""
     has_corners = min(map(len, rings)) >= 3
     return has_corners and bool(Polygon(rings[0], rings[1:]).is_valid)
 
 
 def _simplify_ring(ring: Ring, tolerance: float, is_closed: bool) -> Ring:
-    if len(set(ring)) < (4 if is_closed else 3):
+    if len(set(ring)) < 3:
         return ring
     if not is_closed:
         return tuple(LineString(ring).simplify(tolerance, preserve_topology=False).coords)
+    if len(set(ring)) == 3:
+        return ring
     # Start at a vertex that stays: the one farthest from the center is a corner of the convex hull.
     points = np.array(ring)
     first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())

@@ -4,11 +4,11 @@ from typing import TypeVar
 
 from robocov.errors import MapError
 
-_Needed = TypeVar("_Needed")
+_Value = TypeVar("_Value")
 
 
-def require(there: _Needed | None, words: str) -> _Needed:
-    """Return what an edit needs; MapError with these words unless it is there, and true."""
-    if not there:
-        raise MapError(words)
-    return there
+def require(value: _Value | None, message: str) -> _Value:
+    """Return a value that an edit needs; raise MapError with a message if it is None, false or empty."""
+    if not value:
+        raise MapError(message)
+    return value

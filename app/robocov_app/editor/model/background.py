@@ -86,7 +86,9 @@ class Background:
             background = _ADAPTER.validate_json(json.dumps(document), strict=True)
         except ValidationError:
             return None
-        return background if math.prod(background.pixels) <= MAX_PIXELS else None
+        if math.prod(background.pixels) > MAX_PIXELS:
+            return None
+        return background
 
 
 _ADAPTER = TypeAdapter(Background)
@@ -151,7 +153,7 @@ def _require_apart(background: Background, a: Point, b: Point) -> None:
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 """Attributes of an obstacle besides its shape, with their types; empty and false values are not written."""
 
-_HOME = "editor"  # the free key of the editor, unless it contains something else
+_HOME = "editor"  # free key that the editor uses, unless it contains something else
 _SECTIONS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OWN_KEYS = {*_SECTIONS, "background"}
 _LOST_NOTES = "notes of obstacles that are gone"
@@ -209,9 +211,11 @@ def write_marks(
 
 
 def _identify(index: int, names: Names) -> dict[str, Any]:
-    """Return what identifies an obstacle in the free keys: its index, and its name if it has one."""
+    """Return the keys that identify an obstacle in the free keys: its index, and its name if it has one."""
     name = names[index]
-    return {"obstacle": index} if name is None else {"obstacle": index, "name": name}
+    if name is None:
+        return {"obstacle": index}
+    return {"obstacle": index, "name": name}
 
 
 def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
@@ -222,17 +226,19 @@ def read_marks(extra: FreeKeys, names: Names) -> ReadMarks:
             continue
         background = Background.from_document(content.get("background"))
         has_broken_background = "background" in content and background is None
-        if has_broken_background or not _has_sound_sections(content):
+        if has_broken_background or not _has_valid_sections(content):
             continue
         marks, rest = _assign_marks(content, names)
-        others = {key: rest if key == home else value for key, value in extra.items()}
-        if not rest:
+        others = dict(extra)
+        if rest:
+            others[home] = rest
+        else:
             del others[home]
         return ReadMarks(marks, background, others)
     return ReadMarks({}, None, dict(extra))
 
 
-def _has_sound_sections(content: FreeKeys) -> bool:
+def _has_valid_sections(content: FreeKeys) -> bool:
     return all(
         _are_entries(content.get(section, []), mark_names) for section, mark_names in _SECTIONS.items()
     )
@@ -289,7 +295,7 @@ def _is_entry(entry: object, mark_names: tuple[str, ...]) -> bool:
 
 def _find_obstacle(entry: FreeKeys, names: Names) -> int | None:
     """Return the index of the obstacle of an entry: by index and name, or by a name that is unique."""
-    index = entry["obstacle"]
+    index: int = entry["obstacle"]
     name = entry.get("name")
     exists = 0 <= index < len(names)
     has_same_name = exists and names[index] == name
@@ -297,4 +303,6 @@ def _find_obstacle(entry: FreeKeys, names: Names) -> int | None:
         return names.index(name)
     # The obstacle may have got a name since, or lost it.
     is_compatible = exists and (name is None or names[index] in (None, name))
-    return index if is_compatible else None
+    if not is_compatible:
+        return None
+    return index

@@ -158,7 +158,9 @@ def _parse_number(typed: str) -> float:
     if not re.fullmatch(_NUMBER, typed):
         return math.nan
     value = float(typed.replace(",", "."))
-    return value if math.isfinite(value) else math.nan
+    if not math.isfinite(value):
+        return math.nan
+    return value
 
 
 def _parse_length(typed: str) -> float:
@@ -197,7 +199,9 @@ def _parse_angle(typed: str) -> float:
     if not match:
         return math.nan
     value = _parse_number(match[1])
-    return math.degrees(value) if match[2] == "rad" else value
+    if match[2] == "rad":
+        return math.degrees(value)
+    return value
 
 
 def _convert_polar(length: float, degrees: float, text: str) -> tuple[float, float]:
@@ -206,7 +210,7 @@ def _convert_polar(length: float, degrees: float, text: str) -> tuple[float, flo
 
 
 def _round_exactly(value: float) -> float:
-    """Return a coordinate without the noise of units: 1.1 inches are 0.02794 m."""
+    """Return a coordinate without the rounding errors of units: 1.1 inches are 0.02794 m."""
     return round(value, 9) + 0.0
 
 

@@ -82,7 +82,9 @@ class Document:
         self.autosaver = autosave.Autosaver(drafts, KIND, path, resumed)
         self._checked_at = 0.0
         self._overwrites_changed_file = False
-        self._drafted: Sketch | None = sketch if saved else None
+        self._drafted: Sketch | None = None
+        if saved:
+            self._drafted = sketch
         self.update_draft()
 
     @classmethod
@@ -110,6 +112,12 @@ class Document:
         if self.path is not None:
             return self.path.name
         return self.stem or self.history.sketch.name
+
+    def get_folder(self, default: Path) -> Path:
+        """Return the folder of the map's file, or a default one if it has no file."""
+        if self.path is None:
+            return default
+        return self.path.parent
 
     def suggest_path(self, folder: Path) -> Path:
         """Return the path of the map, or a free one in a folder."""
@@ -163,17 +171,15 @@ class Document:
         if is_bundled(path):
             raise MapError(f"{path.name}: expected another name, because this map comes with robocov")
         sketch = self.history.sketch.with_default_name(path.stem)
-        is_same_file = path == self.path
-        self.version = write_sketch(
-            sketch,
-            path,
-            expected=self.version if is_same_file else None,
-            overwrites=overwrites or (self._overwrites_changed_file and is_same_file),
-        )
+        expected = None
+        if path == self.path:
+            expected = self.version
+            overwrites = overwrites or self._overwrites_changed_file
+        self.version = write_sketch(sketch, path, expected=expected, overwrites=overwrites)
         if sketch is not self.history.sketch:
             self.history.rewrite_all(lambda state: state.with_default_name(path.stem))
         self.path = path
-        self._mark_saved()
+        self._mark_as_saved()
         return f"saved: {path}"
 
     def update_draft(self) -> None:
@@ -234,13 +240,13 @@ class Document:
         assert self.path is not None
         sketch, self.version = read_sketch(self.path)
         self.history.apply(Change(sketch, Selection(), "read again from the file"))
-        self._mark_saved()
+        self._mark_as_saved()
 
     def ignore_disk_change(self) -> None:
         """Let the next save replace the file although it has changed."""
         self._overwrites_changed_file = True
 
-    def _mark_saved(self) -> None:
+    def _mark_as_saved(self) -> None:
         self.file_state = "same"
         self._overwrites_changed_file = False
         self.history.mark_saved()

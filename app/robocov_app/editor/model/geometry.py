@@ -15,9 +15,9 @@ from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.toolkit.tools.geometry import compute_bearing, compute_cos_sin
 
-Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
-SHIFT_ANGLE_DEG = 15.0  # degrees: with Shift, lines are drawn at multiples of this
-DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimeter
+Box: TypeAlias = tuple[float, float, float, float]  # low x, low y, high x, high y, m
+SHIFT_ANGLE_DEG = 15.0  # with Shift, lines are drawn at multiples of this
+DECIMALS = 4  # decimal places of the lengths that the editor writes, m
 distance = math.dist
 
 
@@ -39,12 +39,12 @@ def to_array(points: Sequence[Point] | Array) -> Array:
 
 def round_ring(points: Sequence[Point] | Array) -> Ring:
     """Return points to a tenth of a millimeter; raise MapError if any is beyond the reach of maps."""
-    found = to_array(points)
+    coordinates = to_array(points)
+    # Written so that nan is too far away, too.
+    is_within_reach = np.all(np.abs(coordinates) <= MAX_COORDINATE_M)
     limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
-    require(
-        np.all(np.abs(found) <= MAX_COORDINATE_M), f"that is too far away: {limit}"
-    )  # nan is not near either
-    return tuple([(x, y) for x, y in (np.round(found, DECIMALS) + 0.0).tolist()])
+    require(is_within_reach, f"that is too far away: {limit}")
+    return tuple([(x, y) for x, y in (np.round(coordinates, DECIMALS) + 0.0).tolist()])
 
 
 def check_point(point: Point) -> Point:
@@ -54,10 +54,10 @@ def check_point(point: Point) -> Point:
 
 def drop_repeated_points(ring: Iterable[Point], *, closed: bool = True) -> Ring:
     """Return points without those that repeat the one before; closed rings also at their end."""
-    kept = [point for point, _ in groupby(ring)]
-    if closed and len(kept) > 1 and kept[0] == kept[-1]:
-        kept.pop()
-    return tuple(kept)
+    points = [point for point, _ in groupby(ring)]
+    if closed and len(points) > 1 and points[0] == points[-1]:
+        points.pop()
+    return tuple(points)
 
 
 def compute_levelling_angle(a: Point, b: Point) -> float:
@@ -91,33 +91,38 @@ def enclose_boxes(boxes: Iterable[Box]) -> Box:
 def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
     """Return the polygons of a geometry to a tenth of a millimeter, the largest first, without tiny ones."""
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
-    parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
+    parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_tiny(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
-    found = []
+    polygons = []
     for part in map(shapely.orient_polygons, parts):
-        rings = [part.exterior, *(hole for hole in part.interiors if not _is_crumb(hole))]
+        rings = [part.exterior, *(hole for hole in part.interiors if not _is_tiny(hole))]
         outline, *holes = [tuple(map(round_point, ring.coords[:-1])) for ring in rings]
-        found.append(PolygonObstacle(outline, tuple(holes), name))
-    return tuple(found)
+        polygons.append(PolygonObstacle(outline, tuple(holes), name))
+    return tuple(polygons)
 
 
-def _is_crumb(part: shapely.Geometry) -> bool:
+def _is_tiny(part: shapely.Geometry) -> bool:
     low_x, low_y, high_x, high_y = part.bounds
-    return not min(high_x - low_x, high_y - low_y) >= MIN_SIZE_M  # of what is empty these are no numbers
+    # Written so that an empty geometry, whose bounds are nan, is tiny, too.
+    return not min(high_x - low_x, high_y - low_y) >= MIN_SIZE_M
 
 
 def format_bearing(a: Point, b: Point) -> str:
     """Format length and direction from a point to another: "2.40 m  ∠ 90°"."""
     angle = compute_bearing(a, b)
-    shown = 0.0 if abs(angle) < 0.05 else angle
-    return f"{format_length(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
+    if abs(angle) < 0.05:
+        # Otherwise it could become "-0".
+        angle = 0.0
+    return f"{format_length(distance(a, b))}  ∠ {angle:.1f}".removesuffix(".0") + "°"
 
 
 def format_length(meters: float) -> str:
     """Format a length: "2.3 cm", "12.35 m", "1234.5 m"."""
     if meters < 0.1:
         return f"{100 * meters:.1f} cm"
-    return f"{meters:.2f} m" if meters < 1000 else f"{meters:.1f} m"
+    if meters < 1000:
+        return f"{meters:.2f} m"
+    return f"{meters:.1f} m"
 
 
 def format_point(point: Point) -> str:

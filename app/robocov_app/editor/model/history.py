@@ -42,7 +42,9 @@ class UndoHistory:
     def __init__(self, sketch: Sketch, *, saved: bool = True) -> None:
         self.sketch = sketch
         self.selection = Selection()
-        self.saved = sketch if saved else None
+        self.saved: Sketch | None = None
+        if saved:
+            self.saved = sketch
         self.starts_new_step = False
         self._undoable: list[_Step] = []
         self._redoable: list[_Step] = []
@@ -62,8 +64,7 @@ class UndoHistory:
             Whether anything has changed, besides the selection.
         """
         before = Change(self.sketch, self.selection, change.description)
-        last = self._undoable[-1] if self._undoable else None
-        continues_drag = drag is not None and last is not None and last.drag == drag
+        continues_drag = drag is not None and bool(self._undoable) and self._undoable[-1].drag == drag
         merges = continues_drag and not self.starts_new_step
         self.starts_new_step = False
         self.selection = change.selection
@@ -73,7 +74,7 @@ class UndoHistory:
             before = replace(self._undoable.pop().before, description=change.description)
         self.sketch = change.sketch
         self._redoable = []
-        # A drag that returns to where it began is no step.
+        # A drag that returns to where it started is no step.
         if change.sketch != before.sketch:
             self._undoable.append(_Step(before, change, drag))
         return True

@@ -72,24 +72,23 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
     """Return the nearest edge of some objects within `reach` meters of a point."""
     searched = list(owners)
     if len(searched) > MANY_OBJECTS:
-        near = {item.key for item in _list_items_near(sketch, point, reach)}
-        far = sketch.index_by_key.keys() - near
+        nearby = {item.key for item in _list_items_near(sketch, point, reach)}
+        far = sketch.index_by_key.keys() - nearby
         searched = [owner for owner in searched if owner not in far]
     smallest_gap = reach
     nearest: Edge | None = None
     for owner in searched:
-        for number, ring, is_closed in sketch.list_rings(owner):
-            edge_count = len(ring) if is_closed else len(ring) - 1
-            if edge_count <= 0:
+        for ring in sketch.list_rings(owner):
+            if ring.edge_count == 0:
                 continue
-            points = to_array(ring)
-            starts = points[:edge_count]
-            ends = np.roll(points, -1, axis=0)[:edge_count]
+            points = to_array(ring.points)
+            starts = points[: ring.edge_count]
+            ends = np.roll(points, -1, axis=0)[: ring.edge_count]
             feet, gaps = find_nearest_on_edges(starts, ends, point)
             index = int(gaps.argmin())
             if gaps[index] < smallest_gap or (nearest is None and gaps[index] <= reach):
                 smallest_gap = float(gaps[index])
-                nearest = Edge(owner, number, index, (float(feet[index, 0]), float(feet[index, 1])))
+                nearest = Edge(owner, ring.number, index, (float(feet[index, 0]), float(feet[index, 1])))
     return nearest
 
 
@@ -151,5 +150,5 @@ def _is_in_box(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray
 def _list_items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
     """Return the obstacles whose bounding boxes are within `reach` meters, from the bottom to the top."""
     x, y = point
-    near = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
-    return [sketch.obstacles[index] for index in sorted(near.tolist())]
+    indices = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
+    return [sketch.obstacles[index] for index in sorted(indices.tolist())]

@@ -56,7 +56,9 @@ class MapDraft:
         now = now or datetime.now().astimezone()
         days = (now.date() - self.when.date()).days
         day = {0: "today", 1: "yesterday"}.get(days, f"{self.when:%Y-%m-%d}")
-        state = "never saved" if self.path is None else f"not saved to {self.path.name}"
+        state = "never saved"
+        if self.path is not None:
+            state = f"not saved to {self.path.name}"
         content = f"“{to_one_line(self.name)}”, {format_count(self.obstacles, 'obstacle')}"
         return f"{content}, {day} {self.when:%H:%M}, {state}"
 

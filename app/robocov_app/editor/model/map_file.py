@@ -20,7 +20,7 @@ SUFFIX = ".json"
 FileState: TypeAlias = Literal["same", "changed", "gone"]
 """State of a file compared with an earlier one."""
 _Stamp: TypeAlias = tuple[int, int]
-"""Size (bytes) and time of the last change (ns) of a file, which are quick to find out."""
+"""Size (bytes) and time of the last change (ns) of a file, which are quick to read."""
 _UNKNOWN_STAMP = (-1, 0)
 
 
@@ -119,7 +119,7 @@ def _require_unchanged(path: Path, expected: FileVersion | None) -> None:
 
 
 def check_file(version: FileVersion) -> FileState:
-    """Compare a file with an earlier version, quickly; one that was merely touched is the same.
+    """Compare a file with an earlier version; a file that was only written again is the same.
 
     Parameters
     ----------
@@ -137,13 +137,17 @@ def check_file(version: FileVersion) -> FileState:
     try:
         content = read_bytes(version.path)
     except MapError:
-        return "gone" if _read_stamp(version.path) is None else "changed"
-    return "same" if sha256(content).hexdigest() == version.digest else "changed"
+        if _read_stamp(version.path) is None:
+            return "gone"
+        return "changed"
+    if sha256(content).hexdigest() == version.digest:
+        return "same"
+    return "changed"
 
 
 def is_bundled(path: Path) -> bool:
     """Return whether a file is one of the maps that come with robocov."""
-    # What cannot be the path of a file is no bundled map.
+    # A path that no file can have is not that of a bundled map.
     with suppress(OSError, ValueError, RuntimeError):
         return path.resolve() in {bundled.resolve() for bundled in list_bundled_maps().values()}
     return False
@@ -151,7 +155,9 @@ def is_bundled(path: Path) -> bool:
 
 def add_suffix(path: Path) -> Path:
     """Return a path with the suffix of map files."""
-    return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
+    if path.suffix.lower() == SUFFIX:
+        return path
+    return path.with_name(path.name + SUFFIX)
 
 
 def _read_stamp(path: Path) -> _Stamp | None:

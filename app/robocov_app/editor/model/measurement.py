@@ -1,4 +1,4 @@
-"""Measurements of a sketch: its free area and components, narrowest gap, and impassable places."""
+"""Measurements of a sketch: its free area and components, narrowest gap, and impassable areas."""
 
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -76,6 +76,7 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
     """
     rule_problems, free = find_problems(sketch, radius)
     narrow_gaps = find_narrow_gaps(free, 2.0 * radius - _FIT_TOLERANCE_M)
+    narrowest_gap = next(iter(narrow_gaps), None) or find_narrowest_gap(free)
     swept, untouched = compute_reach(free, radius)
     discs = [shapely.Point(_compute_middle(gap)).buffer(gap.width / 2) for gap in narrow_gaps]
     impassable = _list_polygons(shapely.union_all([*discs, untouched]) & free)
@@ -84,7 +85,7 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
         reached=tuple(float(part.area) for part in swept),
-        gap=narrow_gaps[0] if narrow_gaps else find_narrowest_gap(free),
+        gap=narrowest_gap,
         impassable=MultiPolygon(impassable),
         sealed=sealed,
         vertices=_count_vertices(sketch),
@@ -174,7 +175,7 @@ def _compute_middle(gap: Gap) -> Point:
 
 
 def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
-    """Warn of each passage that is too narrow: of several gaps in one marked place, of the narrowest."""
+    """Warn of each passage that is too narrow; of several gaps in the same mark, only of the narrowest."""
     reason = f"too narrow for robots of radius {radius:g} m"
     tree = shapely.STRtree(marks)
     problem_by_mark: dict[int, Problem] = {}

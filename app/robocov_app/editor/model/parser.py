@@ -1,7 +1,7 @@
 """Reading of sketches from map documents.
 
-A sketch may break the rules of maps, so that its mistakes can be mended in the editor. What cannot be
-represented as a sketch, such as a point of three coordinates, is an error.
+A sketch may break the rules of maps, so that its mistakes can be corrected in the editor. A document that
+cannot be represented as a sketch, for instance because a point has three coordinates, is an error.
 """
 
 from __future__ import annotations
@@ -162,7 +162,9 @@ class _Reader:
 
     def fail(self, path: JsonPath, message: str, *, at_key: bool = False) -> NoReturn:
         """Raise MapError for the value at a path, or with `at_key` for its key."""
-        named_path = path[:-1] if at_key else path
+        named_path = path
+        if at_key:
+            named_path = path[:-1]
         if named_path:
             message = f"{format_path(named_path)}: {message}"
         raise MapError.from_mistakes(self._where, [Mistake(path, message, at_key)])

@@ -1,4 +1,4 @@
-"""Problems of a map, and messages in which objects have their names instead of places in a file."""
+"""Problems of a map, and messages in which objects have their names instead of paths in a file."""
 
 import re
 from dataclasses import dataclass
@@ -24,9 +24,9 @@ ProblemKind: TypeAlias = Literal[
 ]
 """Kind of a problem, by which fixes are found: see `robocov_app.editor.edits.fixes`."""
 
-_MAP_PLACE = re.compile(r"\b(obstacles|starts|boundary|density)((?:\[\d+\]|\.\w+|\[\"[^\"]*\"\])+)")
+_JSON_PATH = re.compile(r"\b(obstacles|starts|boundary|density)((?:\[\d+\]|\.\w+|\[\"[^\"]*\"\])+)")
 _STEP = re.compile(r"\[(\d+)\]|\.(\w+)|\[\"([^\"]*)\"\]")
-_NOUNS = {"vertices": "corner", "points": "point", "positions": "place", "holes": "hole", "areas": "area"}
+_NOUNS = {"vertices": "corner", "points": "point", "positions": "position", "holes": "hole", "areas": "area"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +61,16 @@ def format_position(x: float, y: float) -> str:
 
 
 def translate_message(message: str, sketch: Sketch) -> str:
-    """Return a message about a map file with names of objects instead of places in the file."""
+    """Return a message about a map file with names of objects instead of paths in the file."""
 
-    def name_place(match: re.Match[str]) -> str:
-        return _name_place(match, sketch)
+    def replace_path(match: re.Match[str]) -> str:
+        return _translate_path(match, sketch)
 
-    return _MAP_PLACE.sub(name_place, message.removeprefix("map: "))
+    return _JSON_PATH.sub(replace_path, message.removeprefix("map: "))
 
 
-def _name_place(match: re.Match[str], sketch: Sketch) -> str:
-    """Return a name such as "wall 3, point 2" for a place such as "obstacles[2].points[1]"."""
+def _translate_path(match: re.Match[str], sketch: Sketch) -> str:
+    """Return a name such as "wall 3, point 2" for a path such as "obstacles[2].points[1]"."""
     section = match[1]
     words = [section]
     noun = "corner"
@@ -92,6 +92,9 @@ def _name_place(match: re.Match[str], sketch: Sketch) -> str:
             if words[-1] == noun:
                 words.pop()
             words.append(numbered)
-            # Holes have corners.
-            noun = "corner" if noun == "hole" else ""
+            # A hole has numbered corners in its turn.
+            is_hole = noun == "hole"
+            noun = ""
+            if is_hole:
+                noun = "corner"
     return ", ".join(words)

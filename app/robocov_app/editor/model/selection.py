@@ -79,7 +79,10 @@ class Selection:
     @property
     def owners(self) -> frozenset[Owner]:
         """Selected obstacles, starts and the boundary."""
-        return self.items | self.starts | ({BOUNDARY} if self.boundary else frozenset())
+        owners: frozenset[Owner] = self.items | self.starts
+        if self.boundary:
+            return owners | {BOUNDARY}
+        return owners
 
     def list_items(self, sketch: Sketch) -> list[Item]:
         """Return the selected obstacles, the lowest first."""
@@ -129,11 +132,17 @@ class Selection:
         kinds = [self.items, self.starts, self.boundary, self.vertices]
         if sum(map(bool, kinds)) > 1:
             return f"{len(owners) + vertex_count} objects"
-        if vertex_count:
-            return f"{vertex_count} vertices" if vertex_count > 1 else "vertex"
-        if len(owners) > 1:
-            return format_count(len(owners), "obstacle" if self.items else "start")
-        return sketch.display_name(next(iter(owners))) if owners else "nothing"
+        if vertex_count > 1:
+            return f"{vertex_count} vertices"
+        if vertex_count == 1:
+            return "vertex"
+        if len(self.items) > 1:
+            return format_count(len(self.items), "obstacle")
+        if len(self.starts) > 1:
+            return format_count(len(self.starts), "start")
+        if not owners:
+            return "nothing"
+        return sketch.display_name(next(iter(owners)))
 
 
 @dataclass(frozen=True)
@@ -163,9 +172,9 @@ def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
     return f"{name} {sketch.index_by_key[owner] + 1}"
 
 
-def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], words: str) -> Change:
+def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], description: str) -> Change:
     """Return the change that replaces obstacles, given by their keys, with any number of shapes each."""
-    fresh = sketch.next_key
+    next_key = sketch.next_key
     items: list[Item] = []
     keys: list[int] = []
     for item in sketch.obstacles:
@@ -173,10 +182,13 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], 
             items.append(item)
             continue
         for k, shape in enumerate(shapes[item.key]):
-            keys.append(item.key if k == 0 else fresh)
-            fresh += k > 0
-            items.append(replace(item, key=keys[-1], shape=shape))
-    return Change(replace(sketch, obstacles=tuple(items)), Selection.of(*keys), words)
+            key = item.key
+            if k > 0:
+                key = next_key
+                next_key += 1
+            keys.append(key)
+            items.append(replace(item, key=key, shape=shape))
+    return Change(replace(sketch, obstacles=tuple(items)), Selection.of(*keys), description)
 
 
 def list_vertices(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
@@ -193,5 +205,5 @@ def has_vertex(sketch: Sketch, vertex: Vertex) -> bool:
 
 def find_position(sketch: Sketch, vertex: Vertex) -> Point:
     """Return the position of a vertex, m; raise MapError if it has gone."""
-    require(has_vertex(sketch, vertex), "there is no such vertex any more")
+    require(has_vertex(sketch, vertex), "this vertex no longer exists")
     return sketch.list_vertex_rings(vertex.owner)[vertex.ring][vertex.index]

@@ -30,7 +30,7 @@ def check_shapes(sketch: Sketch) -> Iterator[Problem]:
     if len(sketch.description) > MAX_TEXT_CHARACTERS:
         yield Problem(f"the description is longer than {MAX_TEXT_CHARACTERS} characters", None)
     if sketch.boundary is None:
-        message = "there is no boundary: draw one round all that is free"
+        message = "there is no boundary: draw one around the free space"
         yield Problem(message, None, BOUNDARY, kind="no boundary")
     for owner in sketch.owners:
         if isinstance(owner, str):
@@ -65,18 +65,20 @@ def _check_object(sketch: Sketch, owner: Owner) -> Iterator[Problem]:
 
 
 def _check_circle(circle: env.CircleObstacle | env.DiscStart) -> Iterator[Problem]:
-    yield from _check_size("radius", circle.radius, circle.center)
+    yield from _check_size("radius", circle.radius, (circle.center,))
     yield from _check_distance((circle.center,))
 
 
 def _check_wall(wall: env.WallObstacle) -> Iterator[Problem]:
-    yield from _check_size("width", wall.width, wall.points[0] if wall.points else None)
+    yield from _check_size("width", wall.width, wall.points)
     far = list(_check_distance(wall.points))
     if far:
         yield from far
         return
     points = to_array(wall.points)
-    extent = np.ptp(points, axis=0).max() if len(points) else 0.0
+    extent = 0.0
+    if len(points):
+        extent = np.ptp(points, axis=0).max()
     if len(points) < 2 or extent < MIN_SIZE_M:
         yield Problem("it has no length: it needs two points that are apart", _build_line(points))
     elif extent > MAX_SIZE_M:
@@ -86,12 +88,12 @@ def _check_wall(wall: env.WallObstacle) -> Iterator[Problem]:
 
 def _check_points_start(start: env.PointsStart) -> Iterator[Problem]:
     if not start.positions:
-        yield Problem("has no places: it needs one a robot", None)
+        yield Problem("has no positions: it needs one for each robot", None)
     yield from _check_distance(start.positions)
     seen: set[Point] = set()
     for position in start.positions:
         if position in seen:
-            message = f"the place {format_position(*position)} is given twice: every robot needs its own"
+            message = f"the position {format_position(*position)} occurs twice: each robot needs its own"
             yield Problem(message, shapely.Point(position), kind="spot")
         seen.add(position)
 
@@ -108,16 +110,16 @@ def _check_polygon(shape: env.PolygonObstacle) -> Iterator[Problem]:
 def _check_holes(shape: env.PolygonObstacle) -> Iterator[Problem]:
     """Yield the holes that stick out of the outline, or meet it or another hole."""
     shell = Polygon(shape.vertices)
-    sound: list[Ring] = []
+    valid_holes: list[Ring] = []
     for hole in shape.holes:
         inner = Polygon(hole)
         if not shell.covers(inner):
             yield Problem("a hole sticks out of its outline", inner - shell, kind="crossing")
-        elif not Polygon(shape.vertices, [*sound, hole]).is_valid:
+        elif not Polygon(shape.vertices, [*valid_holes, hole]).is_valid:
             message = "a hole meets the outline or another hole: it must be apart from them"
             yield Problem(message, inner, kind="crossing")
         else:
-            sound.append(hole)
+            valid_holes.append(hole)
 
 
 def _check_ring(ring: Ring, label: str = "its outline") -> Iterator[Problem]:
@@ -153,9 +155,9 @@ def _describe_crossings(label: str, points: Array, polygon: Polygon) -> Problem:
     others = len(crossings) - 1
     suffix = ""
     if others == 1:
-        suffix = " and at one more place"
+        suffix = " and at one more point"
     elif others > 1:
-        suffix = f" and at {others} more places"
+        suffix = f" and at {others} more points"
     message = f"{label} crosses or touches itself at {format_position(*crossings[0])}{suffix}"
     return Problem(message, MultiPoint(crossings[:MAX_CROSSINGS]), kind="crossing")
 
@@ -170,7 +172,9 @@ def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
     ends = np.concatenate([np.asarray(piece.coords)[[0, -1]] for piece in pieces])
     positions, counts = np.unique(ends, axis=0, return_counts=True)
     is_crossing = counts > 2
-    crossings = positions[is_crossing if is_crossing.any() else counts != 2]
+    if not is_crossing.any():
+        is_crossing = counts != 2
+    crossings = positions[is_crossing]
     if not len(crossings):
         reason = shapely.is_valid_reason(polygon)
         x, y = map(float, reason[reason.index("[") + 1 : -1].split())
@@ -178,13 +182,16 @@ def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
     return [(x, y) for x, y in crossings.tolist()]
 
 
-def _check_size(label: str, size: float, position: Point | None) -> Iterator[Problem]:
+def _check_size(label: str, size: float, points: Ring) -> Iterator[Problem]:
+    """Yield an error, at the first of some points, if a size, m, is not possible."""
     if MIN_SIZE_M <= size <= MAX_SIZE_M:
         return
     limit = f"at most {MAX_SIZE_M / 1000:g} km"
     if size < MIN_SIZE_M:
         limit = f"at least {1000 * MIN_SIZE_M:g} mm"
-    point = shapely.Point(position) if position else None
+    point = None
+    if points:
+        point = shapely.Point(points[0])
     yield Problem(f"its {label} is {size:.5g} m: {limit} is possible", point)
 
 
@@ -202,7 +209,9 @@ def _build_line(points: Array) -> shapely.Geometry | None:
     """Return points as a line, one as a point, none as None."""
     if not len(points):
         return None
-    return LineString(points) if len(points) > 1 else shapely.Point(points[0])
+    if len(points) == 1:
+        return shapely.Point(points[0])
+    return LineString(points)
 
 
 _CHECKS: dict[type, Callable[[Any], Iterator[Problem]]] = {

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, Self, TypeAlias
+from typing import Any, Final, NamedTuple, Self, TypeAlias
 
 import numpy as np
 import shapely
@@ -18,10 +18,35 @@ from robocov_app.editor.model.background import MARKS, Background, read_marks, w
 from robocov_app.editor.model.geometry import Box, to_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
-_LINES = {env.WallObstacle: "points", env.PointsStart: "positions"}
-_SHARED = ("name", "description", "schema", "density")  # fields that sketches have as environments do
-BOUNDARY: Final = -1  # of the boundary, where obstacles have their keys
-Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start
+_SHARED = ("name", "description", "schema", "density")  # fields that sketches and environments have
+BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
+Owner: TypeAlias = int | str
+"""An object that has vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+
+
+class VertexRing(NamedTuple):
+    """A line through vertices of an object.
+
+    Attributes
+    ----------
+    number : int
+        0 for the outline or a wall's line; 1, 2, ... for the holes of a polygon.
+    points : Ring
+        The vertices, m.
+    is_closed : bool
+        Whether an edge leads from the last vertex to the first.
+    """
+
+    number: int
+    points: Ring
+    is_closed: bool
+
+    @property
+    def edge_count(self) -> int:
+        """Number of edges."""
+        if self.is_closed:
+            return len(self.points)
+        return max(len(self.points) - 1, 0)
 
 
 @dataclass(frozen=True)
@@ -41,7 +66,7 @@ class Item:
     locked : bool
         Whether the mouse does not select it.
     hidden : bool
-        Whether it is not shown in the editor; robots meet it all the same.
+        Whether the editor does not show it; robots collide with it all the same.
     """
 
     key: int
@@ -148,7 +173,9 @@ class Sketch:
         """Return the shape of an obstacle, or a start; None for other objects."""
         if isinstance(owner, str):
             return dict(self.starts).get(owner)
-        return self.get_item(owner).shape if owner in self.index_by_key else None
+        if owner not in self.index_by_key:
+            return None
+        return self.get_item(owner).shape
 
     @property
     def owners(self) -> tuple[Owner, ...]:
@@ -159,46 +186,60 @@ class Sketch:
         """Return the name of an object for the user: "polygon “desk”", "start “corner”", "boundary"."""
         if isinstance(owner, str):
             return to_one_line(f"start “{owner}”")
-        shape = None if owner == BOUNDARY else self.get_item(owner).shape
-        kind = "boundary" if shape is None else KINDS[type(shape)]
-        return to_one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
+        if owner == BOUNDARY:
+            return "boundary"
+        shape = self.get_item(owner).shape
+        kind = KINDS[type(shape)]
+        if shape.name:
+            return to_one_line(f"{kind} “{shape.name}”")
+        return kind
 
     def list_vertex_rings(self, owner: Owner) -> tuple[Ring, ...]:
         """Return the positions of an object's vertices, m, ring by ring; empty if there is no such object."""
         if owner == BOUNDARY:
-            return () if self.boundary is None else (self.boundary,)
-        thing: Any = self.find_object(owner)
-        if isinstance(thing, env.PolygonObstacle):
-            return (thing.vertices, *thing.holes)
-        if isinstance(thing, env.CircleObstacle | env.DiscStart):
-            x, y = thing.center
-            radius = thing.radius
+            if self.boundary is None:
+                return ()
+            return (self.boundary,)
+        shape = self.find_object(owner)
+        if isinstance(shape, env.PolygonObstacle):
+            return (shape.vertices, *shape.holes)
+        if isinstance(shape, env.WallObstacle):
+            return (shape.points,)
+        if isinstance(shape, env.PointsStart):
+            return (shape.positions,)
+        if isinstance(shape, env.CircleObstacle | env.DiscStart):
+            x, y = shape.center
+            radius = shape.radius
             rim = ((x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius))
             return (((x, y), *rim),)
-        return (getattr(thing, _LINES[type(thing)]),) if type(thing) in _LINES else ()
+        return ()
 
-    def list_rings(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
-        """Return number, points, m, and whether it is closed of each ring; none for circles and starts."""
-        thing = self.find_object(owner)
-        if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
+    def list_rings(self, owner: Owner) -> tuple[VertexRing, ...]:
+        """Return the rings of an object that have edges; circles and starts have none."""
+        shape = self.find_object(owner)
+        if isinstance(owner, str) or isinstance(shape, env.CircleObstacle):
             return ()
-        closed = not isinstance(thing, env.WallObstacle)
-        return tuple((k, points, closed) for k, points in enumerate(self.list_vertex_rings(owner)))
+        is_closed = not isinstance(shape, env.WallObstacle)
+        rings = enumerate(self.list_vertex_rings(owner))
+        return tuple(VertexRing(number, points, is_closed) for number, points in rings)
 
     def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Self:
         """Return the map with other vertices, m, for an object that is not a circle."""
         line, *holes = map(tuple, rings)
         if owner == BOUNDARY:
             return replace(self, boundary=line)
-        thing: Any = self.find_object(owner)
-        if isinstance(thing, env.PolygonObstacle):
-            return self.with_objects({owner: replace(thing, vertices=line, holes=tuple(holes))})
-        return self.with_objects({owner: replace(thing, **{_LINES[type(thing)]: line})})
+        shape = self.find_object(owner)
+        if isinstance(shape, env.PolygonObstacle):
+            return self.with_objects({owner: replace(shape, vertices=line, holes=tuple(holes))})
+        if isinstance(shape, env.WallObstacle):
+            return self.with_objects({owner: replace(shape, points=line)})
+        assert isinstance(shape, env.PointsStart)
+        return self.with_objects({owner: replace(shape, positions=line)})
 
     @cached_property
     def index_by_key(self) -> Mapping[int, int]:
         """Index of each obstacle by its key."""
-        return {item.key: place for place, item in enumerate(self.obstacles)}
+        return {item.key: index for index, item in enumerate(self.obstacles)}
 
     @cached_property
     def geometries(self) -> Any:
@@ -215,33 +256,44 @@ class Sketch:
         """A key that no obstacle has, nor any greater one."""
         return max(self.index_by_key, default=-1) + 1
 
-    def with_obstacles(
-        self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]
-    ) -> tuple[Self, tuple[int, ...]]:
-        """Return the map with more obstacles on top, each a shape or a shape with a note, and their keys."""
-        pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
-        items = [Item(k, *pair) for k, pair in enumerate(pairs, self.next_key)]
+    def with_obstacles(self, shapes: Iterable[Obstacle]) -> tuple[Self, tuple[int, ...]]:
+        """Return the map with more obstacles on top, and their keys."""
+        return self.with_annotated_obstacles((shape, "") for shape in shapes)
+
+    def with_annotated_obstacles(self, pairs: Iterable[tuple[Obstacle, str]]) -> tuple[Self, tuple[int, ...]]:
+        """Return the map with more obstacles on top, given with their notes, and their keys."""
+        items = [Item(key, shape, note) for key, (shape, note) in enumerate(pairs, self.next_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
-    def with_objects(self, things: Mapping[Any, Any]) -> Self:
+    def with_items(self, items: Iterable[Item]) -> Self:
+        """Return the map with items in place of those that have the same keys."""
+        by_key = {item.key: item for item in items}
+        return replace(self, obstacles=tuple(by_key.get(item.key, item) for item in self.obstacles))
+
+    def with_objects(self, objects: Mapping[Any, Any]) -> Self:
         """Return the map with other obstacles by their keys, and other or more starts by their names."""
-        changed = {
-            k: new for k, new in things.items() if isinstance(k, int) and new != self.get_item(k).shape
-        }
-        items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
-        starts = dict(self.starts) | {name: spec for name, spec in things.items() if isinstance(name, str)}
-        return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))
+        items: list[Item] = []
+        starts = dict(self.starts)
+        for owner, shape in objects.items():
+            if isinstance(owner, str):
+                starts[owner] = shape
+            elif shape != self.get_item(owner).shape:
+                items.append(replace(self.get_item(owner), shape=shape))
+        return replace(self.with_items(items), starts=tuple(starts.items()))
 
     def without(self, owners: Iterable[Owner]) -> Self:
         """Return the map without some obstacles and starts."""
-        gone = frozenset(owners)
-        obstacles = tuple(item for item in self.obstacles if item.key not in gone)
-        return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
+        removed = frozenset(owners)
+        obstacles = tuple(item for item in self.obstacles if item.key not in removed)
+        starts = tuple((name, start) for name, start in self.starts if name not in removed)
+        return replace(self, obstacles=obstacles, starts=starts)
 
     def with_default_name(self, name: str) -> Self:
         """Return the map with a name, unless it has one."""
         name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
-        return replace(self, name=name) if self.name == Sketch.name and name else self
+        if self.name != Sketch.name or not name:
+            return self
+        return replace(self, name=name)
 
     @property
     def bounds(self) -> Box | None:
@@ -278,9 +330,6 @@ def build_geometry(shape: Obstacle) -> shapely.Geometry:
     """Build the area that an obstacle covers as a valid geometry, m; empty beyond the reach of maps."""
     if isinstance(shape, env.CircleObstacle):
         return _build_circle(shape)
-    points = shape.points if isinstance(shape, env.WallObstacle) else shape.vertices
-    if not points or not _is_near(points):
-        return shapely.GeometryCollection()
     if isinstance(shape, env.WallObstacle):
         return _build_wall(shape)
     return _build_polygon(shape)
@@ -288,33 +337,46 @@ def build_geometry(shape: Obstacle) -> shapely.Geometry:
 
 def _build_circle(circle: env.CircleObstacle) -> shapely.Geometry:
     """Build the area of a circle, or its center if its radius is invalid."""
-    if not _is_near([circle.center]):
+    if not _is_within_reach([circle.center]):
         return shapely.GeometryCollection()
-    has_valid_radius = 0.0 < circle.radius <= MAX_SIZE_M
-    return circle.polygon if has_valid_radius else shapely.Point(circle.center)
+    if not 0.0 < circle.radius <= MAX_SIZE_M:
+        return shapely.Point(circle.center)
+    return circle.polygon
 
 
 def _build_wall(wall: env.WallObstacle) -> shapely.Geometry:
     """Build the area of a wall, or its line if its width or length is invalid."""
+    if not wall.points or not _is_within_reach(wall.points):
+        return shapely.GeometryCollection()
     line = _build_line(wall.points)
     is_valid = line.length > 0.0 and 0.0 < wall.width <= MAX_SIZE_M
-    return wall.polygon if is_valid else line
+    if not is_valid:
+        return line
+    return wall.polygon
 
 
 def _build_polygon(shape: env.PolygonObstacle) -> shapely.Geometry:
     """Build the area of a polygon without invalid holes, or its line if it has fewer than three vertices."""
+    if not shape.vertices or not _is_within_reach(shape.vertices):
+        return shapely.GeometryCollection()
     if len(shape.vertices) < 3:
         return _build_line(shape.vertices)
-    holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_near(hole)]
-    has_valid_holes = len(holes) == len(shape.holes)
-    polygon = shape.polygon if has_valid_holes else shapely.Polygon(shape.vertices, holes)
-    return polygon if polygon.is_valid else shapely.make_valid(polygon)
+    holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_within_reach(hole)]
+    if len(holes) == len(shape.holes):
+        polygon = shape.polygon
+    else:
+        polygon = shapely.Polygon(shape.vertices, holes)
+    if not polygon.is_valid:
+        return shapely.make_valid(polygon)
+    return polygon
 
 
 def _build_line(points: Sequence[Point]) -> shapely.Geometry:
     """Build a line, or a point if all points are the same."""
-    return shapely.LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
+    if len(set(points)) == 1:
+        return shapely.Point(points[0])
+    return shapely.LineString(points)
 
 
-def _is_near(points: Iterable[Point]) -> bool:
+def _is_within_reach(points: Iterable[Point]) -> bool:
     return all(abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M for x, y in points)

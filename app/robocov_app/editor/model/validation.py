@@ -73,7 +73,7 @@ def _add_name(problem: Problem, sketch: Sketch) -> Problem:
 
 
 def _check_map_rules(sketch: Sketch, environment: env.Environment) -> list[Problem]:
-    """Return the errors by the rules of map files, which decide; in words of our own where there are any."""
+    """Return the errors by the rules of map files, with the editor's own messages where there are any."""
     try:
         validate_document(to_document(sketch), "map")
         check_rules(environment, "map")
@@ -89,7 +89,9 @@ def _build_rough_free_space(sketch: Sketch) -> MultiPolygon:
     if len(ring) < 3 or np.abs(ring).max() > MAX_COORDINATE_M or np.ptp(ring, axis=0).max() > MAX_SIZE_M:
         return MultiPolygon()
     inside = shapely.make_valid(Polygon(ring))
-    solid = shapely.union_all(sketch.geometries) if len(sketch.geometries) else MultiPolygon()
+    solid = MultiPolygon()
+    if len(sketch.geometries):
+        solid = shapely.union_all(sketch.geometries)
     # The difference of broken outlines may contain lines and points.
     parts = shapely.get_parts(inside - solid)
     polygons = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
@@ -129,7 +131,7 @@ def _check_positions(
 
 
 def _describe_position(start: env.PointsStart, number: int) -> str:
-    return f": place {number + 1} at {format_position(*start.positions[number])}"
+    return f": position {number + 1} at {format_position(*start.positions[number])}"
 
 
 def _check_space(
@@ -185,9 +187,7 @@ def _warn_of_duplicates(sketch: Sketch) -> Iterator[Problem]:
         fields = tuple(value for name, value in vars(item.shape).items() if name not in ("name", "polygon"))
         form = (type(item.shape), *fields)
         if form in seen and not item.geometry.is_empty:
-            yield Problem(
-                " lies on another one that is just the same", item.geometry, item.key, False, "twice"
-            )
+            yield Problem(" duplicates another obstacle", item.geometry, item.key, False, "twice")
         seen.add(form)
 
 
@@ -196,7 +196,7 @@ def _warn_of_repeated_vertices(sketch: Sketch) -> Iterator[Problem]:
         for _, ring, is_closed in sketch.list_rings(owner):
             repeated = _find_repeated_vertices(ring, is_closed)
             if repeated and len(set(ring)) >= 3:
-                message = f": two vertices lie in the same place, {format_position(*repeated[0])}"
+                message = f": two vertices have the same position, {format_position(*repeated[0])}"
                 yield Problem(message, MultiPoint(repeated), owner, False, "double")
 
 
@@ -204,16 +204,20 @@ def _find_repeated_vertices(ring: Ring, is_closed: bool) -> list[Point]:
     """Return the vertices that the next vertex repeats."""
     if len(set(ring)) == len(ring):
         return []
-    line = (*ring, ring[0]) if is_closed else ring
+    line = ring
+    if is_closed:
+        line = (*ring, ring[0])
     return [point for point, following in pairwise(line) if point == following]
 
 
 def _warn_of_blocked_paths(sketch: Sketch, skipped: set[Owner | None]) -> Iterator[Problem]:
     """Yield moving obstacles that meet standing ones or the boundary."""
-    sound = [item for item in sketch.obstacles if item.key not in skipped and not item.geometry.is_empty]
-    standing = {item.key: item.geometry for item in sound if item.shape.path is None}
-    inside = None if BOUNDARY in skipped else Polygon(sketch.boundary)
-    for item in sound:
+    checked = [item for item in sketch.obstacles if item.key not in skipped and not item.geometry.is_empty]
+    standing = {item.key: item.geometry for item in checked if item.shape.path is None}
+    inside = None
+    if BOUNDARY not in skipped:
+        inside = Polygon(sketch.boundary)
+    for item in checked:
         if item.shape.path is not None:
             yield from _check_path(sketch, item, standing, inside)
 
@@ -233,14 +237,14 @@ def _check_path(
 
 
 def _warn_of_sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    """Yield the parts of the free space that have no way in; those smaller than a robot together."""
+    """Yield the parts of the free space without an entrance; those smaller than a robot together."""
     robot_area = math.pi * radius * radius
     others = list(free.geoms)[1:]
     pockets = [part for part in others if part.area < robot_area]
     rooms = others[: len(others) - len(pockets)]  # parts are sorted by area, the largest first
     for room in rooms:
         position = format_position(*room.representative_point().coords[0])
-        message = f"the room of {room.area:.3g} m² round {position} is sealed: no way leads in"
+        message = f"the room of {room.area:.3g} m² around {position} is sealed: it has no entrance"
         yield Problem(message, room, None, False, "sealed")
     if pockets:
         area = sum(pocket.area for pocket in pockets)
@@ -265,5 +269,5 @@ def _warn_of_tight_positions(
         gap = math.dist(start.positions[i], start.positions[j])
         if gap < 2 * radius:
             position = _describe_position(start, i)
-            message = f"{position} and place {j + 1} are {gap:.3g} m apart: robots need {2 * radius:g} m"
+            message = f"{position} and position {j + 1} are {gap:.3g} m apart: robots need {2 * radius:g} m"
             yield Problem(message, MultiPoint([points[i], points[j]]), name, False, "spot")

@@ -13,7 +13,7 @@ from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.tools.snapping import Snap, SnapSettings, snap_point
 from robocov_app.toolkit.window.window_model import WindowModel
 
-SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a line that is far off must not win over the grid
+SNAP_REACH_FRACTION = 0.6  # of the pointer's reach: a distant line must not win over the grid
 
 
 class EditorContext(WindowModel):

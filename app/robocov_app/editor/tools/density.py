@@ -18,7 +18,7 @@ from robocov_app.toolkit.tools.tool import CursorShape
 
 DEFAULT_WEIGHT = 4.0  # of a new feature, until another weight is typed
 MIN_SIGMA_M = 0.02
-RIM_REACH_FRACTION = 0.6  # of the pointer's reach, within which a rim or a corner is taken
+RIM_REACH_FRACTION = 0.6  # of the pointer's reach, within which a rim or a corner is picked
 _OUTLINE_POINTS = 64
 
 
@@ -82,7 +82,9 @@ class DensityTool(EditorTool):
             if self.chosen is None:
                 self.chosen = len(density.list_features(context.sketch)) - 1
             return
-        self.chosen = self._hit.feature if self._hit.corner is None else None
+        self.chosen = None
+        if self._hit.corner is None:
+            self.chosen = self._hit.feature
         if self.chosen is not None:
             context.show_message("type its weight, then Enter; Backspace removes it")
 
@@ -114,9 +116,8 @@ class DensityTool(EditorTool):
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return outlines, centers and corners of all features, and the weight of the chosen one."""
-        sketch = context.sketch if self.change is None else self.change.sketch
-        pending = None if self.change is None else sketch
-        features = density.list_features(sketch)
+        pending = self.pending
+        features = density.list_features(pending or context.sketch)
         label = self._build_label(features)
         if not features and not label:
             return EditorDrawState(pending=pending)
@@ -145,7 +146,9 @@ class DensityTool(EditorTool):
 
     def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
-        return "move" if self._hit.feature is not None and self.pressed is not None else "cross"
+        if self._hit.feature is not None and self.pressed is not None:
+            return "move"
+        return "cross"
 
     def _build_change(self, context: EditorContext, start: Point, end: Point) -> Change | None:
         """Return the change of a drag between two points, m."""

@@ -9,8 +9,8 @@ from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 
 DEFAULT_DOOR_WIDTH_M = 0.9
-WALL_REACH_FRACTION = 0.6  # of the pointer's reach, within which a wall is taken
-MIN_DRAG_FRACTION = 0.1  # of a door's width, from which on a drag gives the opening
+WALL_REACH_FRACTION = 0.6  # of the pointer's reach, within which a wall is picked
+MIN_DRAG_FRACTION = 0.1  # of a door's width; longer drags set the width of the opening
 
 
 class DoorTool(EditorTool):

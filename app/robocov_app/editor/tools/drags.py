@@ -18,9 +18,9 @@ from robocov_app.toolkit.tools.geometry import compute_bearing
 from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_move
 from robocov_app.toolkit.tools.tool import CursorShape
 
-MANY_POINTS = 1000  # of more vertices, a picture is moved instead of the obstacles
-MAX_SNAPPING_POINTS = 60  # of the vertices that are moved, about so many can snap
-NO_MOVE_M = 1e-9  # shorter moves are none
+MANY_POINTS = 1000  # if more vertices are dragged, an image of the obstacles is moved instead
+MAX_SNAPPING_POINTS = 60  # approximate number of the dragged vertices that can snap
+NO_MOVE_M = 1e-9  # shorter moves do not count
 MIN_SIZE_M = 1e-3  # of the selection after scaling
 _FACTOR_TOLERANCE = 1e-9
 _UNIT_TOLERANCE = 1e-12
@@ -63,7 +63,7 @@ class Drag:
 
     @property
     def carried(self) -> CarriedItems | None:
-        """Obstacles that are dragged as a picture."""
+        """Obstacles that are dragged as an image."""
         return None
 
     def follow(self, event: EditorPointerEvent) -> None:
@@ -109,7 +109,7 @@ class MoveDrag(Drag):
 
     @property
     def carried(self) -> CarriedItems | None:
-        """Obstacles that are dragged as a picture, if they are many."""
+        """Obstacles that are dragged as an image, if they are many."""
         if not self._is_carried:
             return None
         return CarriedItems(self.selection, self._offset, self._copies)
@@ -118,7 +118,9 @@ class MoveDrag(Drag):
         """Follow the pointer."""
         self._copies = event.alt
         self.guides = ()
-        end = geometry.constrain_angle(self._start, event.raw) if event.shift else event.raw
+        end = event.raw
+        if event.shift:
+            end = geometry.constrain_angle(self._start, event.raw)
         dx = end[0] - self._start[0]
         dy = end[1] - self._start[1]
         context = self.context
@@ -141,8 +143,9 @@ class MoveDrag(Drag):
     def _build_change(self, dx: float, dy: float) -> Change | None:
         if not dx and not dy:
             return None
-        edit = transform.duplicate if self._copies else transform.move
-        return edit(self.context.sketch, self.selection, dx, dy)
+        if self._copies:
+            return transform.duplicate(self.context.sketch, self.selection, dx, dy)
+        return transform.move(self.context.sketch, self.selection, dx, dy)
 
     def end(self) -> None:
         """Apply the change."""
@@ -251,7 +254,9 @@ class ScaleDrag(Drag):
         """Follow the pointer."""
         pointer = (event.raw[0] - self._margin[0], event.raw[1] - self._margin[1])
         position = self._snap(event, pointer)
-        center = geometry.compute_center(self._bounds) if event.alt else self._fixed
+        center = self._fixed
+        if event.alt:
+            center = geometry.compute_center(self._bounds)
         factors = [1.0, 1.0]
         for axis in (0, 1):
             if self._side[axis] and abs(self._grip[axis] - center[axis]) > NO_MOVE_M:
@@ -293,7 +298,9 @@ class ScaleDrag(Drag):
 def _limit_factor(factor: float, length: float) -> float:
     """Return a factor that does not shrink a length, m, below the minimum."""
     min_factor = MIN_SIZE_M / max(length, MIN_SIZE_M)
-    return factor if abs(factor) >= min_factor else min_factor
+    if abs(factor) < min_factor:
+        return min_factor
+    return factor
 
 
 class BoxDrag(Drag):
@@ -302,7 +309,9 @@ class BoxDrag(Drag):
     def __init__(self, context: EditorContext, start: Point, *, adds: bool) -> None:
         super().__init__(context, Selection(), start)
         self._adds = adds
-        self._previous = context.selection if adds else Selection()
+        self._previous = Selection()
+        if adds:
+            self._previous = context.selection
 
     @property
     def _selects_touched(self) -> bool:

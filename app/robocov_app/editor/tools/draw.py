@@ -1,5 +1,6 @@
 """Tools that draw obstacles, the boundary and starts, and the measuring tape."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from itertools import pairwise
 from math import copysign
@@ -20,8 +21,8 @@ from robocov_app.toolkit.tools.drawn_outline import SAME_POINT_M, DrawnOutline
 CLOSING_FRACTION = 0.7  # of the pointer's reach, within which a click on the first point closes the outline
 
 
-class DrawTool(EditorTool):
-    """Draws point by point, or with a single drag; subclasses build something from the points.
+class LineTool(EditorTool, ABC):
+    """Draws point by point, or with a single drag; subclasses define what becomes of the points.
 
     Attributes
     ----------
@@ -45,9 +46,9 @@ class DrawTool(EditorTool):
         super().__init__()
         self.outline = DrawnOutline(self.min_points, self.max_points, self.closes, self.drags)
 
-    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
-        """Return the change that adds the object with these points, m."""
-        raise NotImplementedError
+    @abstractmethod
+    def finish(self, context: EditorContext) -> None:
+        """Complete the drawing with the points drawn so far."""
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the unfinished drawing; the last of the points, m, is the cursor."""
@@ -78,12 +79,16 @@ class DrawTool(EditorTool):
     @property
     def origin(self) -> Point | None:
         """Last point of a line that is being drawn, m; None for shapes given by two points."""
-        return self.points[-1] if self.points and self.max_points > 2 else None
+        if not self.points or self.max_points == 2:
+            return None
+        return self.points[-1]
 
     @property
     def snap_points(self) -> tuple[Point, ...]:
         """Points drawn so far to which the pointer snaps, m."""
-        return tuple(self.points if self.max_points == 2 else self.points[:-1])
+        if self.max_points == 2:
+            return tuple(self.points)
+        return tuple(self.points[:-1])
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Add a point."""
@@ -107,16 +112,6 @@ class DrawTool(EditorTool):
         if self.outline.release(self.choose_point(event), event.raw, event.reach, clicked=clicked):
             self._finish_drag(context, self.outline.cursor)
 
-    def finish(self, context: EditorContext) -> None:
-        """Add the drawn points to the map as an object."""
-        points = self.outline.take_points()
-        if not points:
-            return
-        if len(points) < self.min_points:
-            name = self.title.lower()
-            raise MapError(f"{name}: {len(points)} of at least {self.min_points} points were drawn")
-        context.apply(self.build_change(context, points))
-
     def remove_last(self, context: EditorContext) -> bool:
         """Remove the last point."""
         if not self.points:
@@ -135,7 +130,9 @@ class DrawTool(EditorTool):
             if end is not None:
                 self._finish_drag(context, end)
                 return
-        cursor = self.outline.cursor if self.points else None
+        cursor = None
+        if self.points:
+            cursor = self.outline.cursor
         self.outline.cursor = parse_next_point(text, self.origin, cursor)
         self.outline.points.append(self.outline.cursor)
         self.outline.is_dragging = False
@@ -148,7 +145,10 @@ class DrawTool(EditorTool):
 
     def _finish_drag(self, context: EditorContext, end: Point) -> None:
         start = self.points[0]
-        self.outline.points = list(build_rectangle(start, end)) if self.closes else [start, end]
+        if self.closes:
+            self.outline.points = list(build_rectangle(start, end))
+        else:
+            self.outline.points = [start, end]
         self.finish(context)
 
     def _find_far_corner(self, text: str) -> Point:
@@ -156,9 +156,25 @@ class DrawTool(EditorTool):
         x, y = self.points[0]
         cursor_x, cursor_y = self.outline.cursor
         width, height = parse_size(text)
-        far_x = x + width if cursor_x >= x else x - width
-        far_y = y + height if cursor_y >= y else y - height
-        return far_x, far_y
+        return x + copysign(width, cursor_x - x), y + copysign(height, cursor_y - y)
+
+
+class DrawTool(LineTool, ABC):
+    """Draws an object of the map; subclasses build it from the points."""
+
+    @abstractmethod
+    def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
+        """Return the change that adds the object with these points, m."""
+
+    def finish(self, context: EditorContext) -> None:
+        """Add the drawn points to the map as an object."""
+        points = self.outline.take_points()
+        if not points:
+            return
+        if len(points) < self.min_points:
+            name = self.title.lower()
+            raise MapError(f"{name}: {len(points)} of at least {self.min_points} points were drawn")
+        context.apply(self.build_change(context, points))
 
 
 class PolygonTool(DrawTool):
@@ -191,19 +207,21 @@ class WallTool(DrawTool):
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the line, with the wall as thick as it will be."""
-        line = points if distance(points[-2], points[-1]) > SAME_POINT_M else points[:-1]
+        line = points
+        if distance(points[-2], points[-1]) <= SAME_POINT_M:
+            line = points[:-1]
         shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         label = f"{format_bearing(points[-2], points[-1])}   {format_length(context.wall_width)} wide"
         return EditorDrawState(line=points, shows_lengths=True, shapes=shapes, label=label)
 
 
-class MeasureTool(DrawTool):
+class MeasureTool(LineTool):
     """Measures along a line; the measured line stays until another is drawn."""
 
     name = "measure"
     title = "Measure"
     key = "m"
-    hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
+    hint = "click points, or drag; “level” turns the map so that the line lies level; Esc removes the tape"
     drags = True
 
     @property
@@ -230,7 +248,9 @@ class MeasureTool(DrawTool):
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the line with its length, and the area that it encloses."""
-        points = [*self.points, self.outline.cursor] if self.points else self.clicked
+        points = self.clicked
+        if self.points:
+            points = [*self.points, self.outline.cursor]
         if len(points) < 2:
             return EditorDrawState()
         start, end = points[-2], points[-1]
@@ -249,7 +269,7 @@ class PlacesTool(DrawTool):
     name = "places"
     title = "Start spots"
     key = "shift+s"
-    hint = "click a place for each robot; Enter ends it"
+    hint = "click a position for each robot; Enter ends it"
     min_points = 1
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
@@ -279,12 +299,16 @@ class BoundaryTool(DrawTool):
 
     def choose_point(self, event: EditorPointerEvent) -> Point:
         """Return the position of the next point, m; angles count only between clicked corners."""
-        return event.point if self.outline.is_dragging else super().choose_point(event)
+        if self.outline.is_dragging:
+            return event.point
+        return super().choose_point(event)
 
     def find_drag_end(self, text: str) -> Point | None:
         """Return the corner opposite to the first, if a size such as 10 x 8 was typed."""
         is_size = any(sign in text for sign in "x×*")
-        return self._find_far_corner(text) if is_size else None
+        if not is_size:
+            return None
+        return self._find_far_corner(text)
 
     def build_preview(self, context: EditorContext, points: tuple[Point, ...]) -> EditorDrawState:
         """Return the outline; in a drag, the rectangle."""

@@ -12,7 +12,7 @@ from robocov_app.toolkit.tools.tool import DrawState
 
 @dataclass(frozen=True)
 class CarriedItems:
-    """Obstacles that are dragged as a picture, because there are too many to move one by one.
+    """Obstacles that are dragged as an image, because there are too many to move one by one.
 
     Attributes
     ----------
@@ -58,10 +58,10 @@ class EditorDrawState(DrawState):
     background : Background or None
         The reference image at the position to which it is dragged.
     carried : CarriedItems or None
-        Obstacles that are dragged as a picture.
+        Obstacles that are dragged as an image.
     hovered : Owner or None
         Object under the cursor.
-    near : Handle or None
+    hovered_handle : Handle or None
         Handle under the cursor.
     shows_handles : bool
         Whether the selection has its handles.
@@ -81,6 +81,6 @@ class EditorDrawState(DrawState):
     background: Background | None = None
     carried: CarriedItems | None = None
     hovered: Owner | None = None
-    near: Handle | None = None
+    hovered_handle: Handle | None = None
     shows_handles: bool = False
     labels_cursor: bool = True

@@ -93,8 +93,12 @@ def list_handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Ha
 def _list_frame_handles(frame: Box, pixel: float) -> list[Handle]:
     low_x, low_y, high_x, high_y = frame
     min_side = MIN_SIDE_WITH_MIDDLE_PX * pixel
-    columns = (-1, 0, 1) if high_x - low_x > min_side else (-1, 1)
-    rows = (-1, 0, 1) if high_y - low_y > min_side else (-1, 1)
+    columns = [-1, 1]
+    rows = [-1, 1]
+    if high_x - low_x > min_side:
+        columns = [-1, 0, 1]
+    if high_y - low_y > min_side:
+        rows = [-1, 0, 1]
     sides = [side for side in product(columns, rows) if side != (0, 0)]
     handles = [Handle("scale", compute_side_position(frame, side), side=side) for side in sides]
     knob = (compute_center(frame)[0], high_y + KNOB_HEIGHT_PX * pixel)
@@ -120,5 +124,5 @@ def compute_side_position(box: Box, side: tuple[int, int]) -> Point:
 
 def find_handle(handles: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
     """Return the handle within `reach` meters of a point: the nearest, vertices before others."""
-    near = [handle for handle in handles if distance(handle.at, point) <= reach]
-    return min(near, key=lambda handle: (handle.kind != "vertex", distance(handle.at, point)), default=None)
+    nearby = [handle for handle in handles if distance(handle.at, point) <= reach]
+    return min(nearby, key=lambda handle: (handle.kind != "vertex", distance(handle.at, point)), default=None)

@@ -12,7 +12,7 @@ from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.tools.tool import CursorShape
 
-WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach, within which a waypoint is taken
+WAYPOINT_REACH_FRACTION = 0.75  # of the pointer's reach, within which a waypoint is picked
 LEG_REACH_FRACTION = 0.5  # of the pointer's reach, within which a click inserts into a leg
 HOVER_REACH_PX = 8.0  # at scale 1, within which the cursor shows that a waypoint can be dragged
 
@@ -56,7 +56,9 @@ class MotionPathTool(EditorTool):
     def origin(self) -> Point | None:
         """Last waypoint, m."""
         path = self._subject.path
-        return path.points[-1] if path is not None else None
+        if path is None:
+            return None
+        return path.points[-1]
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Take a waypoint, select an obstacle, or add a waypoint."""
@@ -86,12 +88,16 @@ class MotionPathTool(EditorTool):
     ) -> None:
         """Insert a waypoint into the leg under the pointer, or append it."""
         index = None
+        last = 1  # of a new path, which starts at the obstacle
         if path is not None:
             index = paths.find_leg(path, event.raw, LEG_REACH_FRACTION * event.reach)
-        point = event.point if index is not None else event.constrain(self.origin)
+            last = len(path.points)
+        point = event.point
+        if index is None:
+            point = event.constrain(self.origin)
         context.apply(paths.add_waypoint(context.sketch, subject, point, index, self.speed))
         if index is None:
-            index = len(path.points) if path is not None else 1
+            index = last
         self.chosen = index
         self._dragged = index
 
@@ -135,9 +141,13 @@ class MotionPathTool(EditorTool):
         if subject is None or path is None:
             return False
         last = len(path.points) - 1
-        chosen = last if self.chosen is None else min(self.chosen, last)
+        chosen = last
+        if self.chosen is not None:
+            chosen = min(self.chosen, last)
         context.apply(paths.remove_waypoint(context.sketch, subject, chosen))
-        self.chosen = max(chosen - 1, 0) if len(path.points) > 2 else None
+        self.chosen = None
+        if len(path.points) > 2:
+            self.chosen = max(chosen - 1, 0)
         self._subject = _find_subject(context)
         return True
 
@@ -160,7 +170,7 @@ class MotionPathTool(EditorTool):
 
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the waypoints with the speed and length of the path."""
-        pending = None if self.change is None else self.change.sketch
+        pending = self.pending
         subject, path = _find_subject(context)
         if subject is None:
             return EditorDrawState(pending=pending)
@@ -176,12 +186,12 @@ class MotionPathTool(EditorTool):
 
     def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
+        if self._dragged is not None:
+            return "move"
         path = _find_subject(context).path
-        is_over_waypoint = False
-        if path is not None:
-            waypoint = paths.find_waypoint(path, self.cursor, HOVER_REACH_PX * context.pixel)
-            is_over_waypoint = waypoint is not None
-        return "move" if is_over_waypoint or self._dragged is not None else "cross"
+        if path is None or paths.find_waypoint(path, self.cursor, HOVER_REACH_PX * context.pixel) is None:
+            return "cross"
+        return "move"
 
 
 def _find_subject(context: EditorContext) -> _Subject:

@@ -13,8 +13,8 @@ from robocov_app.editor.tools.handles import Handle, find_handle
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.toolkit.tools.tool import CursorShape
 
-HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach, within which a handle or an edge is taken
-OBJECT_REACH_FRACTION = 0.5  # of the pointer's reach, within which an object is taken
+HANDLE_REACH_FRACTION = 0.6  # of the pointer's reach, within which a handle or an edge is picked
+OBJECT_REACH_FRACTION = 0.5  # of the pointer's reach, within which an object is picked
 EDGE_TOLERANCE_M = 1e-5  # a point closer to an edge lies on it
 _SIDE_CURSORS: dict[tuple[int, int], CursorShape] = {
     (1, 0): "sideways",
@@ -35,7 +35,7 @@ class SelectTool(EditorTool):
     ----------
     hovered : Owner or None
         Object under the cursor.
-    near : Handle or None
+    hovered_handle : Handle or None
         Handle under the cursor.
     drag : Drag or None
         The present drag.
@@ -50,7 +50,7 @@ class SelectTool(EditorTool):
     def __init__(self) -> None:
         super().__init__()
         self.hovered: Owner | None = None
-        self.near: Handle | None = None
+        self.hovered_handle: Handle | None = None
         self.drag: Drag | None = None
         self._handle: Handle | None = None  # that was pressed
         self._narrows = False  # whether a click narrows the selection, as the press was on a selected object
@@ -86,7 +86,9 @@ class SelectTool(EditorTool):
             return
         # A selected object is meant even where another lies on top of it.
         selected = next((owner for owner in owners if owner in context.selection.owners), None)
-        owner = owners[0] if selected is None or event.shift else selected
+        owner = owners[0]
+        if selected is not None and not event.shift:
+            owner = selected
         pressed = Selection.of(owner).with_groups(context.sketch)
         if event.shift:
             context.select(context.selection.without_vertices().toggle(pressed))
@@ -98,9 +100,9 @@ class SelectTool(EditorTool):
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Find the handle or object under the pointer, or drag."""
         if self.pressed is None:
-            self.near = self._find_handle(context, event)
+            self.hovered_handle = self._find_handle(context, event)
             self.hovered = None
-            if self.near is None:
+            if self.hovered_handle is None:
                 self.hovered = next(iter(_find_owners(context, event)), None)
             return
         if self.drag is None and event.has_moved_from(self.pressed.raw):
@@ -188,19 +190,28 @@ class SelectTool(EditorTool):
     def build_draw_state(self, context: EditorContext) -> EditorDrawState:
         """Return the state of the drag, or the handle and object under the cursor."""
         if self.drag is not None:
-            return replace(self.drag.build_draw_state(), near=self.near)
-        return EditorDrawState(hovered=self.hovered, near=self.near, shows_handles=True, labels_cursor=False)
+            return replace(self.drag.build_draw_state(), hovered_handle=self.hovered_handle)
+        return EditorDrawState(
+            hovered=self.hovered,
+            hovered_handle=self.hovered_handle,
+            shows_handles=True,
+            labels_cursor=False,
+        )
 
     def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
-        if self.drag is not None and self.drag.cursor_shape is not None:
-            return self.drag.cursor_shape
-        handle = self._handle if self.drag is not None else self.near
+        handle = self.hovered_handle
+        if self.drag is not None:
+            handle = self._handle
+            if self.drag.cursor_shape is not None:
+                return self.drag.cursor_shape
         if handle is not None:
             return _SIDE_CURSORS.get(handle.side, "hand")
-        if self.hovered is not None:
-            return "move" if self.hovered in context.selection.owners else "hand"
-        return "arrow"
+        if self.hovered is None:
+            return "arrow"
+        if self.hovered in context.selection.owners:
+            return "move"
+        return "hand"
 
     def _find_handle(self, context: EditorContext, event: EditorPointerEvent) -> Handle | None:
         return find_handle(context.handles, event.raw, HANDLE_REACH_FRACTION * event.reach)

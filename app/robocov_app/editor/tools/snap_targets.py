@@ -8,15 +8,15 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, Ring, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
 from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.selection import Vertex
-from robocov_app.editor.model.sketch import Owner, Sketch, build_geometry
+from robocov_app.editor.model.sketch import Owner, Sketch, VertexRing, build_geometry
 from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.tools.snap_targets import Edges, SnapTargets, list_outline_edges
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
-MANY_VERTICES = 1500  # vertices of a map from which on the window does not wait for its targets
+MANY_VERTICES = 1500  # the window does not wait for the targets of maps with this many vertices
 
 
 class _TargetCollector:
@@ -44,8 +44,8 @@ class _TargetCollector:
         elif isinstance(shape, PointsStart):
             dragged = self.dragged[owner, 0]
             self.centers += [point for k, point in enumerate(shape.positions) if k not in dragged]
-        for number, ring, is_closed in sketch.list_rings(owner):
-            self._add_ring(ring, is_closed, self.dragged[owner, number])
+        for ring in sketch.list_rings(owner):
+            self._add_ring(ring, self.dragged[owner, ring.number])
 
     def build_targets(self) -> SnapTargets:
         """Return the collected targets."""
@@ -56,13 +56,13 @@ class _TargetCollector:
         outlines = list_outline_edges([*self.walls, *self.circles])
         return SnapTargets(vertices, to_array(self.centers), Edges(starts, ends), outlines)
 
-    def _add_ring(self, ring: Ring, is_closed: bool, dragged: set[int]) -> None:
-        count = len(ring)
-        self.vertices += [point for k, point in enumerate(ring) if k not in dragged]
-        for k in range(count if is_closed else count - 1):
-            following = (k + 1) % count
+    def _add_ring(self, ring: VertexRing, dragged: set[int]) -> None:
+        points = ring.points
+        self.vertices += [point for k, point in enumerate(points) if k not in dragged]
+        for k in range(ring.edge_count):
+            following = (k + 1) % len(points)
             if k not in dragged and following not in dragged:
-                self.edges.append((ring[k], ring[following]))
+                self.edges.append((points[k], points[following]))
 
 
 def collect_snap_targets(sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> SnapTargets:
@@ -97,12 +97,12 @@ class Snapper:
 
     Attributes
     ----------
-    patient : bool
+    waits_for_targets : bool
         Whether to wait for the targets of large maps, too.
     """
 
     def __init__(self) -> None:
-        self.patient = False
+        self.waits_for_targets = False
         self._latest: LatestValue[Future[SnapTargets]] = LatestValue()
         self._pool = ThreadPoolExecutor(1, "targets")
 
@@ -117,7 +117,8 @@ class Snapper:
             (dragged, points),
             lambda: self._pool.submit(collect_snap_targets, sketch, dragged, points),
         )
-        if future.done() or self.patient or count_vertices(sketch) < MANY_VERTICES:
+        must_wait = self.waits_for_targets or count_vertices(sketch) < MANY_VERTICES
+        if must_wait or future.done():
             return future.result()
         return None
 

@@ -6,6 +6,7 @@ from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.editor.model.geometry import constrain_angle
 from robocov_app.editor.model.selection import Change
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.draw_state import EditorDrawState
 from robocov_app.toolkit.tools.snapping import Guide
@@ -28,10 +29,12 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
 
     Attributes
     ----------
+    name, title, button_text, key, hint, snaps
+        See `Tool`.
     accepts_text : bool
         Whether values can be typed while the tool is busy.
     starts_with_text : bool
-        Whether values can be typed before, too.
+        Whether values can also be typed before it is busy.
     guides : tuple of Guide
         Guides of the latest snap.
     pressed : EditorPointerEvent or None
@@ -59,6 +62,13 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
     def is_busy(self) -> bool:
         """Whether an action is half done."""
         return self.pressed is not None or bool(self.clicked)
+
+    @property
+    def pending(self) -> Sketch | None:
+        """The map as releasing the button would change it."""
+        if self.change is None:
+            return None
+        return self.change.sketch
 
     @property
     def origin(self) -> Point | None:

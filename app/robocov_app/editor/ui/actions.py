@@ -34,23 +34,27 @@ def select_owners(selection: Selection) -> Selection:
 
 def prefer_vertices(selection: Selection) -> Selection:
     """Return only the vertices of a selection, or all of it if there are none."""
-    return Selection(vertices=selection.vertices) if selection.vertices else selection
+    if not selection.vertices:
+        return selection
+    return Selection(vertices=selection.vertices)
 
 
 def align(editor: Editor, side: transform.Side) -> None:
     """Align the selection at a side."""
-    selection = editor.selection if editor.selection.vertices else require_selection(editor)
+    selection = editor.selection
+    if not selection.vertices:
+        selection = require_selection(editor)
     editor.apply(transform.align(editor.sketch, selection, side))
 
 
-def show_motion(editor: Editor) -> str:
-    """Show moving obstacles moving, or standing again; return the status message."""
+def toggle_motion(editor: Editor) -> str:
+    """Start or stop to show obstacles in motion; return the status message."""
     if editor.moves_since is not None:
         editor.moves_since = None
-        return "obstacles stand as they are at time zero"
+        return "obstacles are shown at time zero"
     require(paths.list_moving_obstacles(editor.sketch), "no obstacle moves: the tool Path gives one a path")
     editor.moves_since = editor.now
-    return "obstacles move as they will; L ends it"
+    return "obstacles move as in a run; L stops them"
 
 
 def remove_last(editor: Editor) -> None:
@@ -62,9 +66,11 @@ def remove_last(editor: Editor) -> None:
 
 def delete(editor: Editor) -> None:
     """Delete the selected vertices, or else the selected objects."""
-    selection = require(editor.selection, "nothing is selected: click something first")
-    edit = vertices.delete_vertices if selection.vertices else properties.delete
-    editor.apply(edit(editor.sketch, prefer_vertices(selection)))
+    selection = prefer_vertices(require(editor.selection, "nothing is selected: click something first"))
+    if selection.vertices:
+        editor.apply(vertices.delete_vertices(editor.sketch, selection))
+    else:
+        editor.apply(properties.delete(editor.sketch, selection))
 
 
 def copy(editor: Editor) -> str:
@@ -84,7 +90,9 @@ def paste(editor: Editor, position: Point | None) -> None:
     """Paste the clipboard at a position, m, or where it was copied."""
     text = editor.clipboard.get()
     require(text.strip(), "the clipboard is empty")
-    grid = editor.grid if "grid" in editor.snaps else None
+    grid = None
+    if "grid" in editor.snaps:
+        grid = editor.grid
     editor.apply(clipboard.paste(editor.sketch, text, position, grid))
 
 
@@ -115,8 +123,9 @@ def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
 
 def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
     """Return the change that moves vertices, or else objects, by a displacement, m."""
-    edit = vertices.move_vertices if selection.vertices else transform.move
-    return edit(editor.sketch, selection, dx, dy)
+    if selection.vertices:
+        return vertices.move_vertices(editor.sketch, selection, dx, dy)
+    return transform.move(editor.sketch, selection, dx, dy)
 
 
 def cancel(editor: Editor) -> None:
@@ -138,10 +147,12 @@ def select_next(editor: Editor, step: int) -> None:
     if not order:
         return
     selected = [order.index(owner) for owner in select_owners(editor.selection).owners if owner in order]
-    if step > 0:
-        index = max(selected) + step if selected else 0
+    if not selected:
+        index = 0 if step > 0 else -1
+    elif step > 0:
+        index = max(selected) + step
     else:
-        index = min(selected) + step if selected else -1
+        index = min(selected) + step
     editor.select(Selection.of(order[index % len(order)]))
 
 
@@ -168,7 +179,7 @@ def split_wall(editor: Editor) -> None:
 
 def extend_wall(editor: Editor) -> None:
     """Extend a wall from the selected end to the cursor."""
-    cursor = require(editor.cursor, "move the mouse to where the wall is to go on to")
+    cursor = require(editor.cursor, "move the mouse to the new end of the wall")
     vertex = require_vertex(editor)
     origin = find_position(editor.sketch, vertex)
     end = editor.snap(cursor, REACH_PX * editor.pixel, origin).point
@@ -188,7 +199,7 @@ def scale_wall_width(editor: Editor, factor: float) -> None:
     selection = select_owners(editor.selection)
     shapes = [editor.sketch.get_item(key).shape for key in selection.items]
     widths = [shape.width for shape in shapes if isinstance(shape, WallObstacle)]
-    previous = widths[0] if widths else editor.wall_width
+    previous = next(iter(widths), editor.wall_width)
     width = round(max(previous * factor, MIN_WALL_WIDTH_M), 3)
     if widths and not editor.tool.is_busy:
         change = properties.set_width(editor.sketch, selection, width)
@@ -223,13 +234,15 @@ def convert_to_areas(editor: Editor) -> None:
 
 def fix_problem(editor: Editor) -> None:
     """Fix the chosen problem, or the first that can be fixed."""
-    problems = editor.problems if editor.problem is None else (editor.problem,)
+    problems = editor.problems
+    if editor.problem is not None:
+        problems = (editor.problem,)
     for problem in problems:
         change = fixes.find_fix(editor.sketch, problem, editor.radius)
         if change is not None:
             editor.apply(change)
             return
-    raise MapError("there is nothing that can be mended by itself")
+    raise MapError("no problem can be fixed automatically")
 
 
 def show_next_problem(editor: Editor) -> None:
@@ -237,8 +250,10 @@ def show_next_problem(editor: Editor) -> None:
     problems = editor.problems
     if not problems:
         editor.problem = None
-        is_measured = editor.measurement is not None
-        editor.show_message("nothing is wrong with the map" if is_measured else "not looked at yet")
+        if editor.measurement is None:
+            editor.show_message("the map has not been checked yet")
+        else:
+            editor.show_message("the map has no problems")
         return
     index = 0
     if editor.problem in problems:
@@ -264,4 +279,6 @@ def find_common_length(editor: Editor, attribute: str) -> float | None:
         shape = sketch.find_object(owner)
         if isinstance(shape, _SHAPES_WITH[attribute]):
             lengths.add(getattr(shape, attribute))
-    return lengths.pop() if len(lengths) == 1 else None
+    if len(lengths) != 1:
+        return None
+    return lengths.pop()

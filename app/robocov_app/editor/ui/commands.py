@@ -72,10 +72,13 @@ class EditorCommandGroup(CommandGroup):
     ) -> None:
         """Add a command that applies an edit to the selected objects, with a value if it needs one."""
         editor = self.editor
-        values = () if value is None else (value,)
 
         def apply() -> None:
-            editor.apply(edit(editor.sketch, actions.require_selection(editor), *values))
+            selection = actions.require_selection(editor)
+            if value is None:
+                editor.apply(edit(editor.sketch, selection))
+            else:
+                editor.apply(edit(editor.sketch, selection, value))
 
         self.add(name, title, apply, *keys, repeats=repeats)
 
@@ -211,8 +214,8 @@ def _list_arrange_commands(editor: Editor) -> EditorCommandGroup:
     group.add_edit("raise", "To the top", properties.restack, "page up", value="top")
     group.add_edit("lower", "To the bottom", properties.restack, "page down", value="bottom")
     group.add_edit("group", "Group: a click selects all of it", properties.group, "ctrl+g")
-    group.add_edit("ungroup", "Take out of its group", properties.ungroup, "ctrl+shift+g")
-    group.add_edit("lock", "Lock: the mouse takes it no more", properties.lock, "ctrl+l")
+    group.add_edit("ungroup", "Remove from its group", properties.ungroup, "ctrl+shift+g")
+    group.add_edit("lock", "Lock: the mouse does not select it", properties.lock, "ctrl+l")
     group.add_edit("hide", "Hide in the editor", properties.hide, "ctrl+h")
     group.add("release", "Unlock and show all", release_all, "ctrl+shift+l")
     return group
@@ -236,8 +239,8 @@ def _list_combine_commands(editor: Editor) -> EditorCommandGroup:
     group.add_edit("polygons", "Turn into polygons", properties.convert_to_polygons, "alt+p")
     group.add_edit("boundary:of", "Make it the boundary", properties.convert_to_boundary)
     group.add_edit("repair", "Repair crossing outlines", boolean.repair_outlines, "alt+r")
-    group.add("density:area", "Make it an area that counts more", partial(actions.convert_to_areas, editor))
-    group.add("fill:unreachable", "Fill all that robots cannot reach", fill_unreachable)
+    group.add("density:area", "Make it an area of the density", partial(actions.convert_to_areas, editor))
+    group.add("fill:unreachable", "Fill unreachable areas", fill_unreachable)
     return group
 
 
@@ -253,9 +256,9 @@ def _list_vertex_commands(editor: Editor) -> EditorCommandGroup:
     group.add("extend", "Extend the wall to the cursor", partial(actions.extend_wall, editor), "shift+w")
     group.add("fill", "Fill the hole", partial(actions.fill_hole, editor), "shift+f")
     group.add_edit(
-        "simplify", "Remove needless vertices", vertices.simplify, "shift+p", value=SIMPLIFY_TOLERANCE_M
+        "simplify", "Remove redundant vertices", vertices.simplify, "shift+p", value=SIMPLIFY_TOLERANCE_M
     )
-    group.add_edit("straighten", "Straighten edges that nearly are", vertices.straighten, "shift+l")
+    group.add_edit("straighten", "Straighten nearly level edges", vertices.straighten, "shift+l")
     group.add_edit(
         "path:repeat", "Obstacle goes in a loop, or back and forth", paths.toggle_repeat, "shift+o"
     )
@@ -293,7 +296,7 @@ def _list_view_commands(
     group.add("panel", "Hide or show the panel", editor.toggle_panel, "h")
     group.add("tab", "Next page of the panel", window.show_next_tab, "ctrl+tab")
     group.add("fullscreen", "Full screen", window.toggle_fullscreen, "f11")
-    group.add("path:play", "Let obstacles move, or stand again", partial(actions.show_motion, editor), "l")
+    group.add("path:play", "Show obstacles in motion, or still", partial(actions.toggle_motion, editor), "l")
     show_next_problem = partial(actions.show_next_problem, editor)
     group.add("problem:next", "Go to the next problem", show_next_problem, "f8", "n", repeats=True)
     fix_problem = partial(actions.fix_problem, editor)

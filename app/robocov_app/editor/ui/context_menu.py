@@ -49,8 +49,10 @@ def _list_obstacle_groups(editor: Editor) -> list[list[str]]:
     groups.append(["rotate:left", "rotate:right", "mirror:x", "mirror:y"])
     if count > 1:
         groups.append(["unite", "subtract", "intersect", "divide"])
-        distribute = ["distribute:x", "distribute:y"] if count > 2 else []
-        groups.append(["align:left", "align:bottom", *distribute])
+        align = ["align:left", "align:bottom"]
+        if count > 2:
+            align += ["distribute:x", "distribute:y"]
+        groups.append(align)
         groups.append(["group", "lock", "hide"])
     else:
         groups.append(["lock", "hide"])
@@ -88,10 +90,13 @@ def _list_vertex_groups(editor: Editor) -> list[list[str]]:
         (vertex,) = selection.vertices
         shape = editor.sketch.find_object(vertex.owner)
         if isinstance(shape, WallObstacle):
-            is_end = vertex.index in (0, len(shape.points) - 1)
-            edit.append("extend" if is_end else "split")
+            if vertex.index in (0, len(shape.points) - 1):
+                edit.append("extend")
+            else:
+                edit.append("split")
         if vertex.ring:
             edit.append("fill")
-    can_copy = BOUNDARY not in select_owners(selection).owners
-    copy = ["copy", "duplicate"] if can_copy else []
+    copy: list[str] = []
+    if BOUNDARY not in select_owners(selection).owners:
+        copy = ["copy", "duplicate"]
     return [edit, align, ["straighten", "simplify"], copy]

@@ -48,8 +48,10 @@ class _Frame:
 
 
 def format_number(value: float | None) -> str:
-    """Format a number for a field, without needless zeros; None as an empty text."""
-    return "" if value is None else f"{round(value, DECIMALS) + 0.0:.12g}"
+    """Format a number for a field, without trailing zeros; None as an empty text."""
+    if value is None:
+        return ""
+    return f"{round(value, DECIMALS) + 0.0:.12g}"
 
 
 def _compute_frame(editor: Editor) -> _Frame:
@@ -131,7 +133,9 @@ def _read_name(editor: Editor) -> str:
 
 def _read_note(editor: Editor) -> str:
     notes = {editor.sketch.get_item(key).note for key in editor.selection.items}
-    return notes.pop() if len(notes) == 1 else ""
+    if len(notes) != 1:
+        return ""
+    return notes.pop()
 
 
 def _read_title(editor: Editor) -> str:
@@ -206,7 +210,7 @@ FIELDS: dict[str, PanelField] = {
     "robots": _build_setting_field(
         "robots", "Robots of the team that is shown at a start, and tried with F5"
     ),
-    "grid": _build_setting_field("grid", "Distance of the grid's lines; arrows move by it"),
+    "grid": _build_setting_field("grid", "Spacing of the grid; arrows move by it"),
     "angle": _build_setting_field("angle", "Lines snap to multiples of this"),
     "name": PanelField(_read_name, actions.rename, "Its name"),
     "note": PanelField(_read_note, TYPED_COMMANDS["note"].action, "A note on it"),
@@ -214,7 +218,7 @@ FIELDS: dict[str, PanelField] = {
     "y": PanelField(_read_y, _write_y, "From below; +0.5 moves by half a meter"),
     "wide": PanelField(_read_width, _write_width, "Also *2, 50% or +0.3"),
     "high": PanelField(_read_height, _write_height, "Also *2, 50% or +0.3"),
-    "width": _build_length_field("width", "width", "How thick the wall is"),
+    "width": _build_length_field("width", "width", "Thickness of the wall"),
     "size:radius": _build_length_field("radius", "circle", "Its radius"),
     "picture:scale": PanelField(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
     "picture:turn": PanelField(_read_picture_turn, _write_picture_turn, "Counter-clockwise"),

@@ -55,25 +55,27 @@ class FileCommands:
         Folder of drafts; None to keep none.
     fit : callable
         Shows the whole map.
-    patient : bool
+    waits_for_workers : bool
         Whether to wait for imports.
 
     Attributes
     ----------
-    leaving : bool
+    may_close : bool
         Whether the editor may be closed.
     """
 
-    def __init__(self, editor: Editor, drafts: Path | None, fit: Action, *, patient: bool = False) -> None:
+    def __init__(
+        self, editor: Editor, drafts: Path | None, fit: Action, *, waits_for_workers: bool = False
+    ) -> None:
         self.editor = editor
         self.drafts = drafts
-        self.leaving = False
+        self.may_close = False
         self._fit = fit
-        self._patient = patient
+        self._waits_for_workers = waits_for_workers
         self._pending: Document | None = None  # opened, until the present document may be closed
 
     def leave(self, then: Action) -> None:
-        """Close the document, after asking about unsaved changes, and go on with an action."""
+        """Close the document, after asking about unsaved changes, and then run an action."""
         document = self.editor.document
 
         def discard() -> None:
@@ -84,7 +86,7 @@ class FileCommands:
             discard()
             return
         save = partial(self.save, then=lambda: self.leave(then))
-        text = f"“{document.title}” has changes that are in no file."
+        text = f"“{document.title}” has changes that are not saved."
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
         self.editor.ask_question("Save the changes?", text, *answers)
 
@@ -111,10 +113,10 @@ class FileCommands:
     def quit(self) -> None:
         """Close the editor."""
 
-        def set_leaving() -> None:
-            self.leaving = True
+        def allow_closing() -> None:
+            self.may_close = True
 
-        self.leave(set_leaving)
+        self.leave(allow_closing)
 
     def new(self) -> None:
         """Open a new map."""
@@ -186,7 +188,7 @@ class FileCommands:
             self._leave_for(document, f"imported: {path.name}, not saved yet")
 
         worker: Worker[Imported] = DirectWorker(ImportJob())
-        if not self._patient:
+        if not self._waits_for_workers:
             job = f"{ImportJob.__module__}:{ImportJob.__name__}"
             worker = LatestWorker(job, "imports", patience=IMPORT_PATIENCE_S)
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, accept))
@@ -204,27 +206,30 @@ class FileCommands:
         self.editor.recent = [name, *others][:MAX_RECENT]
 
     def save(self, then: Action | None = None) -> str | None:
-        """Save the map, and go on with an action; return the status message."""
+        """Save the map, and then run an action; return the status message."""
         if self.editor.document.path is None:
             self.ask_name(then)
             return None
         return self._save(self.editor.document.path, then)
 
     def ask_name(self, then: Action | None = None) -> None:
-        """Ask for a path, save the map there, and go on with an action."""
+        """Ask for a path, save the map there, and then run an action."""
         folder = self.editor.folder
         suggested = self.editor.document.suggest_path(folder)
-        text = suggested.name if suggested.parent == folder else str(suggested)
+        text = str(suggested)
+        if suggested.parent == folder:
+            text = suggested.name
         self.ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
 
     def _save(
-        self, path: Path, then: Action | None, *, overwrites: bool = False, spoils: bool = False
+        self, path: Path, then: Action | None, *, overwrites: bool = False, replaces_valid_map: bool = False
     ) -> str | None:
-        """Save the map, after asking before a file is replaced that has changed or holds a valid map."""
+        """Save the map, after asking before a file is replaced that has changed or contains a valid map."""
         document = self.editor.document
-        if not overwrites and not spoils and document.would_replace_valid_map(path):
-            text = f"{path.name} holds a valid map; this one cannot run yet."
-            save_draft = partial(self._save, path, then, spoils=True)
+        may_replace = overwrites or replaces_valid_map
+        if not may_replace and document.would_replace_valid_map(path):
+            text = f"{path.name} contains a valid map; this one cannot run yet."
+            save_draft = partial(self._save, path, then, replaces_valid_map=True)
             self._ask_overwrite("Save a draft over it?", text, then, save_draft)
             return None
         try:
@@ -259,7 +264,7 @@ class FileCommands:
         if path.exists() and not overwrites:
             another_name = ("Another name…", "a", self.ask_export)
             replace_it = ("Replace it", "r", lambda: self._export(path, overwrites=True))
-            text = f"{path} is there already."
+            text = f"{path} already exists."
             self.editor.ask_question("Replace the file?", text, another_name, replace_it, _CANCEL)
             return None
         report = export_map(self.editor.sketch.build_environment(), path)
@@ -280,9 +285,9 @@ class FileCommands:
         state = editor.document.check_disk(editor.now)
         title = editor.document.title
         if state == "gone":
-            editor.show_message(f"{title} is no longer there; Ctrl S writes it again", is_error=True)
+            editor.show_message(f"{title} no longer exists; Ctrl S writes it again", is_error=True)
         elif state == "changed":
-            text = f"Something else has changed {title}. Reloading can be undone."
+            text = f"Another program has changed {title}. Reloading can be undone."
             reload = ("Reload", "r", self.reload)
             keep = ("Keep mine", "k", editor.document.ignore_disk_change)
             editor.ask_question("The file has changed", text, reload, keep)
@@ -330,7 +335,7 @@ def set_reference_image(editor: Editor, path: Path) -> None:
 
 
 def _describe_picture_path(path: Path, map_path: Path | None) -> str:
-    """Return the path of a picture as in a map: relative to the map if it is near, otherwise absolute."""
+    """Return the path of a picture as in a map: relative to a map in a nearby folder, otherwise absolute."""
     path = path.resolve()
     if map_path is not None:
         try:

@@ -101,7 +101,9 @@ class ImportDialog(Dialog):
     @property
     def _shown_sheet(self) -> ColorSheet | None:
         """The file in its own colors, if a click sets the role of a color."""
-        return self.sheet if self.click_action == SET_COLOR else None
+        if self.click_action != SET_COLOR:
+            return None
+        return self.sheet
 
     def _request(self) -> None:
         """Request an import with the present settings."""
@@ -120,7 +122,9 @@ class ImportDialog(Dialog):
             self.imported = imported
         if self.problem:
             self.accepted = False
-        return self.imported if self.accepted and self.is_ready else None
+        if not self.accepted or not self.is_ready:
+            return None
+        return self.imported
 
     @property
     def is_busy(self) -> bool:
@@ -132,7 +136,9 @@ class ImportDialog(Dialog):
         """Why the file cannot be imported with the present settings; empty while that is not known."""
         if self._mistake:
             return self._mistake
-        return "" if self._worker.is_busy else self._worker.problem
+        if self._worker.is_busy:
+            return ""
+        return self._worker.problem
 
     @property
     def is_ready(self) -> bool:
@@ -178,9 +184,11 @@ class ImportDialog(Dialog):
         if self.imported is None:
             ui.space(MAPS_GAP_PX)
             if ui.surface is not None:
-                text = "nothing to show" if self.problem else "reading…"
-                words = render_text(text, ui.px(13), ui.theme.faint)
-                ui.surface.blit(words, words.get_rect(center=box.center))
+                text = "reading…"
+                if self.problem:
+                    text = "nothing to show"
+                image = render_text(text, ui.px(13), ui.theme.faint)
+                ui.surface.blit(image, image.get_rect(center=box.center))
             return
         maps_height = self.preview.arrange(box, self.imported, ui.scale)
         if ui.surface is not None:
@@ -276,7 +284,9 @@ class ImportDialog(Dialog):
     def _list_report_lines(self) -> list[str]:
         if self.problem:
             return [self.problem]
-        return self.imported.report.format_lines() if self.imported is not None else []
+        if self.imported is None:
+            return []
+        return self.imported.report.format_lines()
 
     def _draw_report(self, ui: Ui, foot: float) -> None:
         lines: list[str] = []
@@ -287,12 +297,17 @@ class ImportDialog(Dialog):
             lines = [*lines[: max_lines - 1], f"and {len(lines) - max_lines + 1} lines more"]
         ui.row(height=REPORT_LINE_PX, below=0)
         if ui.surface is not None:
-            color = ui.theme.trajectory if self.problem else ui.theme.ink
+            color = ui.theme.ink
+            if self.problem:
+                color = ui.theme.trajectory
             for line in lines:
                 ui.surface.blit(render_text(line, ui.px(SMALL_TEXT_PX), color), ui.cell())
         ui.end_row()
         ui.y = foot - REPORT_LINE_PX
-        hint = HINTS[KEEP_PART if self._shown_sheet is None else SET_COLOR]
-        is_importing_again = self.is_busy and self.imported is not None
-        ui.label("importing…" if is_importing_again else hint, style="unit")
+        hint = HINTS[KEEP_PART]
+        if self._shown_sheet is not None:
+            hint = HINTS[SET_COLOR]
+        if self.is_busy and self.imported is not None:
+            hint = "importing…"
+        ui.label(hint, style="unit")
         ui.end_row()

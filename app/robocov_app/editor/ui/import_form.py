@@ -82,8 +82,11 @@ class ImportForm:
         reading: dict[str, Any] = {}
         shaping: dict[str, Any] = {}
         for name, text in self.entries.items():
-            values = reading if name in reading_names else shaping
-            values[name] = self.find_option(name).parse(text)
+            value = self.find_option(name).parse(text)
+            if name in reading_names:
+                reading[name] = value
+            else:
+                shaping[name] = value
         return ReadOptions(**reading), Shaping(**shaping)
 
     def show(self, ui: Ui, foot: float) -> None:
@@ -115,7 +118,9 @@ class ImportForm:
         style = "bold" if name in self.entries else ""
         ui.label(name.replace("_", " "), tip=option.help, style=style)
         if option.choices:
-            choices = option.choices if option.default else (DEFAULT_TEXT, *option.choices)
+            choices = option.choices
+            if not option.default:
+                choices = (DEFAULT_TEXT, *choices)
             text = ui.dropdown(name, choices, present or DEFAULT_TEXT, tip=option.help)
         else:
             text = ui.text_field(name, present, placeholder=DEFAULT_TEXT, tip=option.help, live=True)

@@ -79,11 +79,10 @@ class ImportPreview:
         gap = round(MAPS_GAP_PX * scale)
         columns = choose_column_count(2, aspect, box.size, row_margin=caption_height)
         width = (box.width - (columns - 1) * gap) // columns
-        free_height = box.height if columns == 2 else (box.height - gap) // 2
+        rows = 2 // columns
+        free_height = (box.height - (rows - 1) * gap) // rows
         height = min(free_height - caption_height, round(width / aspect))
-        second_top = box.top
-        if columns == 1:
-            second_top += caption_height + height + gap
+        second_top = box.top + (rows - 1) * (caption_height + height + gap)
         corners = [box.topleft, (box.right - width, second_top)]
         map_width = float(min(width, round(height * aspect)))
         self.cameras = []
@@ -149,8 +148,8 @@ class ImportPreview:
 def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) -> list[_Caption]:
     comparison = imported.comparison
     report = imported.report
-    lost = "" if comparison.lost.is_empty else f"{format_area(comparison.lost.area, 3)} left out"
-    opened = "" if comparison.opened.is_empty else f"{format_area(comparison.opened.area, 3)} opened"
+    lost = _describe_difference(comparison.lost, "left out")
+    opened = _describe_difference(comparison.opened, "opened")
     facts_before = f"{report.vertices_read} vertices, {format_area(comparison.before.area)} free"
     facts_after = f"{report.vertices_kept} vertices, {format_area(comparison.after.area)} free"
     if comparison.gap is not None:
@@ -160,6 +159,12 @@ def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) ->
     else:
         before = _Caption("as read", facts_before, lost, theme.trajectory)
     return [before, _Caption("as imported", facts_after, opened, theme.start)]
+
+
+def _describe_difference(area: shapely.Geometry, verb: str) -> str:
+    if area.is_empty:
+        return ""
+    return f"{format_area(area.area, 3)} {verb}"
 
 
 def _draw_comparison(

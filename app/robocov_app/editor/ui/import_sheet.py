@@ -24,7 +24,7 @@ from robocov_app.render.camera import Camera
 
 MAX_COLORS = 12  # that are listed; others are chosen by a click on the picture
 COLOR_TOLERANCE = 24.0  # levels in each channel within which colors of a picture count as one
-MIN_LISTED_SHARE = 0.001  # of a picture, from which on a color is listed
+MIN_LISTED_SHARE = 0.001  # of a picture; rarer colors are not listed
 _ROLE_CYCLE: tuple[Role | None, ...] = (None, "free", "solid", "ignore")
 
 
@@ -67,7 +67,9 @@ class ColorSheet:
         # Because of soft edges and noise, the frequent color that is nearest is meant.
         key = ColorKey(tuple((color, "free") for color in self.colors), COLOR_TOLERANCE)
         nearest = key.find_nearest((red, green, blue))
-        return (red, green, blue) if nearest is None else nearest
+        if nearest is None:
+            return red, green, blue
+        return nearest
 
     def draw(self, surface: Surface, camera: Camera) -> None:
         """Draw the file into the view of a camera."""

@@ -23,7 +23,7 @@ from robocov_app.formats import (
 from robocov_app.formats.geometry.conversion.comparison import ImportComparison, compare_maps
 from robocov_app.jobs.messages import Channel
 
-OptionKind = Literal["number", "place", "words", "colors", "width", "text", "choice"]
+OptionKind = Literal["number", "position", "words", "colors", "width", "text", "choice"]
 ImportSettings: TypeAlias = type[ReadOptions] | type[Shaping]
 ImportRequest: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
 """A file, its format, and how it is to be read and shaped."""
@@ -59,13 +59,15 @@ class ImportOption:
     def parse(self, text: str) -> Any:
         """Return the value of a typed or chosen text; raise ParameterError if it means nothing."""
         if self.kind == "choice":
-            return True if text == ON else text
+            if text == ON:
+                return True
+            return text
         if self.kind in ("words", "colors"):
             return tuple(word.strip() for word in text.split(",") if word.strip())
         if self.kind in ("text", "width"):
             return text.strip()
         numbers = _parse_numbers(text)
-        if self.kind == "place":
+        if self.kind == "position":
             if len(numbers) != 2:
                 raise ParameterError(f"{self.name}: expected x and y, got {quote(text)}")
             return numbers
@@ -112,11 +114,13 @@ def _read_field_docstrings(settings: ImportSettings) -> dict[str, str]:
 def _build_option(field: Field[Any], hint: Any, help_text: str) -> ImportOption:
     """Return the option for a field, by the type of its values."""
     name = field.name
-    default = "" if field.default is None else str(field.default)
+    default = ""
+    if field.default is not None:
+        default = str(field.default)
     if get_origin(hint) not in (Literal, tuple):
-        # Of an optional type, the type that is not None.
+        # An optional type becomes the type that is not None.
         members = [member for member in get_args(hint) if member is not type(None)]
-        hint = members[0] if members else hint
+        hint = next(iter(members), hint)
     if hint is bool:
         return ImportOption(name, "choice", (OFF, ON), OFF, help_text)
     if get_origin(hint) is Literal:
@@ -128,11 +132,15 @@ def _build_option(field: Field[Any], hint: Any, help_text: str) -> ImportOption:
 def _choose_kind(name: str, hint: Any) -> OptionKind:
     if get_origin(hint) is tuple:
         if ... not in get_args(hint):
-            return "place"
-        return "colors" if name.endswith("_color") else "words"
+            return "position"
+        if name.endswith("_color"):
+            return "colors"
+        return "words"
     if name == "min_stroke":
         return "width"
-    return "number" if hint is float else "text"
+    if hint is float:
+        return "number"
+    return "text"
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,13 +85,17 @@ class EditorLauncher:
         """
         # The file is read before a window appears, so that its errors are reported without one.
         opened = self._read_file()
-        document = opened if isinstance(opened, Document) else Document.new(self._draft_folder)
+        document = opened
+        if not isinstance(document, Document):
+            document = Document.new(self._draft_folder)
         with ExitStack() as stack:
-            # Does nothing if the document was closed by then.
+            # Does nothing if the document has been closed before.
             stack.callback(document.close, discard=False)
             worker = stack.enter_context(closing(create_measurement_worker(direct=self.headless)))
             stack.enter_context(open_display(headless=not self._has_display, missing_message=NO_DISPLAY))
-            file = find_settings_file(SETTINGS_FILE) if self._has_display else None
+            file = None
+            if self._has_display:
+                file = find_settings_file(SETTINGS_FILE)
             settings, settings_message = load_settings(EditorSettings, file)
             editor = Editor(document, worker, self.folder, settings)
             self._prepare_editor(editor, settings)
@@ -103,7 +107,7 @@ class EditorLauncher:
             try:
                 with keep_changes(settings, file, partial(read_settings, window)):
                     yield window
-                is_discarded = window.documents.leaving
+                is_discarded = window.documents.may_close
             finally:
                 window.close()
                 # Unsaved changes are kept to be offered, unless the user has decided about them.
@@ -118,7 +122,9 @@ class EditorLauncher:
         """Folder for drafts; None if none are kept."""
         if self.headless:
             return None
-        return find_draft_folder(self.folder if self.served else None)
+        if self.served:
+            return find_draft_folder(self.folder)
+        return find_draft_folder(None)
 
     def _read_file(self) -> Document | Importer:
         """Return the document to edit, or the importer of a foreign file."""
@@ -144,7 +150,8 @@ class EditorLauncher:
     def _open_window(self, editor: Editor, settings: EditorSettings) -> EditorWindow:
         drafts = self._draft_folder
         scale = choose_scale(self.scale or settings.scale, has_display=self._has_display)
-        window = EditorWindow(editor, self._choose_size(settings), scale, drafts, patient=self.headless)
+        size = self._choose_size(settings)
+        window = EditorWindow(editor, size, scale, drafts, waits_for_workers=self.headless)
         window.faults = FaultLog(drafts)
         window.contains_faults = not self.headless
         window.panel.show_tab(settings.tab)
@@ -158,7 +165,9 @@ class EditorLauncher:
         if self.size:
             return self.size
         saved = (settings.width, settings.height)
-        return fit_to_screen(saved) if self._has_display else saved
+        if self._has_display:
+            return fit_to_screen(saved)
+        return saved
 
 
 def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:

@@ -43,12 +43,12 @@ def list_map_facts(editor: Editor) -> list[Fact]:
             _describe_parts(measurement),
             "Connected parts of the free space, and those that a robot can sweep",
         ),
-        Fact("Gap", _describe_gap(measurement), "The narrowest passage, against a robot's diameter"),
-        Fact("Holds", _describe_content(sketch, measurement), "Obstacles and their vertices"),
+        Fact("Gap", _describe_gap(measurement), "The narrowest passage, and a robot's diameter"),
+        Fact("Content", _describe_content(sketch, measurement), "Obstacles and their vertices"),
         Fact(
             "Density",
             density.describe_density(sketch.density),
-            "How much each place counts: the tool Density; floor 0.5 and density none are commands",
+            "Weights of the positions: the tool Density; floor 0.5 and density none are commands",
         ),
     ]
 
@@ -61,7 +61,9 @@ def _describe_size(sketch: Sketch) -> str:
 
 
 def _describe_free_area(measurement: Measurement | None) -> str:
-    return UNKNOWN if measurement is None else f"{measurement.free_area:.2f} m²"
+    if measurement is None:
+        return UNKNOWN
+    return f"{measurement.free_area:.2f} m²"
 
 
 def _describe_parts(measurement: Measurement | None) -> str:
@@ -69,7 +71,9 @@ def _describe_parts(measurement: Measurement | None) -> str:
         return UNKNOWN
     parts = len(measurement.components)
     reachable = len(measurement.reached)
-    return f"{parts}" if parts == reachable else f"{parts}; {reachable} for a robot"
+    if parts == reachable:
+        return f"{parts}"
+    return f"{parts}; {reachable} for a robot"
 
 
 def _describe_gap(measurement: Measurement | None) -> str:
@@ -105,11 +109,12 @@ def list_status(editor: Editor, frame_rate: float, team: Team | None) -> list[st
     if editor.cursor is not None:
         texts.append(format_point(editor.cursor))
     is_selecting = editor.tool is editor.toolbox.selector
-    item = _find_hovered_item(editor) if is_selecting else None
-    if not is_selecting:
+    if is_selecting:
+        item = _find_hovered_item(editor)
+        if item is not None and item.note:
+            texts.append(f"{item.shape.name or 'note'}: {item.note}")
+    else:
         texts.append(f"{editor.tool.title}: {editor.tool.hint}")
-    if item is not None and item.note:
-        texts.append(f"{item.shape.name or 'note'}: {item.note}")
     if is_selecting and editor.selection:
         texts.append(editor.selection.describe(editor.sketch))
     if team is not None and "robots" in editor.shown:
@@ -137,4 +142,6 @@ def _describe_team(team: Team) -> str:
 def _describe_snapping(editor: Editor) -> str:
     if not editor.snaps:
         return "no snapping"
-    return f"grid {editor.grid:g} m" if "grid" in editor.snaps else "grid off"
+    if "grid" not in editor.snaps:
+        return "grid off"
+    return f"grid {editor.grid:g} m"

@@ -17,7 +17,7 @@ from robocov_app.editor.model.selection import (
     format_numbered_name,
     list_vertices,
 )
-from robocov_app.editor.model.sketch import BOUNDARY, KINDS, Owner
+from robocov_app.editor.model.sketch import BOUNDARY, KINDS, Item, Owner
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.settings import LAYERS
 from robocov_app.editor.tools.snap_switches import SNAPS
@@ -225,13 +225,17 @@ class EditorPanel(CommandPanel):
         """Show the buttons that stay in sight, the tools, and the page that is open."""
         ui.inset(12, 8, 12)
         document = self.editor.document
-        suffix = ", not saved" if document.history.has_unsaved_changes else ""
-        ui.header(f"{document.title}{suffix}")
+        title = document.title
+        if document.history.has_unsaved_changes:
+            title = f"{title}, not saved"
+        ui.header(title)
         for row in FILE_BUTTONS:
             self.show_buttons(ui, row)
         self.show_tools(ui, self.editor.toolbox, TOOL_COLUMNS)
         count = len(self.editor.problems)
-        titles = {"problems": f"Problems {min(count, MAX_PROBLEM_COUNT)}"} if count else {}
+        titles: dict[str, str] = {}
+        if count:
+            titles = {"problems": f"Problems {min(count, MAX_PROBLEM_COUNT)}"}
         self.show_pages(ui, titles)
 
     def _draw_layer_check(self, ui: Ui, name: str) -> None:
@@ -347,9 +351,10 @@ class EditorPanel(CommandPanel):
         ui.row(LABEL_WIDTH_PX, 0)
         ui.label("Opacity")
         picture = self.editor.sketch.background
-        present = picture.opacity if picture is not None else 0.5
-        reason = "" if picture is not None else "there is no picture under the map"
-        opacity = ui.slider("opacity", present, 0.0, 1.0, disabled_reason=reason)
+        if picture is None:
+            ui.slider("opacity", 0.5, 0.0, 1.0, disabled_reason="there is no picture under the map")
+            return
+        opacity = ui.slider("opacity", picture.opacity, 0.0, 1.0)
         if opacity is not None:
             self.editor.attempt(lambda: set_picture_opacity(self.editor, round(opacity, 2)))
 
@@ -358,8 +363,9 @@ class EditorPanel(CommandPanel):
         self.show_buttons(ui, PROBLEM_BUTTONS)
         with ui.scroll("problems"):
             if not problems:
-                is_measured = self.editor.measurement is not None
-                text = "Nothing is wrong with the map." if is_measured else "Checking the map …"
+                text = "The map has no problems."
+                if self.editor.measurement is None:
+                    text = "Checking the map …"
                 ui.paragraph(text, color=ui.theme.faint)
             for number, problem in enumerate(problems[:MAX_PROBLEMS]):
                 is_fixed = self._draw_problem(ui, number, problem)
@@ -373,9 +379,12 @@ class EditorPanel(CommandPanel):
         """Draw a problem; return whether its fix has been applied."""
         editor = self.editor
         fix = FIXES.get(problem.kind)
-        text_width = ui.width - 44 - (66 if fix else 0)
+        text_width = ui.width - 44
+        columns = [20, 0]
+        if fix is not None:
+            text_width -= 66
+            columns = [20, 0, 54]
         lines = wrap_text(problem.message, ui.px(TEXT_PX), ui.px(text_width))
-        columns = (20, 0, 54) if fix else (20, 0)
         ui.row(*columns, height=(TEXT_PX + 5) * len(lines) + 8, below=2)
         badge = ui.cell()
         if ui.surface is not None:
@@ -387,7 +396,7 @@ class EditorPanel(CommandPanel):
                 editor.select(Selection.of(problem.owner).restrict_to(editor.sketch))
             editor.revision += 1
             self._show_problem()
-        if fix and ui.button(fix.title, key=f"mend:{number}", small=True):
+        if fix is not None and ui.button(fix.title, key=f"fix:{number}", small=True):
             editor.problem = problem
             editor.attempt(lambda: fix_problem(editor))
             return True
@@ -404,7 +413,9 @@ class EditorPanel(CommandPanel):
         with ui.scroll("history"):
             for number in ui.visible_rows(len(steps), ROW_HEIGHT_PX + 2):
                 text, count = steps[number]
-                mark = "undone" if count < 0 else ""
+                mark = ""
+                if count < 0:
+                    mark = "undone"
                 if ui.option(text, mark, key=f"step:{number}", chosen=count == 0):
                     self.editor.undo_steps(count)
 
@@ -413,18 +424,16 @@ class EditorPanel(CommandPanel):
         editor = self.editor
         sketch = editor.sketch
         rows: list[tuple[Owner, str]] = []  # object, and its marks
-        for item in reversed(sketch.obstacles):
-            marks = [item.group, "locked" if item.locked else "", "hidden" if item.hidden else ""]
-            rows.append((item.key, " · ".join(filter(None, marks))))
+        rows += [(item.key, _describe_marks(item)) for item in reversed(sketch.obstacles)]
         rows += [(name, "") for name, _ in sketch.starts]
         if sketch.boundary is not None:
             rows.append((BOUNDARY, ""))
-        with ui.scroll("things"):
+        with ui.scroll("objects"):
             for number in ui.visible_rows(len(rows), ROW_HEIGHT_PX):
                 owner, marks_text = rows[number]
                 is_selected = owner in editor.selection.owners
                 name = format_numbered_name(sketch, owner)
-                if ui.option(name, marks_text, key=f"thing:{owner}", chosen=is_selected):
+                if ui.option(name, marks_text, key=f"object:{owner}", chosen=is_selected):
                     self._select(Selection.of(owner), editor.selection.without_vertices())
 
     def _draw_vertex_list(self, ui: Ui) -> None:
@@ -444,16 +453,31 @@ class EditorPanel(CommandPanel):
 
     def _select(self, clicked: Selection, previous: Selection) -> None:
         """Select the clicked object; with Shift, add it to the previous selection or remove it."""
-        has_shift = pygame.key.get_mods() & pygame.KMOD_SHIFT
-        self.editor.select(previous.toggle(clicked) if has_shift else clicked)
+        if pygame.key.get_mods() & pygame.KMOD_SHIFT:
+            clicked = previous.toggle(clicked)
+        self.editor.select(clicked)
+
+
+def _describe_marks(item: Item) -> str:
+    """Return the text next to an obstacle in the list of objects: its group, locked and hidden."""
+    marks: list[str] = []
+    if item.group:
+        marks.append(item.group)
+    if item.locked:
+        marks.append("locked")
+    if item.hidden:
+        marks.append("hidden")
+    return " · ".join(marks)
 
 
 def find_object_kind(editor: Editor) -> str:
     """Return the kind of the selection: a key of `OBJECT_BUTTONS`, or "nothing"."""
     sketch = editor.sketch
     selection = editor.selection
+    if len(selection.vertices) == 1:
+        return "vertex"
     if selection.vertices:
-        return "vertex" if len(selection.vertices) == 1 else "vertices"
+        return "vertices"
     if len(selection.owners) > 1:
         return "several"
     if selection.boundary:

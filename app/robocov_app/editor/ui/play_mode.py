@@ -158,7 +158,9 @@ class PlayWindow(ViewerWindow):
             super().do(name)
 
 
-def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
+def start_trial(
+    editor: Editor, screen: pygame.Surface, scale: float, *, waits_for_workers: bool
+) -> PlayWindow:
     """Open the viewer on the map of an editor.
 
     Parameters
@@ -169,7 +171,7 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
         The window in which the viewer is shown.
     scale : float
         Size of texts and widgets.
-    patient : bool
+    waits_for_workers : bool
         Whether to wait for everything that is computed in the background.
 
     Raises
@@ -178,21 +180,26 @@ def start_trial(editor: Editor, screen: pygame.Surface, scale: float, *, patient
         If the map breaks a rule.
     """
     environment = editor.sketch.build_environment()
-    start = editor.start_name if editor.start_name in environment.starts else None
-    limits = RobotProperties(radius=editor.radius)
+    start = None
+    if editor.start_name in environment.starts:
+        start = editor.start_name
     scenario = SessionScenario(
-        environment, robots=editor.robots, start=start, seed=editor.seed, properties=limits
+        environment,
+        robots=editor.robots,
+        start=start,
+        seed=editor.seed,
+        properties=RobotProperties(radius=editor.radius),
     )
     session = Session(scenario)
-    if patient:
+    if waits_for_workers:
         session.playback.clock.budget = float("inf")
-    costs = Costs(DEFAULT_LATTICE, direct=patient)
+    costs = Costs(DEFAULT_LATTICE, direct=waits_for_workers)
     try:
         shown = {layer.name for layer in build_standard_layers() if layer.is_default}
         viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
         viewer.view.theme = editor.theme
         drafts = TrialDrafts(editor.document, viewer.files.tried)
-        trial = PlayWindow(viewer, drafts, screen, scale, is_unattended=patient)
+        trial = PlayWindow(viewer, drafts, screen, scale, is_unattended=waits_for_workers)
     except BaseException:
         costs.close()
         raise

@@ -79,7 +79,10 @@ class EditorPointer(Pointer):
 
     def _toggle_problem(self, problem: Problem) -> None:
         editor = self.editor
-        editor.problem = None if editor.problem is problem else problem
+        if editor.problem is problem:
+            editor.problem = None
+        else:
+            editor.problem = problem
         editor.show_message(problem.message, is_error=problem.is_error)
         editor.revision += 1
 
@@ -88,7 +91,9 @@ class EditorPointer(Pointer):
         # The third of three quick clicks is a single click again.
         is_double = self.count_clicks(event, now) % 2 == 0
         pointer = self._build_event(event.pos)
-        handle = editor.tool.double_click if is_double else editor.tool.press
+        handle = editor.tool.press
+        if is_double:
+            handle = editor.tool.double_click
         editor.attempt(lambda: handle(editor, pointer))
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
@@ -107,10 +112,10 @@ class EditorPointer(Pointer):
         canvas = self.canvas
         is_over_map = canvas.contains(event.pos)
         is_using_tool = self.gesture is not None and not self.gesture.is_pan
-        is_followed = is_over_map or is_using_tool
-        editor.cursor = canvas.to_world(event.pos) if is_followed else None
-        canvas.at = (float(event.pos[0]), float(event.pos[1])) if is_followed else None
-        canvas.hovered = None
+        self.leave()
+        if is_over_map or is_using_tool:
+            editor.cursor = canvas.to_world(event.pos)
+            canvas.at = (float(event.pos[0]), float(event.pos[1]))
         if self.is_busy:
             return
         if is_over_map:

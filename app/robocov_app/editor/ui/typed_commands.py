@@ -146,8 +146,9 @@ def _resize(editor: Editor, text: str) -> None:
 
 
 def _move(editor: Editor, text: str) -> None:
-    displacement = text if text[0] in "+@" else f"@{text}"
-    dx, dy = parse_point(displacement, last=(0.0, 0.0))
+    if text[0] not in "+@":
+        text = f"@{text}"
+    dx, dy = parse_point(text, last=(0.0, 0.0))
     selection = editor.selection or actions.require_selection(editor)
     editor.apply(actions.move(editor, dx, dy, selection))
 
@@ -155,7 +156,9 @@ def _move(editor: Editor, text: str) -> None:
 def _place(editor: Editor, text: str) -> None:
     selection = actions.require_selection(editor)
     bounds = transform.compute_bounds(editor.sketch, selection)
-    corner = bounds[:2] if bounds else None
+    corner = None
+    if bounds is not None:
+        corner = bounds[:2]
     x, y = parse_point(text, last=corner)
     editor.apply(transform.place(editor.sketch, selection, x, y))
 
@@ -163,8 +166,9 @@ def _place(editor: Editor, text: str) -> None:
 def _scale(editor: Editor, text: str) -> None:
     selection = actions.require_selection(editor)
     require(transform.compute_bounds(editor.sketch, selection), "there is nothing to scale")
-    value = text if text.endswith("%") else f"*{text.lstrip('*x')}"
-    factor = parse_length(value, now=1.0)
+    if not text.endswith("%"):
+        text = f"*{text.lstrip('*x')}"
+    factor = parse_length(text, now=1.0)
     editor.apply(transform.scale(editor.sketch, selection, factor, factor))
 
 
@@ -217,11 +221,11 @@ _offset = _apply_edit(boolean.offset, _parse_signed_length)
 _set_note = _apply_edit(properties.set_note, str)
 
 _ROWS = (
-    TypedCommand("grid", "0.25: distance of the grid's lines", _set_grid),
+    TypedCommand("grid", "0.25: spacing of the grid", _set_grid),
     TypedCommand("angle", "15: lines snap to multiples of it", _set_angle),
     TypedCommand("radius", "0.2: of a robot", _set_radius),
     TypedCommand("robots", "8: of the team", _set_robots),
-    TypedCommand("seed", "3: of the team's places", _set_seed),
+    TypedCommand("seed", "3: of the team's positions", _set_seed),
     TypedCommand("wall", "0.1: width of walls that are drawn", _set_wall_width),
     TypedCommand("move", "1 0.5: the selection", _move),
     TypedCommand("place", "2 3: lower left corner", _place),
@@ -232,15 +236,15 @@ _ROWS = (
     TypedCommand("circle", "0.5: radius of circles", _set_circle_radius),
     TypedCommand("bevel", "0.3: cut corners off", _bevel),
     TypedCommand("round", "0.3: round corners", _round),
-    TypedCommand("simplify", "0.05: leave vertices out, to a tolerance", _simplify),
+    TypedCommand("simplify", "0.05: remove vertices, to a tolerance", _simplify),
     TypedCommand("floor", "0.1: density away from hot spots", _set_floor),
     TypedCommand("weight", "2: of a hot spot", _set_weight),
-    TypedCommand("density", "none: takes it away", _remove_density),
+    TypedCommand("density", "none: removes it", _remove_density),
     TypedCommand("speed", "0.5: along a path, m/s", _set_speed),
     TypedCommand("offset", "0.2: grow, or shrink with -", _offset),
     TypedCommand("array", "3 x 2 1.5 1.5: columns, rows, distances", _copy_to_grid),
     TypedCommand("name", "pillar: of the selection", actions.rename),
-    TypedCommand("note", "words: on the selection", _set_note),
+    TypedCommand("note", "text: on the selection", _set_note),
     TypedCommand("title", "Hall: of the map", _set_title),
 )
 TYPED_COMMANDS = {row.word: row for row in _ROWS}

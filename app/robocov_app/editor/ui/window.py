@@ -48,7 +48,7 @@ class EditorWindow(CommandWindow):
         Size of texts and widgets.
     drafts : Path or None
         Folder of drafts; None to keep none.
-    patient : bool
+    waits_for_workers : bool
         Whether to wait for everything that is computed in the background.
 
     Attributes
@@ -77,20 +77,26 @@ class EditorWindow(CommandWindow):
     pointer: EditorPointer
 
     def __init__(
-        self, editor: Editor, size: tuple[int, int], scale: float, drafts: Path | None, patient: bool = False
+        self,
+        editor: Editor,
+        size: tuple[int, int],
+        scale: float,
+        drafts: Path | None,
+        *,
+        waits_for_workers: bool = False,
     ) -> None:
         super().__init__(editor, editor.dialogs, size, scale)
         self.editor = editor
         self.trial: PlayWindow | None = None
         self.canvas = EditorCanvas(editor)
-        self.documents = FileCommands(editor, drafts, self.canvas.fit, patient=patient)
+        self.documents = FileCommands(editor, drafts, self.canvas.fit, waits_for_workers=waits_for_workers)
         commands = list_commands(editor, self.canvas, self.documents, self._build_actions())
         self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
         self.panel = EditorPanel(editor, self.commands, self.do, self._show_problem)
         self.pointer = EditorPointer(editor, self.canvas, self.panel, self.open_menu)
         self.team_sampler = TeamSampler()
-        self._patient = patient
-        editor.snapper.patient = patient
+        self._waits_for_workers = waits_for_workers
+        editor.snapper.waits_for_targets = waits_for_workers
         self._arranged: tuple[object, ...] | None = None
         self._arrange()
         self.canvas.fit()
@@ -112,12 +118,12 @@ class EditorWindow(CommandWindow):
         )
 
     def create_save_point(self) -> Callable[[], None]:
-        """Return a function that takes back all changes since now."""
+        """Return a function that undoes all changes made from now on."""
         editor = self.editor
         document = editor.document
         restore_history = document.history.build_save_point()
 
-        def take_back() -> None:
+        def restore() -> None:
             self.pointer.reset()
             editor.typed = ""
             if editor.document is document:
@@ -132,7 +138,7 @@ class EditorWindow(CommandWindow):
                 editor.revision += 1
                 document.update_draft()
 
-        return take_back
+        return restore
 
     def restore_view(self) -> None:
         """Close everything that may be the cause of an exception in drawing."""
@@ -150,7 +156,7 @@ class EditorWindow(CommandWindow):
         self.editor.snapper.close()
 
     def get_visible_state(self) -> object:
-        """Return all that changes the picture without an event; None while something moves."""
+        """Return everything that can change the frame without an event; None while something moves."""
         editor = self.editor
         canvas = self.canvas
         dialog = editor.dialogs.current
@@ -182,21 +188,21 @@ class EditorWindow(CommandWindow):
         )
 
     def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
+        """Set scale and theme; `panel` shows or hides the panel, None leaves it as it is."""
         self.scale = scale
         self.editor.theme = theme
         if panel is not None:
-            self.editor.panel = panel
+            self.editor.shows_panel = panel
         self.editor.revision += 1
         if self.trial is not None:
             self.trial.set_appearance(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
-        """Let seconds pass: poll files and workers, and adapt layout, cursor and title."""
+        """Advance the clock: poll files and workers, and adapt layout, cursor and title."""
         if self.trial is not None:
             self._update_trial(self.trial, seconds)
             return
-        if self.documents.leaving:
+        if self.documents.may_close:
             self.closed = True
             return
         editor = self.editor
@@ -207,15 +213,17 @@ class EditorWindow(CommandWindow):
         if not (self.pointer.is_busy and editor.measurement_worker.is_busy):
             editor.request_measurement()
         editor.show_message(editor.document.autosaver.problem, is_error=True)
-        if self.documents.leaving:
+        if self.documents.may_close:
             self.closed = True
             return
         self._arrange()
         self.panel.is_covered = self.dialogs.is_open
         self.panel.update()
         self.cursor.show(self._choose_cursor())
-        unsaved_mark = "● " if editor.document.history.has_unsaved_changes else ""
-        set_title(f"{unsaved_mark}{editor.document.title} · robocov edit")
+        title = editor.document.title
+        if editor.document.history.has_unsaved_changes:
+            title = f"● {title}"
+        set_title(f"{title} · robocov edit")
 
     def _update_team(self) -> None:
         editor = self.editor
@@ -239,12 +247,12 @@ class EditorWindow(CommandWindow):
     def _arrange(self) -> None:
         """Lay the window out again after another size, scale or theme."""
         editor = self.editor
-        key = (self.screen.get_size(), self.scale, editor.panel, editor.theme)
+        key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.theme)
         if key == self._arranged:
             return
         self._arranged = key
         self.theme = get_theme(editor.theme)
-        self.layout = build_layout(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
+        self.layout = build_layout(key[0], self.scale, 1, 1.0, panel=editor.shows_panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 
@@ -274,12 +282,16 @@ class EditorWindow(CommandWindow):
 
     def _edit_name(self) -> None:
         """Put the text cursor into the name of the selected object, or of the map."""
-        has_object = len(self.editor.selection.owners) == 1
-        self.editor.panel = True
+        tab = "map"
+        field = "title"
+        if len(self.editor.selection.owners) == 1:
+            tab = "object"
+            field = "name"
+        self.editor.shows_panel = True
         self._arrange()
-        self.panel.show_tab("object" if has_object else "map")
+        self.panel.show_tab(tab)
         self.panel.ui.run(None, None)
-        self.panel.ui.set_focus("name" if has_object else "title")
+        self.panel.ui.set_focus(field)
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
         """Open the context menu, and select the object under a pixel unless it is selected."""
@@ -297,7 +309,7 @@ class EditorWindow(CommandWindow):
         if self.editor.toolbox.selector.is_busy:
             # A drag ends, but an unfinished drawing stays.
             self.editor.toolbox.selector.cancel(self.editor)
-        trial = start_trial(self.editor, self.screen, self.scale, patient=self._patient)
+        trial = start_trial(self.editor, self.screen, self.scale, waits_for_workers=self._waits_for_workers)
         trial.windowed_size = self.windowed_size
         trial.cursor = self.cursor
         self.trial = trial
