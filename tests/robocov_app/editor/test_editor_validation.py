@@ -179,7 +179,12 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
             (1.0, 1.0),
             "a",
         ),
-        (hall(starts=(("a", PointsStart(())),)), "start “a”: has no positions: it needs one for each robot", None, "a"),
+        (
+            hall(starts=(("a", PointsStart(())),)),
+            "start “a”: has no positions: it needs one for each robot",
+            None,
+            "a",
+        ),
         (
             hall(starts=(("", DiscStart((2.0, 2.0), 1.0)),)),
             "a start has no name",
@@ -238,9 +243,7 @@ def test_warnings_of_what_may_be_a_mistake():
     beside = PolygonObstacle(((12.0, 1.0), (13.0, 1.0), (13.0, 2.0)))
     assert warned(hall(beside)) == ["polygon 1 lies outside the boundary"]
     twice = CircleObstacle((5.0, 5.0), 1.0, "a")
-    assert warned(hall(twice, replace(twice, name="b"))) == [
-        "circle “b” duplicates another obstacle"
-    ]
+    assert warned(hall(twice, replace(twice, name="b"))) == ["circle “b” duplicates another obstacle"]
     doubled = PolygonObstacle(((1.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.0, 3.0)))
     assert warned(hall(doubled)) == ["polygon 1: two vertices have the same position, (1, 1)"]
     ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
